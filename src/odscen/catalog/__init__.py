@@ -1,0 +1,1 @@
+"""Maps and assets on disk."""

@@ -1,0 +1,149 @@
+"""The whole error tree.
+
+::
+
+    OdscenError                     everything odscen raises on purpose; ``exit_code`` for the command line
+    |-- InputError (2)              what the user gave cannot be used; names file, place and value
+    |   |-- OpenDriveError          an .xodr file, with the element path and the value at fault
+    |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
+    |   |-- ScenarioError           a scenario document or its graph form; carries all problems found
+    |   `-- NotFoundError           a name that is not in the catalogue, with close names
+    |-- WorkspaceError (2)          a workspace that cannot be read or written
+    |-- MissingDependencyError (2)  something that is not installed, and how to get it
+    `-- ToolError (3)               a program or library that we call failed, in its own words
+        |-- NetconvertError         netconvert: refused, crashed, ran out of time or of memory
+        `-- SimulationError         SUMO: refused to start, died, or stopped early
+
+Messages read ``place: what is wrong``; a place is a file, then the path of the element in it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+
+class OdscenError(Exception):
+    """Base of every error that odscen raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(OdscenError):
+    """Something the user gave cannot be used.
+
+    Parameters
+    ----------
+    problem
+        What is wrong, with the value.
+    file
+        Name of the file, if there is one.
+    element
+        Path of the element inside the file, for example ``road 7 > laneSection 0 > lane -1``.
+    """
+
+    exit_code = 2
+
+    def __init__(self, problem: str, *, file: str | None = None, element: str | None = None) -> None:
+        self.problem = problem
+        self.file = file
+        self.element = element
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.file, self.element, self.problem) if part)
+
+
+class OpenDriveError(InputError):
+    """An OpenDRIVE file is malformed or uses something that is not supported."""
+
+
+class GraphFormatError(InputError):
+    """A graph file (GraphML, npz) cannot be read as one of ours."""
+
+
+class ScenarioError(InputError):
+    """A scenario document or its graph form is not usable; ``problems`` lists every reason."""
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        problems: Sequence[str] = (),
+        file: str | None = None,
+        element: str | None = None,
+    ) -> None:
+        self.problems = tuple(problems)
+        super().__init__(problem, file=file, element=element)
+
+    def __str__(self) -> str:
+        return "\n".join([super().__str__(), *(f"  - {problem}" for problem in self.problems)])
+
+
+class NotFoundError(InputError):
+    """A name is not known; the message offers close ones.
+
+    Parameters
+    ----------
+    what
+        The kind of thing, for example ``"map"``.
+    name
+        The name that was asked for.
+    known
+        All names there are.
+    """
+
+    def __init__(self, what: str, name: str, known: Sequence[str]) -> None:
+        self.what = what
+        self.name = name
+        close = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        if close:
+            hint = f"; did you mean {', '.join(close)}?"
+        elif known:
+            listed = ", ".join(sorted(known)[:8])
+            hint = f"; known are {listed}{', ...' if len(known) > 8 else ''}"
+        else:
+            hint = f"; there is no {what} yet"
+        super().__init__(f"no {what} named {name!r}{hint}")
+
+
+class WorkspaceError(OdscenError):
+    """The workspace cannot be read or written."""
+
+    exit_code = 2
+
+
+class MissingDependencyError(OdscenError):
+    """A package or program is not installed; the message says how to get it."""
+
+    exit_code = 2
+
+
+class ToolError(OdscenError):
+    """A program or library that we call failed; ``output`` is what it said."""
+
+    exit_code = 3
+
+    def __init__(self, problem: str, *, output: str = "") -> None:
+        self.output = output
+        super().__init__(f"{problem}\n{output.strip()}" if output.strip() else problem)
+
+
+class NetconvertError(ToolError):
+    """netconvert refused the map, crashed, or ran out of time or memory."""
+
+
+class SimulationError(ToolError):
+    """SUMO refused to start, died, or stopped early."""
+
+
+@contextmanager
+def in_file(file: str) -> Iterator[None]:
+    """Add the file's name to any :class:`InputError` that passes through without one."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is None:
+            error.file = file
+        raise

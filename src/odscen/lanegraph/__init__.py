@@ -1,0 +1,1 @@
+"""The lane graph, its segments, the pedestrian graph."""

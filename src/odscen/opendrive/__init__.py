@@ -1,0 +1,1 @@
+"""OpenDRIVE text to road model, and its evaluation."""

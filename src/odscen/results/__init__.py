@@ -1,0 +1,1 @@
+"""From trajectories and events to figures and a report."""

@@ -1,0 +1,1 @@
+"""The scenario document, its graph form, edits, checks and sampling."""

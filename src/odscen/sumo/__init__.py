@@ -1,0 +1,1 @@
+"""From a scenario to SUMO files, and the run."""
