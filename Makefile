@@ -1,0 +1,46 @@
+# Two commands do everything on a fresh machine: `make demo` and `make test`.
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/ready
+
+.PHONY: demo test check format bench golden maps clean
+
+# Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
+demo: $(READY)
+	$(BIN)/odscen demo --workspace demo
+
+# Set-up plus the tests; the slow ones run with `make test PYTEST='-m slow'`.
+test: $(READY)
+	$(BIN)/python -m pytest $(or $(PYTEST),-m "not slow")
+
+check: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# Benchmarks print ratios against a named peer, measured in the same run.
+bench: $(READY)
+	$(BIN)/python -m bench
+
+# Rewrites golden files and the published schema from what the code does now; read the diff.
+golden: $(READY)
+	ODSCEN_GOLDEN=write $(BIN)/python -m pytest -q -m golden
+
+# Writes maps/*.xodr again.
+maps: $(READY)
+	$(BIN)/python -m tools.make_maps
+
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "odscen needs Python 3.11 or newer; this is " + sys.version.split()[0])'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --editable '.[png]' --group dev
+	touch $@
+
+clean:
+	rm -rf .venv demo bench/out

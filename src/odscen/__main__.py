@@ -1,0 +1,5 @@
+"""``python -m odscen``."""
+
+from odscen.cli import main
+
+main()

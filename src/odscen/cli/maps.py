@@ -1,0 +1,187 @@
+"""``odscen maps``: the catalogue."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from odscen.cli.output import (
+    JsonOption,
+    WorkspaceOption,
+    error_fields,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
+from odscen.errors import InputError, OdscenError
+
+if TYPE_CHECKING:
+    from odscen.catalog.store import MapEntry
+
+app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=True)
+
+
+@app.command()
+def add(
+    files: Annotated[list[Path], typer.Argument(help="OpenDRIVE files.", metavar="FILE.xodr...")],
+    name: Annotated[
+        str | None, typer.Option(help="Name in the catalogue. [default: the file's name]")
+    ] = None,
+    spacing: Annotated[float, typer.Option(help="Metres between nodes of the lane graph.")] = 2.0,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Add maps: build lane graph, SUMO network, statistics and drawing, once.
+
+    A map of the same name is replaced if its content differs, and kept as it is otherwise. Files
+    that cannot be used are refused with their reason; the others are added all the same.
+    """
+    from odscen.catalog.store import Workspace
+
+    if name is not None and len(files) > 1:
+        msg = f"--name takes one file, {len(files)} are given"
+        raise InputError(msg)
+    store = Workspace.open(workspace)
+    rows: list[dict[str, Any]] = []
+    worst = 0
+    for file, map_name in zip(files, names_for(files, name), strict=True):
+        try:
+            with progress(map_name) as step:
+                entry = store.add_map(file, name=map_name, spacing=spacing, progress=step)
+        except OdscenError as error:
+            worst = max(worst, error.exit_code)
+            rows.append({"name": map_name, "source": str(file), "error": error_fields(error)})
+            log(f"{file}: refused: {error}")
+        else:
+            rows.append({**_row(entry), "source": str(file)})
+            log(_added(entry))
+    if as_json:
+        print_json({"maps": rows})
+    raise typer.Exit(worst)
+
+
+def names_for(files: list[Path], name: str | None) -> list[str]:
+    """Names for the maps; files of the same name in one call also get their folder's name."""
+    from odscen.catalog.store import name_from_file
+
+    if name is not None:
+        return [name]
+    stems = Counter(name_from_file(file) for file in files)
+    return [
+        name_from_file(file)
+        if stems[name_from_file(file)] == 1
+        else name_from_file(Path(f"{file.absolute().parent.name}-{file.name}"))
+        for file in files
+    ]
+
+
+@app.command("list")
+def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
+    """List the maps with their statistics."""
+    from odscen.catalog.store import Workspace
+
+    rows = [_row(entry) for entry in Workspace.open(workspace).maps()]
+    if as_json:
+        print_json({"maps": rows})
+    elif not rows:
+        log("No maps yet. Add one with: odscen maps add FILE.xodr")
+    else:
+        shown = ("name", "rule", "road km", "junctions", "crosswalks", "lights", "nodes")
+        print_table(
+            "",
+            shown,
+            [
+                (
+                    row["name"],
+                    row["opendrive"]["rule"],
+                    row["statistics"]["road_length"] / 1000,
+                    row["statistics"]["junctions"],
+                    row["statistics"]["crosswalks"],
+                    row["statistics"]["traffic_lights"],
+                    row["graph"]["nodes"],
+                )
+                for row in rows
+            ],
+        )
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a map: statistics, graph, SUMO network, files, and what was lost on the way."""
+    from odscen.catalog.store import Workspace
+
+    entry = Workspace.open(workspace).map(name)
+    if as_json:
+        files = {key: str(entry.path(key)) for key in entry.info["files"]}
+        print_json({**entry.info, "files": files})
+        return
+    for part in ("opendrive", "statistics", "graph", "sumo", "report"):
+        values = entry.info[part]
+        if part == "report":
+            values = values["counts"]
+        print_table(part, ("", ""), [(key, _plain(value)) for key, value in values.items()])
+    log(f"Drawing: {entry.path('preview')}")
+
+
+@app.command()
+def remove(
+    names: Annotated[list[str], typer.Argument(metavar="NAME...")],
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove maps from the catalogue."""
+    from odscen.catalog.store import Workspace
+
+    store = Workspace.open(workspace)
+    for name in names:
+        store.map(name)
+    for name in names:
+        store.remove_map(name)
+        log(f"Removed {name}")
+    if as_json:
+        print_json({"removed": names})
+
+
+@app.command()
+def render(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File ending in .svg or .png.")],
+    width: Annotated[int, typer.Option(help="Width of a PNG in pixels.", min=100, max=16000)] = 2400,
+    graph: Annotated[bool, typer.Option("--graph", help="Draw the lane graph on top.")] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a map as SVG or PNG."""
+    from odscen.catalog.build import draw_map
+    from odscen.catalog.store import Workspace
+
+    draw_map(Workspace.open(workspace).map(name), out, width=width, with_graph=graph)
+    log(f"Wrote {out}")
+    if as_json:
+        print_json({"name": name, "file": str(out)})
+
+
+def _row(entry: MapEntry) -> dict[str, Any]:
+    keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
+    return {key: entry.info[key] for key in keys}
+
+
+def _added(entry: MapEntry) -> str:
+    graph = entry.info["graph"]
+    return (
+        f"{entry.name}: {graph['nodes']:,} nodes, {graph['segments']:,} segments, "
+        f"built in {entry.info['build_seconds']:.1f} s"
+    )
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, int | float | str | None) else json.dumps(value)
