@@ -1,0 +1,17 @@
+"""``python -m bench [NAME...]``: run all benchmarks, or those named."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+ALL = ("startup", "lane_graph", "maps_add", "recording")
+
+
+def main() -> None:
+    for name in sys.argv[1:] or ALL:
+        print(f"== {name}", flush=True)
+        importlib.import_module(f"bench.{name}").main()
+
+
+main()

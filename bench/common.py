@@ -1,0 +1,44 @@
+"""What the benchmarks share: where real maps lie, and paired timing."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+OUT = Path(__file__).parent / "out"
+
+
+def shared_maps() -> Path | None:
+    """Folder with real maps: ``$ODSCEN_TEST_MAPS``, else ``../shared/maps`` beside the project."""
+    given = os.environ.get("ODSCEN_TEST_MAPS")
+    folder = Path(given) if given else Path(__file__).parents[2] / "shared" / "maps"
+    return folder if folder.is_dir() else None
+
+
+def paired(
+    ours: Callable[[], object], peer: Callable[[], object], *, repeats: int = 7
+) -> tuple[float, float, float]:
+    """Run both in turn; median seconds of each, and the median of the pairwise ratios ours/peer.
+
+    Taking turns makes the ratio hold when the machine's speed drifts. One round of each goes first
+    and is not counted.
+    """
+    ours()
+    peer()
+    times: list[tuple[float, float]] = []
+    for _ in range(repeats):
+        times.append((_seconds(ours), _seconds(peer)))
+    return (
+        statistics.median(mine for mine, _ in times),
+        statistics.median(theirs for _, theirs in times),
+        statistics.median(mine / theirs for mine, theirs in times),
+    )
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
