@@ -45,7 +45,9 @@ class InputError(OdscenError):
 
     exit_code = 2
 
-    def __init__(self, problem: str, *, file: str | None = None, element: str | None = None) -> None:
+    def __init__(
+        self, problem: str, *, file: str | None = None, element: str | None = None
+    ) -> None:
         self.problem = problem
         self.file = file
         self.element = element
