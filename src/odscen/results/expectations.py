@@ -1,0 +1,145 @@
+"""Expectations of a run, such as ``arrived>=0.95`` (requirement R58, simplest form).
+
+``NAME OP NUMBER`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds, the
+counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
+mean_travel_time, ...). A *count* compared with a number from 0 to 1 that is written with a decimal
+point, or followed by ``%``, is taken as a share of the planned actors: ``arrived>=0.95``,
+``arrived>=95%`` and ``arrived==1.0`` are shares, ``arrived>=1`` and ``collided==0`` are counts.
+"""
+
+from __future__ import annotations
+
+import difflib
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from odscen.errors import InputError
+
+COUNTS = (
+    "planned",
+    "inserted",
+    "arrived",
+    "running",
+    "waiting",
+    "teleported",
+    "collided",
+    "emergency_stopped",
+)
+FIGURES = (
+    "insertion_error_max",
+    "insertion_error_mean",
+    "depart_delay_max",
+    "mean_travel_time",
+    "median_travel_time",
+    "p95_travel_time",
+    "mean_speed",
+    "mean_delay",
+    "pedestrian_mean_travel_time",
+    "pedestrian_median_travel_time",
+    "pedestrian_p95_travel_time",
+    "pedestrian_mean_speed",
+    "pedestrian_mean_delay",
+)
+NAMES = ("sim_seconds", *COUNTS, *FIGURES)
+
+_OPERATORS: dict[str, Callable[[float, float], bool]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    "==": operator.eq,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+_PATTERN = re.compile(
+    r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<op>>=|<=|==|>|<)\s*"
+    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<percent>%?)\s*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """One expectation; ``share`` if the value is divided by the number of planned actors first."""
+
+    text: str
+    name: str
+    op: str
+    bound: float
+    share: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """An expectation and what the run had; ``value`` ``None`` if the run has no such figure."""
+
+    expectation: str
+    value: float | None
+    passed: bool
+
+
+def parse_expectation(text: str) -> Expectation:
+    """Read one expectation.
+
+    Raises
+    ------
+    InputError
+        If it is not ``NAME OP NUMBER``, or the name is not known.
+    """
+    match = _PATTERN.fullmatch(text)
+    if match is None:
+        msg = (
+            f"expectation {text!r} is not of the form NAME OP NUMBER, "
+            "for example arrived>=0.95 (OP is one of >= <= > < ==)"
+        )
+        raise InputError(msg)
+    name, number, percent = match["name"], match["number"], bool(match["percent"])
+    if name not in NAMES:
+        close = difflib.get_close_matches(name, NAMES, n=3, cutoff=0.5)
+        hint = f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(NAMES)}"
+        msg = f"expectation {text!r}: no figure is named {name!r}; {hint}"
+        raise InputError(msg)
+    if percent and name not in COUNTS:
+        msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
+        raise InputError(msg)
+    bound = float(number) / 100.0 if percent else float(number)
+    written_as_share = ("." in number or "e" in number.lower()) and 0.0 <= bound <= 1.0
+    return Expectation(
+        text=text.strip(),
+        name=name,
+        op=match["op"],
+        bound=bound,
+        share=name in COUNTS and (percent or written_as_share),
+    )
+
+
+def evaluate(
+    expectations: Sequence[Expectation], summary: Mapping[str, Any]
+) -> tuple[Verdict, ...]:
+    """Hold a run's summary against expectations.
+
+    A figure that the run does not have (nobody arrived, the run failed) fails its expectation.
+    """
+    return tuple(_verdict(expectation, summary) for expectation in expectations)
+
+
+def _verdict(expectation: Expectation, summary: Mapping[str, Any]) -> Verdict:
+    value = _value(expectation, summary)
+    passed = value is not None and _OPERATORS[expectation.op](value, expectation.bound)
+    return Verdict(expectation.text, value, passed)
+
+
+def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
+    if expectation.name in COUNTS:
+        actors = summary.get("actors") or {}
+        count = actors.get(expectation.name)
+        if count is None:
+            return None
+        if not expectation.share:
+            return float(count)
+        return count / actors["planned"] if actors["planned"] else None
+    if expectation.name == "sim_seconds":
+        value = summary.get("sim_seconds")
+    else:
+        value = (summary.get("figures") or {}).get(expectation.name)
+    return None if value is None else float(value)

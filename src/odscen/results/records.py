@@ -1,0 +1,224 @@
+"""What a run is planned to do and what happened: the values that pass between rooms.
+
+A :class:`Plan` is written beside the SUMO files, so that a run can be judged, and repeated, from its
+folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians, seconds, m/s.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import Any
+
+from odscen.errors import InputError
+
+PLAN_FORMAT = "odscen-plan"
+EVENTS_FORMAT = "odscen-events"
+ACTORS_FORMAT = "odscen-actors"
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedActor:
+    """One road user that the run is to insert; those of flows are listed one by one.
+
+    Attributes
+    ----------
+    id
+        Id in SUMO: the actor's id, or ``<flow>.<k>``.
+    x, y, z, hdg
+        Body centre at departure, lateral offset included, OpenDRIVE frame.
+    speed
+        Desired speed, ``None`` for the limit.
+    speed_factor
+        Drawn for this actor; multiplies the speed limit (vehicles) or the walking speed.
+    route_length
+        Metres from the spawn node to the goal along the lane graph.
+    free_flow_time
+        Seconds that the way takes at the desired speed without anybody else; ``None`` if unknown.
+    flow
+        Id of the flow it belongs to, if any.
+    """
+
+    id: str
+    category: str
+    spawn: str
+    goal: str | None
+    depart: float
+    length: float
+    width: float
+    x: float
+    y: float
+    z: float
+    hdg: float
+    speed: float | None = None
+    speed_factor: float = 1.0
+    route_length: float | None = None
+    free_flow_time: float | None = None
+    model: str | None = None
+    flow: str | None = None
+    ego: bool = False
+
+    @property
+    def person(self) -> bool:
+        """Whether SUMO runs it as a person."""
+        return self.category == "pedestrian"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a run is to do. ``net_offset`` is added to OpenDRIVE x and y to give SUMO's."""
+
+    scenario: str
+    seed: int
+    until: float
+    step_length: float
+    net_offset: tuple[float, float]
+    actors: tuple[PlannedActor, ...]
+    elevation: bool = False
+
+    def to_json(self) -> str:
+        """One actor per line; the same plan gives the same text."""
+        head = {
+            "format": PLAN_FORMAT,
+            "version": VERSION,
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "until": self.until,
+            "step_length": self.step_length,
+            "net_offset": list(self.net_offset),
+            "elevation": self.elevation,
+        }
+        return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
+
+    @classmethod
+    def from_json(cls, text: str) -> Plan:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        InputError
+            If it is not a plan of this version.
+        """
+        try:
+            data = json.loads(text)
+            if (data["format"], data["version"]) != (PLAN_FORMAT, VERSION):
+                msg = f"format {data['format']!r} version {data['version']!r} is not a plan"
+                raise InputError(msg)
+            x, y = data["net_offset"]
+            return cls(
+                scenario=data["scenario"],
+                seed=data["seed"],
+                until=data["until"],
+                step_length=data["step_length"],
+                net_offset=(x, y),
+                actors=tuple(PlannedActor(**actor) for actor in data["actors"]),
+                elevation=data["elevation"],
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            msg = f"not a plan of a run: {error!r}"
+            raise InputError(msg) from error
+
+
+class EventKind(StrEnum):
+    """What can happen to an actor."""
+
+    DEPARTED = "departed"
+    ARRIVED = "arrived"
+    TELEPORT_START = "teleport_start"
+    TELEPORT_END = "teleport_end"
+    COLLISION = "collision"
+    EMERGENCY_STOP = "emergency_stop"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened to ``actor``.
+
+    Attributes
+    ----------
+    x, y
+        Body centre (departures), front (everything else), OpenDRIVE frame; ``None`` if unknown.
+    lane
+        SUMO lane, where SUMO names one.
+    partner
+        The other one in a collision.
+    error
+        Departures: metres between the body's centre and its planned place.
+    travel_time
+        Arrivals: seconds since departure.
+    detail
+        SUMO's word for the kind of collision.
+    """
+
+    time: float
+    kind: EventKind
+    actor: str
+    x: float | None = None
+    y: float | None = None
+    lane: str | None = None
+    partner: str | None = None
+    error: float | None = None
+    travel_time: float | None = None
+    detail: str | None = None
+
+
+def events_to_json(events: tuple[Event, ...]) -> str:
+    """``events.json``: one event per line, in order of time."""
+    return json_with_rows(
+        {"format": EVENTS_FORMAT, "version": VERSION},
+        "events",
+        [_without_defaults(event) for event in events],
+    )
+
+
+def events_from_json(text: str) -> tuple[Event, ...]:
+    """Inverse of :func:`events_to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is not a list of events of this version.
+    """
+    try:
+        data = json.loads(text)
+        if (data["format"], data["version"]) != (EVENTS_FORMAT, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a list of events"
+            raise InputError(msg)
+        return tuple(
+            Event(**{**event, "kind": EventKind(event["kind"])}) for event in data["events"]
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not a list of events: {error!r}"
+        raise InputError(msg) from error
+
+
+def json_with_rows(head: Mapping[str, Any], key: str, rows: list[dict[str, Any]]) -> str:
+    """JSON text of ``{**head, key: rows}`` with one row per line, which people can read and diff.
+
+    Numbers are rounded to 1e-6: far below what is physical, and free of rounding noise.
+    """
+    lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
+    body = ",\n".join(
+        "    " + json.dumps(rounded(row), ensure_ascii=False, allow_nan=False) for row in rows
+    )
+    listed = f"[\n{body}\n  ]" if rows else "[]"
+    return "\n".join(["{", *lines, f"  {json.dumps(key)}: {listed}", "}"]) + "\n"
+
+
+def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Round the floats of a row to 1e-6."""
+    return {
+        name: round(value, 6) if isinstance(value, float) else value for name, value in row.items()
+    }
+
+
+def _without_defaults(value: PlannedActor | Event) -> dict[str, Any]:
+    row = {}
+    for field in fields(value):
+        item = getattr(value, field.name)
+        if item != field.default:
+            row[field.name] = item
+    return row

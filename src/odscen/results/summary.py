@@ -1,0 +1,245 @@
+"""From plan and events to what became of each actor, and the figures of a run.
+
+Everything here is a pure function of the plan and the events; wall-clock figures are added by the
+runner to ``summary.json`` only, so that all other files of a run are the same bytes for the same
+seed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from odscen.errors import InputError
+from odscen.results.records import (
+    ACTORS_FORMAT,
+    VERSION,
+    Event,
+    EventKind,
+    Plan,
+    PlannedActor,
+    json_with_rows,
+    rounded,
+)
+
+ActorStatus = Literal["arrived", "running", "waiting"]
+"""``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActorOutcome:
+    """What was planned for an actor and what became of it; seconds, metres, m/s.
+
+    Attributes
+    ----------
+    inserted
+        When it appeared on the road; ``None`` if it never did.
+    depart_delay
+        Seconds it waited beyond its planned departure.
+    insertion_error
+        Metres between the centre of its body and its planned place when it appeared.
+    travel_time
+        From appearing to arriving.
+    delay
+        Travel time beyond the time that the way takes undisturbed, including getting up to speed.
+    mean_speed
+        Route length over travel time.
+    """
+
+    id: str
+    category: str
+    model: str | None
+    ego: bool
+    flow: str | None
+    spawn: str
+    goal: str | None
+    status: ActorStatus
+    depart: float
+    inserted: float | None
+    depart_delay: float | None
+    insertion_error: float | None
+    arrived: float | None
+    travel_time: float | None
+    free_flow_time: float | None
+    delay: float | None
+    route_length: float | None
+    mean_speed: float | None
+    teleports: int
+    collisions: int
+    emergency_stops: int
+
+
+def actor_outcomes(plan: Plan, events: Sequence[Event]) -> tuple[ActorOutcome, ...]:
+    """One outcome per planned actor, in the plan's order."""
+    departures = {e.actor: e for e in events if e.kind is EventKind.DEPARTED}
+    arrivals = {e.actor: e for e in events if e.kind is EventKind.ARRIVED}
+    teleports = Counter(e.actor for e in events if e.kind is EventKind.TELEPORT_START)
+    stops = Counter(e.actor for e in events if e.kind is EventKind.EMERGENCY_STOP)
+    collisions = Counter(
+        name
+        for e in events
+        if e.kind is EventKind.COLLISION
+        for name in {e.actor, e.partner}
+        if name is not None
+    )
+    return tuple(
+        _outcome(
+            actor,
+            departures.get(actor.id),
+            arrivals.get(actor.id),
+            teleports=teleports[actor.id],
+            collisions=collisions[actor.id],
+            emergency_stops=stops[actor.id],
+        )
+        for actor in plan.actors
+    )
+
+
+def _outcome(
+    actor: PlannedActor,
+    departure: Event | None,
+    arrival: Event | None,
+    *,
+    teleports: int,
+    collisions: int,
+    emergency_stops: int,
+) -> ActorOutcome:
+    status: ActorStatus = "arrived" if arrival else "running" if departure else "waiting"
+    inserted = departure.time if departure else None
+    travel_time = arrival.travel_time if arrival else None
+    delay = mean_speed = None
+    if travel_time is not None and actor.free_flow_time is not None:
+        delay = travel_time - actor.free_flow_time
+    if travel_time and actor.route_length is not None:
+        mean_speed = actor.route_length / travel_time
+    return ActorOutcome(
+        id=actor.id,
+        category=actor.category,
+        model=actor.model,
+        ego=actor.ego,
+        flow=actor.flow,
+        spawn=actor.spawn,
+        goal=actor.goal,
+        status=status,
+        depart=actor.depart,
+        inserted=inserted,
+        depart_delay=None if inserted is None else inserted - actor.depart,
+        insertion_error=departure.error if departure else None,
+        arrived=arrival.time if arrival else None,
+        travel_time=travel_time,
+        free_flow_time=actor.free_flow_time,
+        delay=delay,
+        route_length=actor.route_length,
+        mean_speed=mean_speed,
+        teleports=teleports,
+        collisions=collisions,
+        emergency_stops=emergency_stops,
+    )
+
+
+def actors_to_json(outcomes: Sequence[ActorOutcome]) -> str:
+    """``actors.json``: one actor per line."""
+    head = {"format": ACTORS_FORMAT, "version": VERSION}
+    return json_with_rows(head, "actors", [asdict(outcome) for outcome in outcomes])
+
+
+def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
+    """Inverse of :func:`actors_to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is not a list of actors of this version.
+    """
+    try:
+        data = json.loads(text)
+        if (data["format"], data["version"]) != (ACTORS_FORMAT, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a list of actors"
+            raise InputError(msg)
+        return tuple(ActorOutcome(**actor) for actor in data["actors"])
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not a list of actors: {error!r}"
+        raise InputError(msg) from error
+
+
+def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
+    """How many actors were planned, and how many of them met each fate.
+
+    ``inserted`` = ``arrived`` + ``running``; ``planned`` = ``inserted`` + ``waiting``. ``teleported``
+    and ``collided`` count actors, not events.
+    """
+    status = Counter(outcome.status for outcome in outcomes)
+    return {
+        "planned": len(outcomes),
+        "inserted": status["arrived"] + status["running"],
+        "arrived": status["arrived"],
+        "running": status["running"],
+        "waiting": status["waiting"],
+        "teleported": sum(outcome.teleports > 0 for outcome in outcomes),
+        "collided": sum(outcome.collisions > 0 for outcome in outcomes),
+        "emergency_stopped": sum(outcome.emergency_stops > 0 for outcome in outcomes),
+    }
+
+
+def key_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
+    """Figures of the whole run; vehicles and pedestrians apart, as they mix badly.
+
+    Times in seconds, speeds in m/s; ``None`` where nobody arrived. ``mean_speed`` is the space mean:
+    metres of all who arrived over their seconds.
+    """
+    figures: dict[str, float | None] = {
+        "insertion_error_max": _largest([o.insertion_error for o in outcomes]),
+        "insertion_error_mean": _mean([o.insertion_error for o in outcomes]),
+        "depart_delay_max": _largest([o.depart_delay for o in outcomes]),
+    }
+    vehicles = [o for o in outcomes if o.category != "pedestrian"]
+    pedestrians = [o for o in outcomes if o.category == "pedestrian"]
+    figures.update(_travel_figures(vehicles))
+    figures.update(
+        {f"pedestrian_{name}": value for name, value in _travel_figures(pedestrians).items()}
+    )
+    return rounded(figures)
+
+
+def _travel_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
+    times = sorted(o.travel_time for o in outcomes if o.travel_time is not None)
+    moved = [
+        (o.route_length, o.travel_time)
+        for o in outcomes
+        if o.travel_time and o.route_length is not None
+    ]
+    seconds = sum(time for _, time in moved)
+    return {
+        "mean_travel_time": _mean(times),
+        "median_travel_time": _percentile(times, 0.5),
+        "p95_travel_time": _percentile(times, 0.95),
+        "mean_speed": sum(length for length, _ in moved) / seconds if seconds else None,
+        "mean_delay": _mean([o.delay for o in outcomes]),
+    }
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _largest(values: Sequence[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _percentile(ordered: Sequence[float], share: float) -> float | None:
+    """Linear between the two nearest ranks, as ``numpy.percentile`` does."""
+    if not ordered:
+        return None
+    position = share * (len(ordered) - 1)
+    low = int(position)
+    high = min(low + 1, len(ordered) - 1)
+    return ordered[low] + (position - low) * (ordered[high] - ordered[low])
+
+
+def summary_to_json(summary: Mapping[str, Any]) -> str:
+    """``summary.json``; NaN and infinity are refused."""
+    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

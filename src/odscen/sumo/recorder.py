@@ -1,0 +1,109 @@
+"""What happened to whom, collected while the simulation steps.
+
+Only id lists are read per step, and poses of those who have just departed: the cost does not grow with
+the number of vehicles running. Trajectories are SUMO's own business (FCD output).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from odscen.frames import SumoPose, sumo_to_xodr
+from odscen.results.records import Event, EventKind, Plan
+from odscen.sumo.session import Collision, Front, Session
+
+
+class Recorder:
+    """Turns the session's lists into events, step by step.
+
+    Attributes
+    ----------
+    events
+        All events so far, in order of time.
+    departed, arrived
+        How many vehicles and persons so far.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.events: list[Event] = []
+        self.departed = 0
+        self.arrived = 0
+        self._planned = {actor.id: actor for actor in plan.actors}
+        self._offset = plan.net_offset
+        self._elevation = plan.elevation
+        self._departures: dict[str, float] = {}
+        self._touching: set[tuple[str, str]] = set()
+        self._stopping: set[str] = set()
+
+    def record(self, session: Session, time: float) -> None:
+        """Record the step that began at ``time`` and has just been made."""
+        lists = session.lists()
+        for vehicle in lists.departed:
+            self._depart(time, vehicle, session.vehicle_front(vehicle))
+        for person in lists.departed_persons:
+            self._depart(time, person, session.person_front(person))
+        for vehicle in lists.teleports_started:
+            self._place(time, EventKind.TELEPORT_START, vehicle, None)
+        for vehicle in lists.teleports_ended:
+            front = session.vehicle_front(vehicle)
+            self._place(time, EventKind.TELEPORT_END, vehicle, front)
+        self._stops(time, lists.emergency_stops, session)
+        self._collisions(time, session.collisions())
+        # The end of the step is when they left the road.
+        for name in (*lists.arrived, *lists.arrived_persons):
+            self._arrive(session.time, name)
+
+    def _depart(self, time: float, name: str, front: Front | None) -> None:
+        if name in self._departures:  # back on the road after a teleport is no second departure
+            return
+        self._departures[name] = time
+        self.departed += 1
+        if front is None:
+            self.events.append(Event(time, EventKind.DEPARTED, name))
+            return
+        planned = self._planned.get(name)
+        length = planned.length if planned else 0.0
+        centre = sumo_to_xodr(SumoPose(*front), length=length, net_offset=self._offset)
+        x, y = float(centre.x), float(centre.y)
+        error = math.hypot(x - planned.x, y - planned.y) if planned else None
+        self.events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
+
+    def _arrive(self, time: float, name: str) -> None:
+        self.arrived += 1
+        departed = self._departures.get(name)
+        spent = None if departed is None else time - departed
+        self.events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
+
+    def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
+        if front is None:
+            self.events.append(Event(time, kind, name))
+            return
+        dx, dy = self._offset
+        self.events.append(Event(time, kind, name, x=front.x - dx, y=front.y - dy))
+
+    def _stops(self, time: float, stopping: Sequence[str], session: Session) -> None:
+        """Report the first step only of each emergency stop."""
+        for vehicle in stopping:
+            if vehicle not in self._stopping:
+                front = session.vehicle_front(vehicle)
+                self._place(time, EventKind.EMERGENCY_STOP, vehicle, front)
+        self._stopping = set(stopping)
+
+    def _collisions(self, time: float, collisions: Sequence[Collision]) -> None:
+        """Report a pair once, when it begins to touch."""
+        touching = {(c.collider, c.victim) for c in collisions}
+        for collision in collisions:
+            if (collision.collider, collision.victim) in self._touching:
+                continue
+            self.events.append(
+                Event(
+                    time,
+                    EventKind.COLLISION,
+                    collision.collider,
+                    lane=collision.lane,
+                    partner=collision.victim,
+                    detail=collision.type,
+                )
+            )
+        self._touching = touching

@@ -1,0 +1,205 @@
+"""The only door to libsumo: one simulation per process, always closed.
+
+libsumo keeps its simulation in the process, and a second ``libsumo.start`` silently drops the first.
+:func:`open_session` is therefore a context manager that refuses a second one. Only the worker process
+(:mod:`odscen.sumo.worker`) opens a session; SUMO's own words appear on that process's file
+descriptors 1 and 2, which :func:`captured_output` sends to a file.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from odscen.errors import SimulationError
+
+
+class Front(NamedTuple):
+    """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
+
+    x: float
+    y: float
+    z: float
+    angle_deg: float
+
+
+class Collision(NamedTuple):
+    """One collision that SUMO reports in a step; ``pos`` in metres along ``lane``."""
+
+    collider: str
+    victim: str
+    type: str
+    lane: str
+    pos: float
+    collider_speed: float
+    victim_speed: float
+
+
+class StepLists(NamedTuple):
+    """What happened in one step: ids, in SUMO's order."""
+
+    departed: Sequence[str]
+    arrived: Sequence[str]
+    departed_persons: Sequence[str]
+    arrived_persons: Sequence[str]
+    teleports_started: Sequence[str]
+    teleports_ended: Sequence[str]
+    emergency_stops: Sequence[str]
+
+
+class Session:
+    """A running simulation. Made by :func:`open_session` only."""
+
+    def __init__(self, sumo: Any) -> None:
+        self._sumo = sumo
+        self._simulation = sumo.simulation
+        self._errors = (sumo.TraCIException, RuntimeError)
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds at the start of the next step."""
+        return float(self._simulation.getTime())
+
+    def step(self) -> None:
+        """Advance by one step.
+
+        Raises
+        ------
+        SimulationError
+            If SUMO ends the simulation with an error.
+        """
+        try:
+            self._sumo.simulationStep()
+        except self._errors as error:
+            msg = f"SUMO stopped at {self.time:g} s: {error}"
+            raise SimulationError(msg) from error
+
+    def expected(self) -> int:
+        """How many vehicles and persons are on the road or still to come; 0 only when none is."""
+        return int(self._simulation.getMinExpectedNumber())
+
+    def running(self) -> int:
+        """How many vehicles and persons are on the road now."""
+        return int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
+
+    def lists(self) -> StepLists:
+        """Id lists of the last step: one call each, whatever the number of vehicles running."""
+        simulation = self._simulation
+        return StepLists(
+            simulation.getDepartedIDList(),
+            simulation.getArrivedIDList(),
+            simulation.getDepartedPersonIDList(),
+            simulation.getArrivedPersonIDList(),
+            simulation.getStartingTeleportIDList(),
+            simulation.getEndingTeleportIDList(),
+            simulation.getEmergencyStoppingVehiclesIDList(),
+        )
+
+    def collisions(self) -> list[Collision]:
+        """Collisions that lasted during the last step."""
+        return [
+            Collision(
+                str(c.collider),
+                str(c.victim),
+                str(c.type),
+                str(c.lane),
+                float(c.pos),
+                float(c.colliderSpeed),
+                float(c.victimSpeed),
+            )
+            for c in self._simulation.getCollisions()
+        ]
+
+    def vehicle_front(self, vehicle: str) -> Front | None:
+        """Pose of a vehicle on the road, ``None`` if it is not (or no longer) there."""
+        return self._front(self._sumo.vehicle, vehicle)
+
+    def person_front(self, person: str) -> Front | None:
+        """Pose of a person, ``None`` if it is not (or no longer) there."""
+        return self._front(self._sumo.person, person)
+
+    def _front(self, domain: Any, name: str) -> Front | None:
+        try:
+            x, y, z = domain.getPosition3D(name)
+            angle = float(domain.getAngle(name))
+        except self._errors:
+            return None
+        if abs(x) > 1e8:  # SUMO's INVALID_DOUBLE_VALUE, -2^30: known, but not on the road
+            return None
+        return Front(x, y, z, angle)
+
+
+_open = False
+
+
+@contextmanager
+def open_session(arguments: Sequence[str]) -> Iterator[Session]:
+    """Start SUMO with these command-line arguments, without the program's name; close it at the end.
+
+    Raises
+    ------
+    SimulationError
+        If a session is open in this process already (that one lives on), or SUMO refuses to start.
+    """
+    global _open  # noqa: PLW0603 - libsumo itself is one global simulation
+    if _open:
+        msg = "a simulation is running in this process already; libsumo holds only one"
+        raise SimulationError(msg)
+    sumo = import_libsumo()
+    _open = True
+    try:
+        try:
+            sumo.start(["sumo", *arguments])
+        except (sumo.TraCIException, RuntimeError) as error:
+            msg = f"SUMO refused to start: {error}"
+            raise SimulationError(msg) from error
+        yield Session(sumo)
+    finally:
+        _open = False
+        with suppress(sumo.TraCIException, RuntimeError):
+            sumo.close()
+
+
+def import_libsumo() -> Any:
+    """Import libsumo with stdout kept clean.
+
+    With pyarrow importable libsumo prints a warning about Arrow to stdout when imported, which would
+    break output that a program reads; it goes to stderr instead.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        os.dup2(2, 1)
+        import libsumo
+
+        sys.stdout.flush()
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+    return libsumo
+
+
+@contextmanager
+def captured_output(log: Path) -> Iterator[IO[str]]:
+    """Send the process's file descriptors 1 and 2 to ``log``; yield the real stdout.
+
+    C++ code writes to the descriptors, not to ``sys.stdout``, so these are what is redirected.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = os.dup(1), os.dup(2)
+    with log.open("ab") as target, os.fdopen(os.dup(1), "w", encoding="utf-8") as real:
+        os.dup2(target.fileno(), 1)
+        os.dup2(target.fileno(), 2)
+        try:
+            yield real
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            for descriptor, copy in zip((1, 2), kept, strict=True):
+                os.dup2(copy, descriptor)
+                os.close(copy)

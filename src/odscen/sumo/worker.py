@@ -1,0 +1,100 @@
+"""The process that runs one simulation: ``python -m odscen.sumo.worker RUN/plan.json``.
+
+libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every run
+has a process of its own, and only the runner starts it. It reads the plan and the SUMO files beside
+it, steps until nobody is left or the end is reached, writes ``events.json`` and ``actors.json``, and
+sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says goes to ``sumo.log``.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from odscen.errors import OdscenError
+from odscen.results.records import Plan, events_to_json
+from odscen.results.summary import actor_outcomes, actors_to_json
+from odscen.sumo.progress import Done, Failed, Message, Progress, encode
+from odscen.sumo.recorder import Recorder
+from odscen.sumo.session import captured_output, open_session
+
+PLAN_FILE = "plan.json"
+CONFIG_FILE = "sumo/scenario.sumocfg"
+LOG_FILE = "sumo.log"
+TRAJECTORIES_FILE = "trajectories.parquet"
+EVENTS_FILE = "events.json"
+ACTORS_FILE = "actors.json"
+
+MESSAGE_PAUSE = 0.25
+"""Least wall seconds between two progress messages."""
+
+
+def main() -> int:
+    """Run the plan named on the command line; 0 when the simulation ended by itself."""
+    plan_file = Path(sys.argv[1])
+    folder = plan_file.parent
+    with captured_output(folder / LOG_FILE) as stdout:
+
+        def send(message: Message) -> None:
+            stdout.write(encode(message))
+            stdout.flush()
+
+        try:
+            plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
+            send(simulate(plan, folder, send))
+        except (OdscenError, OSError) as error:
+            send(Failed(str(error)))
+            return 3
+    return 0
+
+
+def simulate(plan: Plan, folder: Path, send: Callable[[Message], None]) -> Done:
+    """Run the simulation in ``folder`` and write its events and actors.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO refuses to start or stops with an error.
+    """
+    start = time.perf_counter()
+    recorder = Recorder(plan)
+    sim_seconds, steps = _steps(plan, folder, recorder, send)
+    wall_seconds = time.perf_counter() - start
+    events = tuple(recorder.events)
+    outcomes = actor_outcomes(plan, events)
+    (folder / EVENTS_FILE).write_text(events_to_json(events), encoding="utf-8")
+    (folder / ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
+    return Done(sim_seconds=sim_seconds, steps=steps, wall_seconds=wall_seconds)
+
+
+def _steps(
+    plan: Plan, folder: Path, recorder: Recorder, send: Callable[[Message], None]
+) -> tuple[float, int]:
+    arguments = [
+        "--configuration-file",
+        str(folder / CONFIG_FILE),
+        "--fcd-output",
+        str(folder / TRAJECTORIES_FILE),
+    ]
+    planned, steps, sent = len(plan.actors), 0, 0.0
+    with open_session(arguments) as session:
+        now = session.time
+        while now < plan.until and session.expected() > 0:
+            session.step()
+            recorder.record(session, now)
+            now = session.time
+            steps += 1
+            clock = time.monotonic()
+            if clock - sent >= MESSAGE_PAUSE:
+                sent = clock
+                running = session.running()
+                send(
+                    Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned)
+                )
+        return now, steps
+
+
+if __name__ == "__main__":
+    sys.exit(main())
