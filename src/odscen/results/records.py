@@ -1,18 +1,20 @@
 """What a run is planned to do and what happened: the values that pass between rooms.
 
-A :class:`Plan` is written beside the SUMO files, so that a run can be judged, and repeated, from its
-folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians, seconds, m/s.
+A :class:`Plan` is written beside the SUMO files, so that a run can be judged, and repeated, from
+its folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians, seconds, m/s.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 PLAN_FORMAT = "odscen-plan"
 EVENTS_FORMAT = "odscen-events"

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.errors import InputError
 from odscen.results.records import (
@@ -24,6 +23,9 @@ from odscen.results.records import (
     json_with_rows,
     rounded,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
 ActorStatus = Literal["arrived", "running", "waiting"]
 """``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
@@ -168,8 +170,8 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
 def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
     """How many actors were planned, and how many of them met each fate.
 
-    ``inserted`` = ``arrived`` + ``running``; ``planned`` = ``inserted`` + ``waiting``. ``teleported``
-    and ``collided`` count actors, not events.
+    ``inserted`` = ``arrived`` + ``running``; ``planned`` = ``inserted`` + ``waiting``.
+    ``teleported`` and ``collided`` count actors, not events.
     """
     status = Counter(outcome.status for outcome in outcomes)
     return {
@@ -187,8 +189,8 @@ def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
 def key_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
     """Figures of the whole run; vehicles and pedestrians apart, as they mix badly.
 
-    Times in seconds, speeds in m/s; ``None`` where nobody arrived. ``mean_speed`` is the space mean:
-    metres of all who arrived over their seconds.
+    Times in seconds, speeds in m/s; ``None`` where nobody arrived. ``mean_speed`` is the space
+    mean: metres of all who arrived over their seconds.
     """
     figures: dict[str, float | None] = {
         "insertion_error_max": _largest([o.insertion_error for o in outcomes]),

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is. ``time`` and ``until`` in simulated seconds; counts of vehicles and persons."""
+    """How far a run is: simulated seconds, counts of vehicles and persons."""
 
     time: float
     until: float
@@ -27,7 +27,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The run has ended by itself: simulated seconds and steps made; wall seconds of the stepping."""
+    """The run has ended by itself: simulated seconds, steps, wall seconds of the simulation."""
 
     sim_seconds: float
     steps: int

@@ -1,17 +1,21 @@
 """What happened to whom, collected while the simulation steps.
 
-Only id lists are read per step, and poses of those who have just departed: the cost does not grow with
-the number of vehicles running. Trajectories are SUMO's own business (FCD output).
+Only id lists are read per step, and poses of those who have just departed: the cost does not grow
+with the number of vehicles running. Trajectories are SUMO's own business (FCD output).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from odscen.frames import SumoPose, sumo_to_xodr
 from odscen.results.records import Event, EventKind, Plan
-from odscen.sumo.session import Collision, Front, Session
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.sumo.session import Collision, Front, Session
 
 
 class Recorder:

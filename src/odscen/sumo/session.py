@@ -1,21 +1,23 @@
 """The only door to libsumo: one simulation per process, always closed.
 
-libsumo keeps its simulation in the process, and a second ``libsumo.start`` silently drops the first.
-:func:`open_session` is therefore a context manager that refuses a second one. Only the worker process
-(:mod:`odscen.sumo.worker`) opens a session; SUMO's own words appear on that process's file
-descriptors 1 and 2, which :func:`captured_output` sends to a file.
+libsumo keeps its simulation in the process, and a second ``libsumo.start`` silently drops the
+first. :func:`open_session` is therefore a context manager that refuses a second one. Only the
+worker process (:mod:`odscen.sumo.worker`) opens a session; SUMO's own words appear on that
+process's file descriptors 1 and 2, which :func:`captured_output` sends to a file.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from odscen.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
 
 class Front(NamedTuple):
@@ -138,7 +140,7 @@ _open = False
 
 @contextmanager
 def open_session(arguments: Sequence[str]) -> Iterator[Session]:
-    """Start SUMO with these command-line arguments, without the program's name; close it at the end.
+    """Start SUMO with these command-line arguments (without its name); close it at the end.
 
     Raises
     ------
@@ -167,8 +169,8 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
 def import_libsumo() -> Any:
     """Import libsumo with stdout kept clean.
 
-    With pyarrow importable libsumo prints a warning about Arrow to stdout when imported, which would
-    break output that a program reads; it goes to stderr instead.
+    With pyarrow importable libsumo prints a warning about Arrow to stdout when imported, which
+    would break output that a program reads; it goes to stderr instead.
     """
     sys.stdout.flush()
     kept = os.dup(1)

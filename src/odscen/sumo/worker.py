@@ -1,17 +1,18 @@
 """The process that runs one simulation: ``python -m odscen.sumo.worker RUN/plan.json``.
 
-libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every run
-has a process of its own, and only the runner starts it. It reads the plan and the SUMO files beside
-it, steps until nobody is left or the end is reached, writes ``events.json`` and ``actors.json``, and
-sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says goes to ``sumo.log``.
+libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
+run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
+beside it, steps until nobody is left or the end is reached, writes ``events.json`` and
+``actors.json``, and sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says
+goes to ``sumo.log``.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from odscen.errors import OdscenError
 from odscen.results.records import Plan, events_to_json
@@ -19,6 +20,9 @@ from odscen.results.summary import actor_outcomes, actors_to_json
 from odscen.sumo.progress import Done, Failed, Message, Progress, encode
 from odscen.sumo.recorder import Recorder
 from odscen.sumo.session import captured_output, open_session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 PLAN_FILE = "plan.json"
 CONFIG_FILE = "sumo/scenario.sumocfg"
