@@ -1,0 +1,293 @@
+"""A map drawing as SVG groups, bottom to top, in centimetres with y down.
+
+Every element carries a class (``m-road``, ``m-mark``, ...) beside its colour, so that a page can
+repaint the map for a dark background.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.catalog.markup import Markup, element, join, number, path_data
+
+if TYPE_CHECKING:
+    from odscen.catalog.drawing import Lines, MapDrawing, Symbol
+    from odscen.lanegraph.model import MapGraph
+
+AREA_COLORS = {
+    "green": "#c3d2ae",
+    "other": "#d5d6d1",
+    "rail": "#b9aa9b",
+    "restricted": "#b3b5b2",
+    "curb": "#c9c6bf",
+    "shoulder": "#b4b9bf",
+    "sidewalk": "#e0d8c8",
+    "parking": "#a9b4c4",
+    "bicycle": "#c98f7a",
+    "bus": "#a7939c",
+    "road": "#9aa1aa",
+}
+"""Fill per kind of area, in the order they are painted."""
+
+AREA_NAMES = {
+    "road": "Carriageway",
+    "bus": "Bus, taxi or high-occupancy lane",
+    "bicycle": "Bicycle lane",
+    "sidewalk": "Sidewalk",
+    "parking": "Parking",
+    "shoulder": "Shoulder",
+    "curb": "Kerb",
+    "restricted": "Restricted area",
+    "rail": "Tram or rail",
+    "green": "Median or verge",
+    "other": "Other surface",
+}
+
+MARK_COLORS = {
+    "white": "#ffffff",
+    "yellow": "#f4c431",
+    "red": "#d64545",
+    "blue": "#3f7fd1",
+    "green": "#4a9a5a",
+    "orange": "#ea8a2c",
+}
+
+CROSSWALK_COLOR = "#ff8a1f"
+RELATION_COLORS = ("#000000", "#00E279", "#FF4261")
+"""Successor, left, right (requirement R22)."""
+VEHICLE_NODE_COLOR = "#24A3F2"
+PEDESTRIAN_NODE_COLOR = "#FFD800"
+SEGMENT_COLORS = ("#7b6fd0", "#3f9c8f", "#c7772e", "#b4558a", "#5f8a2f", "#4477aa")
+
+SYMBOL_NAMES = {
+    "traffic_light": "Traffic light",
+    "pedestrian_light": "Pedestrian light",
+    "stop": "Stop sign",
+    "yield": "Yield sign",
+    "speed_limit": "Speed limit",
+}
+
+FONT = "system-ui, 'Segoe UI', 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif"
+
+
+@dataclass(frozen=True, slots=True)
+class LayerOptions:
+    """What to draw, and how large symbols are.
+
+    Attributes
+    ----------
+    symbol_size
+        Height of a traffic light in metres; all symbols follow it.
+    symbols, speed_limits, markings
+        What to show.
+    prefix
+        Put before every ``id``, so that two maps can be in one page.
+    """
+
+    symbol_size: float = 4.0
+    symbols: bool = True
+    speed_limits: bool = False
+    markings: bool = True
+    prefix: str = ""
+
+
+def map_layers(drawing: MapDrawing, options: LayerOptions) -> Markup:
+    """Surfaces, markings, crosswalks, stop lines and symbols of a map."""
+    parts = [_rings(drawing.buildings, class_="m-building", fill="#e4dfd6", stroke="#c9c2b5")]
+    for level in sorted({area.level for area in drawing.areas}):
+        parts.append(_surfaces(drawing, level, options))
+        if options.markings:
+            parts.append(_markings(drawing, level))
+    parts.append(_rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"))
+    parts.append(_crosswalks(drawing, options))
+    parts.append(_rings(drawing.stop_lines, class_="m-stopline", fill="#ffffff"))
+    if options.symbols:
+        parts.append(_symbols(drawing, options))
+    return join([part for part in parts if part])
+
+
+def svg_xy(lines: Lines) -> str:
+    """``d`` of lines with y down."""
+    return path_data(lines.xy * (1.0, -1.0), lines.start)
+
+
+def svg_rings(lines: Lines) -> str:
+    """``d`` of rings with y down."""
+    return path_data(lines.xy * (1.0, -1.0), lines.start, closed=True)
+
+
+def _rings(lines: Lines, **attributes: str) -> Markup:
+    if lines.total == 0:
+        return Markup("")
+    width = 8 if "stroke" in attributes else None
+    return element("path", d=svg_rings(lines), stroke_width=width, **attributes)
+
+
+def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
+    order = list(AREA_COLORS)
+    areas = sorted(
+        (area for area in drawing.areas if area.level == level), key=lambda a: order.index(a.kind)
+    )
+    data = {area.kind: svg_rings(area.rings) for area in areas}
+    parts = []
+    if level > 0:
+        # A light edge and a dark one under it lift a bridge off what it crosses.
+        for width, color, style in ((170, "#6b6f75", "m-edge"), (110, "#f3f1ea", "m-casing")):
+            everything = "".join(data.values())
+            parts.append(
+                element("path", d=everything, class_=style, stroke=color, stroke_width=width)
+            )
+    for kind, rings in data.items():
+        # The thin stroke in the same colour closes hairlines between neighbouring lanes.
+        color = AREA_COLORS[kind]
+        style = f"m-area m-{kind}"
+        parts.append(
+            element("path", d=rings, class_=style, fill=color, stroke=color, stroke_width=6)
+        )
+    return element("g", *parts, id=f"{options.prefix}level-{level}", stroke_linejoin="round")
+
+
+def _markings(drawing: MapDrawing, level: int) -> Markup:
+    parts = []
+    for mark in drawing.marks:
+        if mark.level != level:
+            continue
+        dash = None if mark.dash is None else " ".join(number(d * 100, 0) for d in mark.dash)
+        parts.append(
+            element(
+                "path",
+                d=svg_xy(mark.lines),
+                class_=f"m-mark m-mark-{mark.color}",
+                stroke=MARK_COLORS.get(mark.color, MARK_COLORS["white"]),
+                stroke_width=round(mark.width * 100),
+                stroke_dasharray=dash,
+            )
+        )
+    return element("g", *parts, fill="none") if parts else Markup("")
+
+
+def _crosswalks(drawing: MapDrawing, options: LayerOptions) -> Markup:
+    if drawing.crosswalks.total == 0:
+        return Markup("")
+    outline = svg_rings(drawing.crosswalks)
+    halo = round(max(60.0, options.symbol_size * 22.0))
+    return join(
+        [
+            element(
+                "path",
+                d=outline,
+                class_="m-crosswalk",
+                fill=CROSSWALK_COLOR,
+                stroke=CROSSWALK_COLOR,
+                stroke_width=halo,
+                stroke_linejoin="round",
+            ),
+            element("path", d=outline, class_="m-crosswalk-ground", fill="#7b828b"),
+            _rings(drawing.bars, class_="m-bar", fill="#ffffff"),
+        ]
+    )
+
+
+def symbol_shapes(prefix: str) -> Markup:
+    """``<defs>`` of the symbols: 100 units high, centred on the origin."""
+    octagon = " ".join(
+        f"{number(46 * np.cos(a), 1)},{number(46 * np.sin(a), 1)}"
+        for a in np.pi / 8 + np.arange(8) * np.pi / 4
+    )
+    light = element("rect", x=-24, y=-54, width=48, height=108, rx=18, fill="#fff")
+    light += element("rect", x=-19, y=-49, width=38, height=98, rx=14, fill="#22262b")
+    for y, color in ((-29, "#ff4b3e"), (0, "#ffc93c"), (29, "#35c46a")):
+        light += element("circle", cx=0, cy=y, r=11, fill=color)
+    walker = element("rect", x=-24, y=-40, width=48, height=80, rx=18, fill="#fff")
+    walker += element("rect", x=-19, y=-35, width=38, height=70, rx=14, fill="#22262b")
+    for y, color in ((-15, "#ff4b3e"), (15, "#35c46a")):
+        walker += element("circle", cx=0, cy=y, r=11, fill=color)
+    stop = element("polygon", points=octagon, fill="#c8102e", stroke="#fff", stroke_width=9)
+    stop += element("rect", x=-24, y=-6, width=48, height=12, fill="#fff")
+    give_way = element(
+        "polygon",
+        points="-44,-36 44,-36 0,40",
+        fill="#fff",
+        stroke="#c8102e",
+        stroke_width=15,
+        stroke_linejoin="round",
+    )
+    limit = element("circle", r=43, fill="#fff", stroke="#c8102e", stroke_width=13)
+    shapes = {
+        "traffic_light": light,
+        "pedestrian_light": walker,
+        "stop": stop,
+        "yield": give_way,
+        "speed_limit": limit,
+    }
+    return element("defs", *(element("g", s, id=f"{prefix}s-{k}") for k, s in shapes.items()))
+
+
+def _symbols(drawing: MapDrawing, options: LayerOptions) -> Markup:
+    shown = [
+        symbol
+        for symbol in drawing.symbols
+        if symbol.kind in SYMBOL_NAMES and (options.speed_limits or symbol.kind != "speed_limit")
+    ]
+    if not shown:
+        return Markup("")
+    # Lights last: they lie on top where signs share their pole.
+    shown.sort(key=lambda symbol: list(SYMBOL_NAMES).index(symbol.kind), reverse=True)
+    uses = [_symbol(symbol, options) for symbol in shown]
+    return element("g", symbol_shapes(options.prefix), *uses, class_="m-symbols")
+
+
+def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
+    place = f"translate({round(symbol.x * 100)} {round(-symbol.y * 100)})"
+    scale = number(options.symbol_size, 2)
+    use = element("use", href=f"#{options.prefix}s-{symbol.kind}")
+    if symbol.text:
+        use += element(
+            "text",
+            symbol.text,
+            y=13,
+            font_size=40 if len(symbol.text) < 3 else 31,
+            font_weight=700,
+            text_anchor="middle",
+            font_family=FONT,
+            fill="#1d2126",
+        )
+    return element("g", use, transform=f"{place} scale({scale})")
+
+
+def graph_layers(graph: MapGraph, *, node_size: float = 0.35) -> Markup:
+    """Lane graph and pedestrian graph in the colours of requirement R22.
+
+    Parameters
+    ----------
+    node_size
+        Radius of a node in metres.
+    """
+    lanes, walks = graph.lanes, graph.walks
+    parts = []
+    places = np.stack([lanes.x, lanes.y], axis=1)
+    for relation, color in enumerate(RELATION_COLORS):
+        rows = np.flatnonzero(lanes.relation == relation)
+        parts.append(_edges(places, lanes.source[rows], lanes.target[rows], color, node_size))
+    walk_places = np.stack([walks.x, walks.y], axis=1)
+    parts.append(_edges(walk_places, walks.source, walks.target, "#b39700", node_size))
+    parts.append(_dots(places, VEHICLE_NODE_COLOR, node_size))
+    parts.append(_dots(walk_places, PEDESTRIAN_NODE_COLOR, node_size))
+    return element("g", *parts, class_="m-graph", fill="none", stroke_linecap="round")
+
+
+def _edges(
+    places: np.ndarray, source: np.ndarray, target: np.ndarray, color: str, size: float
+) -> Markup:
+    xy = np.stack([places[source], places[target]], axis=1).reshape(-1, 2) * (1.0, -1.0)
+    data = path_data(xy, np.arange(len(source) + 1, dtype=np.int64) * 2)
+    return element("path", d=data, stroke=color, stroke_width=round(size * 40))
+
+
+def _dots(places: np.ndarray, color: str, size: float) -> Markup:
+    whole = np.rint(places * (100.0, -100.0)).astype(np.int64).tolist()
+    data = "".join(f"M{x} {y}h0" for x, y in whole).replace(" -", "-")
+    return element("path", d=data, stroke=color, stroke_width=round(size * 200))

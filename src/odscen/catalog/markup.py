@@ -1,0 +1,115 @@
+"""SVG and HTML text, escaped by construction.
+
+Map names, actor ids and messages come from files that nobody has vetted. Everything that becomes
+text goes through :func:`element`, which escapes whatever is not already :class:`Markup`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from html import escape
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_VOID = frozenset({"meta", "input", "br"})
+_FORBIDDEN = dict.fromkeys(code for code in range(32) if chr(code) not in "\t\n\r")
+
+
+class Markup(str):
+    """Text that is markup already and is not escaped again."""
+
+    __slots__ = ()
+
+    def __add__(self, other: str) -> Markup:
+        return Markup(str.__add__(self, escaped(other)))
+
+
+Attribute: TypeAlias = str | float | int | None
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Shortest fixed-point text of ``value`` rounded to ``digits``; never ``-0`` or an exponent."""
+    text = f"{value:.{digits}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text in {"-0", ""} else text
+
+
+def escaped(content: object) -> Markup:
+    """``content`` as text, escaped for elements and attributes, without control characters."""
+    if isinstance(content, Markup):
+        return content
+    text = str(content).translate(_FORBIDDEN)
+    if not text.isascii():
+        text = text.encode("utf-8", "replace").decode("utf-8")  # lone surrogates cannot be written
+    return Markup(escape(text, quote=True))
+
+
+def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
+    """One element of SVG or HTML.
+
+    Parameters
+    ----------
+    name
+        Name of the element.
+    children
+        Text (escaped) or :class:`Markup`; ``None`` is left out.
+    attributes
+        ``_`` in a name becomes ``-``, a trailing one is dropped (``class_``); ``None`` is left out;
+        floats are written with two digits.
+    """
+    opened = [name]
+    for key, value in attributes.items():
+        if value is None:
+            continue
+        text = number(value) if isinstance(value, float) else str(value)
+        opened.append(f'{key.rstrip("_").replace("_", "-")}="{escaped(text)}"')
+    head = " ".join(opened)
+    if name in _VOID:
+        return Markup(f"<{head}>")
+    inner = "".join(escaped(child) for child in children if child is not None)
+    return Markup(f"<{head}>{inner}</{name}>" if inner else f"<{head}></{name}>")
+
+
+def join(parts: list[Markup]) -> Markup:
+    """Pieces of markup, one after the other."""
+    return Markup("".join(parts))
+
+
+def path_data(xy: FloatArray, start: IntArray, *, closed: bool = False, unit: float = 0.01) -> str:
+    """``d`` of an SVG path through many polylines, in whole units, relative after each start.
+
+    Parameters
+    ----------
+    xy
+        Shape ``(N, 2)``: all points.
+    start
+        Shape ``(K + 1,)``: polyline ``k`` is ``xy[start[k]:start[k + 1]]``.
+    closed
+        Whether each polyline is a ring to be closed.
+    unit
+        Length of one unit in the units of ``xy``; 0.01 writes metres as whole centimetres.
+    """
+    if len(xy) == 0:
+        return ""
+    whole = np.rint(xy / unit).astype(np.int64)
+    steps = np.empty_like(whole)
+    steps[0] = 0
+    np.subtract(whole[1:], whole[:-1], out=steps[1:])
+    begins = start[:-1][start[1:] > start[:-1]]
+    steps[begins] = whole[begins]
+    words = list(map(str, steps.ravel().tolist()))
+    bounds = (2 * start).tolist()
+    end = "z" if closed else ""
+    parts = []
+    for begin, stop in itertools.pairwise(bounds):
+        if stop - begin >= 4:
+            parts.append(
+                f"M{words[begin]} {words[begin + 1]}l{' '.join(words[begin + 2 : stop])}{end}"
+            )
+    return "".join(parts).replace(" -", "-")

@@ -1,0 +1,306 @@
+"""The report of a run: one HTML file that needs nothing else, for people who do not program.
+
+Everything that comes from files is escaped by construction (:mod:`odscen.catalog.markup`); besides,
+the page forbids itself every request and every script but its own, whose hash it names.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.catalog.markup import Markup, element, join, number
+from odscen.results.plots import Series, line_chart
+from odscen.results.report_map import CATEGORIES, run_map
+from odscen.results.report_tables import (
+    actor_table,
+    event_list,
+    expectation_table,
+    report_section,
+)
+from odscen.results.summary import actor_counts, key_figures
+from odscen.results.traces import bin_width, counts_over_time, speed_over_time, tidy, travel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import polars as pl
+
+    from odscen.catalog.drawing import MapDrawing
+    from odscen.results.records import Event, Plan
+    from odscen.results.summary import ActorOutcome
+
+FloatArray = NDArray[np.float64]
+
+
+def render_report(
+    summary: Mapping[str, Any],
+    plan: Plan,
+    actors: Sequence[ActorOutcome],
+    events: Sequence[Event],
+    trajectories: pl.DataFrame,
+    *,
+    drawing: MapDrawing | None = None,
+) -> str:
+    """Write the report of one run.
+
+    Parameters
+    ----------
+    summary
+        As in ``summary.json``: ``status``, ``map``, ``sim_seconds``, ``wall_seconds``, ``figures``,
+        ``expectations``, ``versions``, ``error``; whatever is missing is left out.
+    plan
+        What the run was to do; names the scenario and gives the frame of the trajectories.
+    actors
+        What became of each actor, as in ``actors.json``.
+    events
+        What happened, as in ``events.json``.
+    trajectories
+        As read from ``trajectories.parquet``, in SUMO's frame.
+    drawing
+        Of the map, if it is to be shown below the ways.
+
+    Returns
+    -------
+    str
+        The whole page; the same input gives the same text.
+    """
+    categories = {actor.id: actor.category for actor in actors}
+    traces = tidy(trajectories, categories, net_offset=plan.net_offset)
+    end = _end(summary, traces)
+    title = plan.scenario or "Run"
+    body = [
+        _head(title, plan, summary),
+        _key_figures(summary, actors, traces),
+        _map_section(traces, plan, actors, events, drawing),
+        _speed_section(traces, end),
+        _progress_section(actors, end),
+        expectation_table(summary.get("expectations") or ()),
+        event_list(events, actors),
+        actor_table(actors, travel(traces)),
+        _foot(summary),
+    ]
+    return _page(title, join([part for part in body if part]))
+
+
+def _page(title: str, body: Markup) -> str:
+    style, script = _asset("report.css"), _asset("report.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    head = [
+        element("meta", charset="utf-8"),
+        Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", name="color-scheme", content="light dark"),
+        element("title", f"{title} - run report"),
+        element("style", Markup(style)),
+    ]
+    script_element = element("script", Markup(script))
+    page = element(
+        "html", element("head", *head), element("body", element("main", body), script_element),
+        lang="en",
+    )  # fmt: skip
+    return f"<!DOCTYPE html>\n{page}\n"
+
+
+def _asset(name: str) -> str:
+    return (files("odscen.results") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
+    last = traces["time"].max()
+    recorded = float(last) if isinstance(last, int | float) else 0.0
+    return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
+
+
+def duration(seconds: float | None) -> str:
+    """``"4 min 05 s"``; empty for ``None``."""
+    if seconds is None or not np.isfinite(seconds):
+        return ""
+    if seconds < 60.0:
+        return f"{number(seconds, 1)} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s"
+
+
+def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
+    """Class and words."""
+    status = str(summary.get("status", "completed"))
+    expectations = summary.get("expectations") or ()
+    missed = sum(not row.get("passed") for row in expectations)
+    if status == "failed":
+        return "bad", "The run failed"
+    words = {"completed": "Completed", "stopped": "Stopped early"}.get(status, status)
+    if missed:
+        return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
+    if expectations:
+        return "good", f"{words}, all {len(expectations)} expectations met"
+    return ("good" if status == "completed" else "fair"), words
+
+
+def _head(title: str, plan: Plan, summary: Mapping[str, Any]) -> Markup:
+    style, words = _verdict(summary)
+    facts = [
+        ("Map", summary.get("map")),
+        ("Weather", summary.get("environment")),
+        ("Seed", plan.seed),
+        ("Simulated", duration(summary.get("sim_seconds"))),
+        ("Computed in", duration(summary.get("wall_seconds"))),
+    ]
+    shown = [
+        element("span", element("b", f"{name} "), _plain(value))
+        for name, value in facts
+        if value not in (None, "")
+    ]
+    reason = summary.get("error") or summary.get("reason")
+    return element(
+        "header",
+        element("p", "Run report", class_="kind"),
+        element("h1", title),
+        element("p", words, class_=f"verdict {style}"),
+        element("pre", str(reason), class_="reason") if reason else None,
+        element("p", *shown, class_="facts"),
+    )
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, dict):
+        return str(value.get("name") or value.get("preset") or "")
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def _key_figures(
+    summary: Mapping[str, Any], actors: Sequence[ActorOutcome], traces: pl.DataFrame
+) -> Markup:
+    counts = actor_counts(actors)
+    given = summary.get("figures") or key_figures(actors)
+    driven = traces.filter(traces["category"] != "pedestrian")["speed"].mean()
+    planned, inserted = counts["planned"], counts["inserted"]
+    travelled = duration(given.get("mean_travel_time")) or "-"
+    error = given.get("insertion_error_max")
+    figures = [
+        ("actors planned", f"{planned:,}", ""),
+        ("entered the road", f"{inserted:,}", _share(inserted, planned)),
+        ("reached their goal", f"{counts['arrived']:,}", _share(counts["arrived"], planned)),
+        ("teleported", f"{counts['teleported']:,}", "" if counts["teleported"] else "none: good"),
+        ("collided", f"{counts['collided']:,}", "" if counts["collided"] else "none: good"),
+        ("mean travel time", travelled, "of vehicles that arrived"),
+        ("mean speed of vehicles", _kmh(driven), "stops included"),
+    ]
+    if isinstance(error, int | float):
+        text = f"{error * 100:.1f} cm"
+        figures.append(("largest start error", text, "from the planned place"))
+    cards = [
+        element(
+            "div",
+            element("strong", value),
+            element("span", name),
+            element("small", note) if note else None,
+            class_="card bad" if name in {"teleported", "collided"} and value != "0" else "card",
+        )
+        for name, value, note in figures
+    ]
+    explained = (
+        "an actor is one vehicle or pedestrian. It has entered the road when the simulation could "
+        "place it, and teleported when it was stuck so long that the simulator moved it on."
+    )
+    return report_section(
+        "Key figures", element("div", *cards, class_="cards"), explained=explained, ident="figures"
+    )
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{number(100.0 * part / whole, 1)} % of the planned" if whole else ""
+
+
+def _kmh(speed: object) -> str:
+    return f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
+
+
+def _map_section(
+    traces: pl.DataFrame,
+    plan: Plan,
+    actors: Sequence[ActorOutcome],
+    events: Sequence[Event],
+    drawing: MapDrawing | None,
+) -> Markup | None:
+    figure = run_map(traces, plan, actors, events, drawing)
+    if figure is None:
+        return None
+    explained = (
+        "every line is the way of one actor; point at it to see whose. Switch to mean speed to see "
+        "where traffic was slow: red places stood, blue places flowed."
+    )
+    return report_section("Where they went", figure, explained=explained, ident="map")
+
+
+def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
+    if traces.is_empty():
+        return None
+    width = bin_width(end)
+    vehicles = traces.filter(traces["category"] != "pedestrian")
+    parts: list[Markup | None] = []
+    if not vehicles.is_empty():
+        curve = speed_over_time(vehicles, end=end, width=width)
+        line = Series(
+            "mean of all vehicles", "c-all", curve.mean * 3.6, curve.low * 3.6, curve.high * 3.6
+        )
+        text = "Mean speed of all vehicles over time"
+        parts.append(line_chart(curve.time, [line], y_label="speed, km/h", description=text))
+    present = [key for key in CATEGORIES if (traces["category"] == key).any()]
+    if len(present) > 1:
+        lines = []
+        for key in present:
+            curve = speed_over_time(traces.filter(traces["category"] == key), end=end, width=width)
+            lines.append(Series(CATEGORIES[key], f"c-{key}", curve.mean * 3.6))
+        text = "Mean speed of each category over time"
+        parts.append(element("h3", "By category"))
+        parts.append(line_chart(curve.time, lines, y_label="speed, km/h", description=text))
+    explained = (
+        f"each point is the mean over {duration(width)} of everyone on the road then, those who "
+        "stand included. A wide band means that some drive freely while others wait."
+    )
+    return report_section("Speed over time", *parts, explained=explained, ident="speed")
+
+
+def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | None:
+    if not actors:
+        return None
+    depart, inserted, arrived = (
+        np.array([_number(getattr(actor, key)) for actor in actors])
+        for key in ("depart", "inserted", "arrived")
+    )
+    counts = counts_over_time(depart, inserted, arrived, end=end, width=bin_width(end))
+    series = [
+        Series("on the road", "c-running", counts.running),
+        Series("reached their goal", "c-arrived", counts.arrived),
+    ]
+    if counts.waiting.any():
+        series.append(Series("waiting to enter", "c-waiting", counts.waiting))
+    chart = line_chart(
+        counts.time,
+        series,
+        y_label="actors",
+        description="Actors on the road and arrived over time",
+    )
+    explained = (
+        "when the line of those who arrived climbs steadily, traffic flows. A growing number that "
+        "waits to enter means that there is no room at their start."
+    )
+    return report_section("Entering and arriving", chart, explained=explained, ident="progress")
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else float("nan")
+
+
+def _foot(summary: Mapping[str, Any]) -> Markup:
+    versions = summary.get("versions") or {}
+    made = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
+    return element("footer", f"Made by odscen{' with ' + made if made else ''}.")

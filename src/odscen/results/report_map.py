@@ -1,0 +1,231 @@
+"""The map of a run: ways by category, mean speed by place, spawns, goals and incidents."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.catalog.layers import LayerOptions, map_layers
+from odscen.catalog.markup import Markup, element, number, path_data
+from odscen.results.records import EventKind
+from odscen.results.traces import speed_by_place, thinned_paths
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import polars as pl
+
+    from odscen.catalog.drawing import Bounds, MapDrawing
+    from odscen.results.records import Event, Plan
+    from odscen.results.summary import ActorOutcome
+    from odscen.results.traces import Paths, SpeedCells
+
+FloatArray = NDArray[np.float64]
+
+CATEGORIES = {
+    "car": "Cars",
+    "van": "Vans",
+    "truck": "Trucks",
+    "bus": "Buses",
+    "motorcycle": "Motorcycles",
+    "bicycle": "Bicycles",
+    "pedestrian": "Pedestrians",
+    "other": "Others",
+}
+"""Categories in the order of every legend, with the name of many."""
+
+SPEED_STEPS_KMH = (5.0, 15.0, 30.0, 50.0, 80.0)
+"""Limits between the colours of the speed map, km/h."""
+
+_INCIDENTS = (EventKind.TELEPORT_START, EventKind.COLLISION)
+
+_DRAW_LIMIT = 4000
+"""Ways drawn at most; of more, every n-th is drawn and the page says so."""
+
+
+def run_map(
+    traces: pl.DataFrame,
+    plan: Plan,
+    actors: Sequence[ActorOutcome],
+    events: Sequence[Event],
+    drawing: MapDrawing | None,
+) -> Markup | None:
+    """Build the figure: controls, drawing, legend; ``None`` if nothing has a place.
+
+    Parameters
+    ----------
+    traces
+        As :func:`~odscen.results.traces.tidy` gives them.
+    plan
+        Gives the places where actors were to start.
+    actors, events
+        What became of them and what happened.
+    drawing
+        The map to draw below the ways, if there is one.
+    """
+    paths = thinned_paths(traces)
+    spawns = np.array([(actor.x, actor.y) for actor in plan.actors]).reshape(-1, 2)
+    bounds = _view(paths.xy, spawns, drawing)
+    if bounds is None:
+        return None
+    extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    dot = min(max(extent / 260.0, 0.5), 4.0)
+    layers = []
+    if drawing is not None:
+        options = LayerOptions(symbol_size=dot * 2.2, prefix="map-")
+        layers.append(element("g", map_layers(drawing.clipped(bounds), options), class_="map"))
+    layers.append(_speed_layer(speed_by_place(traces)))
+    layers.append(_path_layer(paths, actors, dot))
+    layers.append(_mark_layer(paths, spawns, events, dot))
+    cm = [round(value * 100) for value in (bounds[0], -bounds[3])]
+    size = [round((bounds[2] - bounds[0]) * 100), round((bounds[3] - bounds[1]) * 100)]
+    svg = element(
+        "svg",
+        element("title", "Map of the run: the ways of all actors"),
+        *layers,
+        _scale_bar(bounds),
+        viewBox=" ".join(map(str, cm + size)),
+        class_="run-map",
+        role="img",
+    )
+    return element("div", *_controls(), svg, *_legends(paths), class_="map-figure", id="map-figure")
+
+
+def _controls() -> list[Markup]:
+    """Radio buttons before the drawing: the style sheet shows what is checked, without a script."""
+    parts = []
+    for key, label in (("ways", "Ways by category"), ("speeds", "Mean speed by place")):
+        checked = "checked" if key == "ways" else None
+        name = f"show-{key}"
+        parts.append(
+            element("input", type="radio", name="map-view", id=name, class_=name, checked=checked)
+        )
+        parts.append(element("label", label, for_=name))
+    return parts
+
+
+def _legends(paths: Paths) -> list[Markup]:
+    present = [key for key in CATEGORIES if key in set(paths.categories)]
+    ways = [_swatch(f"c-{key}", CATEGORIES[key]) for key in present]
+    signs = [
+        _swatch("spawn", "start"),
+        _swatch("goal", "end of the way"),
+        _swatch("incident", "teleport or collision"),
+    ]
+    steps = ["0", *(number(step, 0) for step in SPEED_STEPS_KMH)]
+    names = [f"{a} to {b} km/h" for a, b in itertools.pairwise(steps)]
+    names.append(f"over {steps[-1]} km/h")
+    speeds = [_swatch(f"v{i}", name) for i, name in enumerate(names)]
+    return [
+        element("div", *ways, *signs, class_="legend for-ways"),
+        element("div", *speeds, class_="legend for-speeds"),
+    ]
+
+
+def _swatch(style: str, label: str) -> Markup:
+    return element("span", element("i", class_=f"swatch {style}"), label)
+
+
+def _view(xy: FloatArray, spawns: FloatArray, drawing: MapDrawing | None) -> Bounds | None:
+    """Bounds of the traffic with a margin, of a shape fit for a page; the map's if it is idle."""
+    everything = np.concatenate([xy, spawns])
+    if len(everything) == 0:
+        return None if drawing is None else drawing.bounds
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    middle, half = (low + high) / 2.0, (high - low) / 2.0
+    half = half + max(12.0, 0.05 * float(half.max()))
+    half[0] = max(half[0], half[1] * 1.2)
+    half[1] = max(half[1], half[0] * 0.3)
+    return (*(middle - half).tolist(), *(middle + half).tolist())
+
+
+def _speed_layer(cells: SpeedCells) -> Markup:
+    kmh = cells.speed * 3.6
+    step = np.searchsorted(SPEED_STEPS_KMH, kmh, side="right")
+    side = round(cells.size * 100)
+    corner = np.rint(cells.corner * 100.0).astype(np.int64)
+    parts = []
+    for index in range(len(SPEED_STEPS_KMH) + 1):
+        chosen = corner[step == index].tolist()
+        data = "".join(f"M{x} {-y}h{side}v{-side}h{-side}z" for x, y in chosen)
+        if data:
+            parts.append(element("path", d=data, class_=f"cell v{index}"))
+    return element("g", *parts, class_="for-speeds")
+
+
+def _path_layer(paths: Paths, actors: Sequence[ActorOutcome], dot: float) -> Markup:
+    status = {actor.id: actor.status for actor in actors}
+    every = -(-len(paths.ids) // _DRAW_LIMIT) or 1
+    groups: dict[str, list[Markup]] = {}
+    for k in range(0, len(paths.ids), every):
+        xy = paths.xy[paths.start[k] : paths.start[k + 1]] * (1.0, -1.0)
+        data = path_data(xy, np.array([0, len(xy)]), unit=0.1)
+        name = paths.ids[k]
+        title = element("title", f"{name} ({paths.categories[k]}) {status.get(name, '')}".strip())
+        groups.setdefault(paths.categories[k], []).append(element("path", title, d=data))
+    width = round(dot * 5.0)
+    drawn = [
+        element("g", *groups[key], class_=f"way c-{key}", stroke_width=width)
+        for key in CATEGORIES
+        if key in groups
+    ]
+    return element("g", *drawn, class_="for-ways", transform="scale(10)")
+
+
+def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: float) -> Markup:
+    ends = paths.xy[paths.start[1:] - 1] if len(paths.ids) else np.empty((0, 2))
+    incidents = np.array(
+        [
+            (event.x, event.y)
+            for event in events
+            if event.kind in _INCIDENTS and event.x is not None and event.y is not None
+        ]
+    ).reshape(-1, 2)
+    width = round(dot * 100)
+    parts = [
+        element("path", d=_dots(ends), class_="goal-ring", stroke_width=round(width * 1.3)),
+        element("path", d=_dots(ends), class_="goal", stroke_width=round(width * 0.8)),
+        element("path", d=_dots(spawns), class_="spawn", stroke_width=width),
+    ]
+    r = round(dot * 90)
+    crosses = "".join(
+        f"M{x - r} {y - r}l{2 * r} {2 * r}M{x - r} {y + r}l{2 * r} {-2 * r}"
+        for x, y in np.rint(incidents * (100.0, -100.0)).astype(np.int64).tolist()
+    )
+    shown = element("path", d=crosses, class_="incident", stroke_width=round(dot * 45))
+    return element("g", element("g", *parts, class_="for-ways"), shown if crosses else None)
+
+
+def _dots(places: FloatArray) -> str:
+    whole = np.rint(places * (100.0, -100.0)).astype(np.int64).tolist()
+    return "".join(f"M{x} {y}h0" for x, y in whole)
+
+
+def round_length(limit: float) -> float:
+    """Largest of 1, 2, 5 times a power of ten that is not above ``limit`` metres."""
+    power = 10.0 ** np.floor(np.log10(limit))
+    return float(max(f * power for f in (1.0, 2.0, 5.0) if f * power <= limit * (1 + 1e-9)))
+
+
+def _scale_bar(bounds: Bounds) -> Markup:
+    wide = bounds[2] - bounds[0]
+    length = round_length(wide / 5.0)
+    text = f"{number(length / 1000)} km" if length >= 1000 else f"{number(length)} m"
+    x, y = bounds[0] + wide * 0.02, -bounds[1] - wide * 0.02
+    tick = wide * 0.008
+    bar = path_data(
+        np.array([[x, y - tick], [x, y], [x + length, y], [x + length, y - tick]]), np.array([0, 4])
+    )
+    label = element(
+        "text",
+        text,
+        x=round((x + length / 2) * 100),
+        y=round((y - tick) * 100),
+        font_size=round(wide * 1.7),
+        text_anchor="middle",
+    )
+    line = element("path", d=bar, stroke_width=round(wide * 0.25))
+    return element("g", line, label, class_="scale")
