@@ -152,18 +152,27 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
         msg = "a simulation is running in this process already; libsumo holds only one"
         raise SimulationError(msg)
     sumo = import_libsumo()
+    errors = (sumo.TraCIException, RuntimeError)
     _open = True
     try:
         try:
             sumo.start(["sumo", *arguments])
-        except (sumo.TraCIException, RuntimeError) as error:
+        except errors as error:
             msg = f"SUMO refused to start: {error}"
             raise SimulationError(msg) from error
         yield Session(sumo)
+    except BaseException:
+        with suppress(*errors):  # the first error is the one to tell
+            sumo.close()
+        raise
+    else:
+        try:
+            sumo.close()  # writes what is left of the outputs
+        except errors as error:
+            msg = f"SUMO could not finish its outputs: {error}"
+            raise SimulationError(msg) from error
     finally:
         _open = False
-        with suppress(sumo.TraCIException, RuntimeError):
-            sumo.close()
 
 
 def import_libsumo() -> Any:

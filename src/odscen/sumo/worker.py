@@ -17,19 +17,20 @@ from typing import TYPE_CHECKING
 from odscen.errors import OdscenError
 from odscen.results.records import Plan, events_to_json
 from odscen.results.summary import actor_outcomes, actors_to_json
+from odscen.sumo.layout import (
+    ACTORS_FILE,
+    CONFIG_FILE,
+    EVENTS_FILE,
+    LOG_FILE,
+    SUMO_FOLDER,
+    TRAJECTORIES_FILE,
+)
 from odscen.sumo.progress import Done, Failed, Message, Progress, encode
 from odscen.sumo.recorder import Recorder
 from odscen.sumo.session import captured_output, open_session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-PLAN_FILE = "plan.json"
-CONFIG_FILE = "sumo/scenario.sumocfg"
-LOG_FILE = "sumo.log"
-TRAJECTORIES_FILE = "trajectories.parquet"
-EVENTS_FILE = "events.json"
-ACTORS_FILE = "actors.json"
 
 MESSAGE_PAUSE = 0.25
 """Least wall seconds between two progress messages."""
@@ -78,7 +79,7 @@ def _steps(
 ) -> tuple[float, int]:
     arguments = [
         "--configuration-file",
-        str(folder / CONFIG_FILE),
+        str(folder / SUMO_FOLDER / CONFIG_FILE),
         "--fcd-output",
         str(folder / TRAJECTORIES_FILE),
     ]

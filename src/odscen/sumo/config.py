@@ -1,0 +1,83 @@
+"""The sumocfg: everything a run needs beyond network and routes, so that plain ``sumo -c`` does it.
+
+Paths are relative to the file. What each setting is for is said in ``docs/runs.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from odscen.sumo.layout import NET_FILE, ROUTES_FILE, TRAJECTORIES_FILE
+
+FCD_ATTRIBUTES = ("id", "x", "y", "angle", "speed", "lane")
+"""What is recorded of each vehicle and person in each step."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How SUMO runs a scenario.
+
+    Attributes
+    ----------
+    until
+        End of the simulation, seconds, if somebody is still under way then.
+    step_length
+        Seconds.
+    seed
+        Of SUMO's own random numbers (dawdling of drivers; speed factors are drawn by us).
+    time_to_teleport
+        Seconds that a vehicle may stand at the head of its lane before SUMO moves it on.
+    elevation
+        Whether the network has heights, so that z is recorded.
+    """
+
+    until: float
+    step_length: float
+    seed: int
+    time_to_teleport: float = 300.0
+    elevation: bool = False
+
+
+def sumo_config(settings: RunSettings) -> str:
+    """Text of ``scenario.sumocfg``."""
+    attributes = [*FCD_ATTRIBUTES]
+    if settings.elevation:
+        attributes.insert(3, "z")
+    sections: dict[str, dict[str, str]] = {
+        "input": {"net-file": NET_FILE, "route-files": ROUTES_FILE},
+        "output": {
+            "fcd-output": TRAJECTORIES_FILE,
+            "fcd-output.attributes": ",".join(attributes),
+            "fcd-output.skip-empty": "true",
+            "precision": "4",
+        },
+        "time": {
+            "begin": "0",
+            "end": f"{settings.until:g}",
+            "step-length": f"{settings.step_length:g}",
+        },
+        "processing": {
+            "collision.action": "warn",
+            "collision.mingap-factor": "0",
+            "collision.check-junctions": "true",
+            "intermodal-collision.action": "warn",
+            "pedestrian.model": "striping",
+            "time-to-teleport": f"{settings.time_to_teleport:g}",
+        },
+        "random_number": {"seed": str(settings.seed)},
+        "report": {
+            "aggregate-warnings": "20",
+            "duration-log.disable": "true",
+            "no-step-log": "true",
+            "xml-validation": "never",
+        },
+    }
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
+    for section, options in sections.items():
+        lines.append(f"    <{section}>")
+        lines.extend(
+            f"        <{name} value={quoteattr(value)}/>" for name, value in options.items()
+        )
+        lines.append(f"    </{section}>")
+    return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"

@@ -1,0 +1,130 @@
+"""Start the worker process in a prepared run folder and follow it to its end."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.sumo.layout import LOG_FILE, PLAN_FILE
+from odscen.sumo.progress import Done, Failed, Progress, decode
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from odscen.sumo.progress import OnProgress
+
+WORKER = "odscen.sumo.worker"
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a worker process ended.
+
+    Attributes
+    ----------
+    done
+        What it reported at its end; ``None`` if the run failed.
+    wall_seconds
+        From starting the process to its end.
+    error
+        Why it failed, with SUMO's own words where it said any.
+    """
+
+    done: Done | None
+    wall_seconds: float
+    error: str | None
+
+
+def run_worker(
+    folder: Path, *, progress: OnProgress | None = None, time_limit: float | None = None
+) -> Ended:
+    """Run the simulation prepared in ``folder``.
+
+    Never raises for what happens inside the process: a crash, an error of SUMO's or running out of
+    time are described in the result.
+
+    Parameters
+    ----------
+    folder
+        Holds ``plan.json`` and ``sumo/``.
+    progress
+        Called with each progress message, in this thread.
+    time_limit
+        Wall seconds after which the process is killed.
+    """
+    start = time.perf_counter()
+    command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
+    late = threading.Event()
+    last: Done | Failed | None = None
+    # Python's own words (a traceback before the worker has opened its log) belong in the log too.
+    with (
+        (folder / LOG_FILE).open("ab") as log,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            text=True,
+            encoding="utf-8",
+        ) as process,
+    ):
+        timer = _kill_after(process, time_limit, late)
+        try:
+            for line in process.stdout or ():
+                message = decode(line)
+                if isinstance(message, Progress):
+                    if progress is not None:
+                        progress(message)
+                elif message is not None:
+                    last = message
+        except BaseException:  # an interrupt, or the caller's progress function
+            process.kill()
+            raise
+        finally:
+            if timer is not None:
+                timer.cancel()
+    seconds = time.perf_counter() - start
+    if isinstance(last, Done) and process.returncode == 0:
+        return Ended(last, seconds, None)
+    if late.is_set():
+        return Ended(None, seconds, f"stopped after the time limit of {time_limit:g} s")
+    reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
+    words = sumo_words(folder)
+    return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
+
+
+def sumo_words(folder: Path, *, lines: int = 12) -> str:
+    """SUMO's error messages in a run's log, else its last lines."""
+    try:
+        text = (folder / LOG_FILE).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    said = [line.rstrip() for line in text.splitlines() if line.strip()]
+    first = next((i for i, line in enumerate(said) if line.startswith("Error")), None)
+    return "\n".join(said[-lines:] if first is None else said[first : first + lines])
+
+
+def _kill_after(
+    process: subprocess.Popen[str], seconds: float | None, late: threading.Event
+) -> threading.Timer | None:
+    if seconds is None:
+        return None
+
+    def kill() -> None:
+        late.set()
+        process.kill()
+
+    timer = threading.Timer(seconds, kill)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def _exit_words(code: int) -> str:
+    if code < 0:
+        return f"the simulation process was ended by signal {-code}"
+    return f"the simulation process ended with exit code {code} without a result"
