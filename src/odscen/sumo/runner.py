@@ -141,6 +141,10 @@ def run_prepared(
     return RunResult(out, summary)
 
 
+class _StoppedError(Exception):
+    """Another run of the same call has failed to start, or the user has interrupted."""
+
+
 @dataclass(frozen=True, slots=True)
 class RunJob:
     """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder."""
@@ -166,13 +170,12 @@ def run_many(
     the order in which runs end. An error in preparing a run ends all of it: scenarios are checked
     before they are run.
     """
-
     stopping = threading.Event()
 
     def one(job: RunJob) -> RunResult:
         def follow(message: Progress) -> None:
             if stopping.is_set():  # ends this worker process too
-                raise InterruptedError
+                raise _StoppedError
             if progress is not None:
                 progress(job, message)
 
@@ -273,7 +276,12 @@ def _summary(
 def _drop_torn_trajectories(folder: Path) -> None:
     """Remove a Parquet file without its end: a killed run leaves one, and nothing can read it."""
     file = folder / layout.TRAJECTORIES_FILE
-    if file.is_file() and not file.read_bytes().endswith(b"PAR1"):
+    if not file.is_file():
+        return
+    with file.open("rb") as opened:
+        opened.seek(max(0, file.stat().st_size - 4))
+        whole = opened.read() == b"PAR1"
+    if not whole:
         file.unlink()
 
 
