@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import threading
@@ -126,5 +127,6 @@ def _kill_after(
 
 def _exit_words(code: int) -> str:
     if code < 0:
-        return f"the simulation process was ended by signal {-code}"
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
+        return f"SUMO crashed: its process was ended by signal {name}"
     return f"the simulation process ended with exit code {code} without a result"

@@ -153,13 +153,13 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
         raise SimulationError(msg)
     sumo = import_libsumo()
     errors = (sumo.TraCIException, RuntimeError)
+    try:
+        sumo.start(["sumo", *arguments])
+    except errors as error:  # libsumo has closed by itself; closing again would crash
+        msg = f"SUMO refused to start: {error}"
+        raise SimulationError(msg) from error
     _open = True
     try:
-        try:
-            sumo.start(["sumo", *arguments])
-        except errors as error:
-            msg = f"SUMO refused to start: {error}"
-            raise SimulationError(msg) from error
         yield Session(sumo)
     except BaseException:
         with suppress(*errors):  # the first error is the one to tell
