@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.ids import JunctionId, LaneKey, RoadId, SegmentId
+if TYPE_CHECKING:
+    from odscen.ids import JunctionId, LaneKey, RoadId, SegmentId
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -30,6 +31,15 @@ class Relation(IntEnum):
     RIGHT = 2
 
 
+RELATION_COLORS = {
+    Relation.SUCCESSOR: "#000000",
+    Relation.LEFT: "#FF4261",
+    Relation.RIGHT: "#00E279",
+}
+"""Colour of each relation in every drawing (requirement R22)."""
+VEHICLE_NODE_COLOR = "#24A3F2"
+PEDESTRIAN_NODE_COLOR = "#FFD800"
+
 CHANGE_LEFT = 1
 """Bit of :attr:`LaneGraph.lane_change`: road marks permit a change to the left here."""
 CHANGE_RIGHT = 2
@@ -38,8 +48,10 @@ CHANGE_RIGHT = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lanes:
-    """The drivable lanes, one row per lane of a lane section, sorted by road (file order), section,
-    lane id ascending. Shape of every array ``(L,)`` unless said otherwise.
+    """The drivable lanes that have nodes, one row per lane of a lane section.
+
+    Sorted by road (file order), section, lane id ascending. Arrays have shape ``(L,)`` unless said
+    otherwise.
 
     Attributes
     ----------
@@ -104,8 +116,8 @@ class LaneGraph:
     source, target
         Nodes of each edge.
     relation
-        :class:`Relation` of each edge. Left and right edges exist only where ``lane_change`` permits
-        and lead about one spacing ahead (requirement R21).
+        :class:`Relation` of each edge. Left and right edges exist only where ``lane_change``
+        permits, and lead about one spacing ahead (requirement R21).
     length
         Length of each edge, metres, along the lanes for successors, straight for left and right.
     """
@@ -149,8 +161,8 @@ class Segments:
     Attributes
     ----------
     ids
-        ``j<junction>`` for a junction, ``r<road>`` or ``r<road>-<k>`` for the k-th piece of the chain
-        of roads that starts with that road.
+        ``j<junction>`` for a junction, ``r<road>`` or ``r<road>-<k>`` for the k-th piece of the
+        chain of roads that starts with that road.
     kinds
         ``junction`` or ``road``.
     parts

@@ -1,0 +1,254 @@
+"""Ids of nodes, and what belongs to a set of segments.
+
+The graphs are arrays over dense integers; this module is the only place that turns those into the
+string ids of :mod:`odscen.ids` and back (R24), and that knows which sets of segments are
+regions of interest (requirements R29 and R31).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.errors import NotFoundError
+from odscen.ids import LaneKey, NodeId, RoadId, SegmentId
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from odscen.lanegraph.model import BoolArray, IntArray, MapGraph, Segments
+
+WALK_PREFIX = "ped."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roi:
+    """What a region of interest takes from the three graphs (induced subgraph, requirement R31).
+
+    Attributes
+    ----------
+    segments
+        The members, in the map's order.
+    rows
+        Their rows of :class:`~odscen.lanegraph.model.Segments`, ascending.
+    nodes, edges
+        Shapes ``(N,)`` and ``(E,)``: lane-graph nodes inside, and edges with both ends inside.
+    walk_nodes, walk_edges
+        Shapes ``(P,)`` and ``(Q,)``: the same of the pedestrian graph.
+    """
+
+    segments: tuple[SegmentId, ...]
+    rows: IntArray
+    nodes: BoolArray
+    edges: BoolArray
+    walk_nodes: BoolArray
+    walk_edges: BoolArray
+
+
+def node_id(graph: MapGraph, i: int) -> NodeId:
+    """Id ``road.section.lane.k`` of lane-graph node ``i``; k counts in driving direction."""
+    lanes = graph.lanes.lanes
+    row = int(graph.lanes.lane[i])
+    return NodeId(f"{lanes.keys[row]}.{i - int(lanes.first_node[row])}")
+
+
+def node_ids(graph: MapGraph) -> list[NodeId]:
+    """Ids of all lane-graph nodes, in their order."""
+    return _all_ids(graph.lanes.lanes.keys, graph.lanes.lanes.first_node, "")
+
+
+def node_index(graph: MapGraph, name: str) -> int:
+    """Index of the lane-graph node ``name``.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such node.
+    """
+    lanes = graph.lanes.lanes
+    return _index(name, name, lanes.keys, lanes.first_node)
+
+
+def walk_node_id(graph: MapGraph, i: int) -> NodeId:
+    """Id ``ped.road.section.lane.k`` of pedestrian node ``i``; k counts with growing s."""
+    walks = graph.walks
+    row = int(walks.lane[i])
+    return NodeId(f"{WALK_PREFIX}{walks.lane_keys[row]}.{i - int(walks.first_node[row])}")
+
+
+def walk_node_ids(graph: MapGraph) -> list[NodeId]:
+    """Ids of all pedestrian nodes, in their order."""
+    return _all_ids(graph.walks.lane_keys, graph.walks.first_node, WALK_PREFIX)
+
+
+def walk_node_index(graph: MapGraph, name: str) -> int:
+    """Index of the pedestrian node ``name``.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such node.
+    """
+    if not name.startswith(WALK_PREFIX):
+        msg = "pedestrian node"
+        raise NotFoundError(msg, name, [])
+    bare = name.removeprefix(WALK_PREFIX)
+    return _index(name, bare, graph.walks.lane_keys, graph.walks.first_node)
+
+
+def is_walk_node_id(name: str) -> bool:
+    """Whether ``name`` is written like the id of a pedestrian node."""
+    return name.startswith(WALK_PREFIX)
+
+
+def segment_rows(segments: Segments, ids: Iterable[str]) -> IntArray:
+    """Rows of the segments ``ids``, ascending and without repetitions.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    known = _segment_index(segments)
+    rows: set[int] = set()
+    for name in ids:
+        row = known.get(name)
+        if row is None:
+            msg = "segment"
+            raise NotFoundError(msg, name, segments.ids)
+        rows.add(row)
+    return np.array(sorted(rows), dtype=np.int32)
+
+
+def induced(graph: MapGraph, segments: Iterable[str]) -> Roi:
+    """Nodes and edges of the region made of ``segments``.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    rows = segment_rows(graph.segments, segments)
+    inside = np.zeros(len(graph.segments.ids), dtype=np.bool_)
+    inside[rows] = True
+    nodes = inside[graph.lanes.segment]
+    walks = inside[graph.walks.segment]
+    return Roi(
+        segments=tuple(graph.segments.ids[row] for row in rows),
+        rows=rows,
+        nodes=nodes,
+        edges=nodes[graph.lanes.source] & nodes[graph.lanes.target],
+        walk_nodes=walks,
+        walk_edges=walks[graph.walks.source] & walks[graph.walks.target],
+    )
+
+
+def neighbours(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:
+    """Segments beside any of ``ids`` that are not among them: what may be added (R29).
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    inside = np.zeros(len(segments.ids), dtype=np.bool_)
+    inside[segment_rows(segments, ids)] = True
+    one, other = segments.adjacency[:, 0], segments.adjacency[:, 1]
+    beside = np.union1d(one[inside[other] & ~inside[one]], other[inside[one] & ~inside[other]])
+    return tuple(segments.ids[row] for row in beside)
+
+
+def is_connected(segments: Segments, ids: Iterable[str]) -> bool:
+    """Whether one can go from each of ``ids`` to each other through members only (R29).
+
+    The empty set counts as not connected: it is no region.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    members = set(segment_rows(segments, ids).tolist())
+    if not members:
+        return False
+    beside: dict[int, list[int]] = {row: [] for row in members}
+    for one, other in segments.adjacency.tolist():
+        if one in members and other in members:
+            beside[one].append(other)
+            beside[other].append(one)
+    found = {min(members)}
+    todo = list(found)
+    while todo:
+        fresh = [row for row in beside[todo.pop()] if row not in found]
+        found.update(fresh)
+        todo.extend(fresh)
+    return found == members
+
+
+def _all_ids(keys: tuple[LaneKey, ...], first_node: IntArray, prefix: str) -> list[NodeId]:
+    return [
+        NodeId(f"{prefix}{key.road}.{key.section}.{key.lane}.{k}")
+        for key, count in zip(keys, np.diff(first_node).tolist(), strict=True)
+        for k in range(count)
+    ]
+
+
+def split_node_id(name: str) -> tuple[LaneKey, int]:
+    """Lane and k of a lane node id; the road's id may itself contain dots.
+
+    Raises
+    ------
+    ValueError
+        If ``name`` is not written like one.
+    """
+    road, section, lane, k = name.rsplit(".", 3)
+    key = LaneKey(RoadId(road), int(section), int(lane))
+    if f"{key}.{int(k)}" != name:  # int() takes "+1", "01" and " 1"
+        raise ValueError(name)
+    return key, int(k)
+
+
+def _index(name: str, bare: str, keys: tuple[LaneKey, ...], first_node: IntArray) -> int:
+    what = "pedestrian node" if is_walk_node_id(name) else "node"
+    try:
+        key, k = split_node_id(bare)
+    except ValueError:
+        raise NotFoundError(what, name, []) from None
+    row = _lane_rows(_Keys(keys)).get(key)
+    if row is None:
+        prefix = name[: len(name) - len(bare)]
+        known = [f"{prefix}{other}.{k}" for other in keys if other.road == key.road]
+        raise NotFoundError(what, name, known)
+    first, end = int(first_node[row]), int(first_node[row + 1])
+    if not 0 <= k < end - first:
+        prefix = name[: len(name) - len(bare)]
+        raise NotFoundError(what, name, [f"{prefix}{key}.{end - first - 1}"])
+    return first + k
+
+
+class _Keys:
+    """A tuple of keys that hashes by identity, so that the cache need not hash 10,000 of them."""
+
+    __slots__ = ("keys",)
+
+    def __init__(self, keys: tuple[LaneKey, ...]) -> None:
+        self.keys = keys
+
+    def __hash__(self) -> int:
+        return id(self.keys)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Keys) and self.keys is other.keys
+
+
+@lru_cache(maxsize=8)
+def _lane_rows(keys: _Keys) -> dict[LaneKey, int]:
+    return {key: row for row, key in enumerate(keys.keys)}
+
+
+@lru_cache(maxsize=8)
+def _segment_index(segments: Segments) -> dict[str, int]:
+    return {name: row for row, name in enumerate(segments.ids)}
