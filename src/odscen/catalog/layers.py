@@ -7,15 +7,19 @@ repaint the map for a dark background.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from odscen.catalog.markup import Markup, element, join, number, path_data
 
 if TYPE_CHECKING:
     from odscen.catalog.drawing import Lines, MapDrawing, Symbol
     from odscen.lanegraph.model import MapGraph
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 AREA_COLORS = {
     "green": "#c3d2ae",
@@ -81,32 +85,37 @@ class LayerOptions:
     ----------
     symbol_size
         Height of a traffic light in metres; all symbols follow it.
-    symbols, speed_limits, markings
-        What to show.
+    ground, symbols, speed_limits
+        What to show: everything on the ground, signs and lights, speed limits among them.
     prefix
         Put before every ``id``, so that two maps can be in one page.
     """
 
     symbol_size: float = 4.0
+    ground: bool = True
     symbols: bool = True
     speed_limits: bool = False
-    markings: bool = True
     prefix: str = ""
 
 
 def map_layers(drawing: MapDrawing, options: LayerOptions) -> Markup:
     """Surfaces, markings, crosswalks, stop lines and symbols of a map."""
-    parts = [_rings(drawing.buildings, class_="m-building", fill="#e4dfd6", stroke="#c9c2b5")]
-    for level in sorted({area.level for area in drawing.areas}):
-        parts.append(_surfaces(drawing, level, options))
-        if options.markings:
-            parts.append(_markings(drawing, level))
-    parts.append(_rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"))
-    parts.append(_crosswalks(drawing, options))
-    parts.append(_rings(drawing.stop_lines, class_="m-stopline", fill="#ffffff"))
+    parts = _ground(drawing, options) if options.ground else []
     if options.symbols:
         parts.append(_symbols(drawing, options))
     return join([part for part in parts if part])
+
+
+def _ground(drawing: MapDrawing, options: LayerOptions) -> list[Markup]:
+    parts = [_rings(drawing.buildings, class_="m-building", fill="#e4dfd6", stroke="#c9c2b5")]
+    for level in sorted({area.level for area in drawing.areas}):
+        parts += [_surfaces(drawing, level, options), _markings(drawing, level)]
+    return [
+        *parts,
+        _rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"),
+        _crosswalks(drawing, options),
+        _rings(drawing.stop_lines, class_="m-stopline", fill="#ffffff"),
+    ]
 
 
 def svg_xy(lines: Lines) -> str:
@@ -279,15 +288,44 @@ def graph_layers(graph: MapGraph, *, node_size: float = 0.35) -> Markup:
     return element("g", *parts, class_="m-graph", fill="none", stroke_linecap="round")
 
 
+def segment_layer(graph: MapGraph, *, width: float) -> Markup:
+    """Segments as broad translucent bands along their lanes; neighbours differ in colour."""
+    lanes, segments = graph.lanes, graph.segments
+    colors = _segment_colors(len(segments.ids), segments.adjacency.tolist())
+    inside = lanes.relation == 0
+    inside &= lanes.segment[lanes.source] == lanes.segment[lanes.target]
+    places = np.stack([lanes.x, lanes.y], axis=1)
+    color_of_edge = colors[lanes.segment[lanes.source]]
+    parts = []
+    for index, color in enumerate(SEGMENT_COLORS):
+        rows = np.flatnonzero(inside & (color_of_edge == index))
+        parts.append(_edges(places, lanes.source[rows], lanes.target[rows], color, width * 2.5))
+    return element("g", *parts, class_="m-segments", fill="none", opacity=0.45)
+
+
+def _segment_colors(count: int, adjacency: list[list[int]]) -> IntArray:
+    """First colour that no earlier neighbour has, taken round when all are."""
+    neighbours: list[set[int]] = [set() for _ in range(count)]
+    for a, b in adjacency:
+        neighbours[a].add(b)
+        neighbours[b].add(a)
+    colors: list[int] = []
+    for index, near in enumerate(neighbours):
+        used = {colors[other] for other in near if other < index}
+        free = (k for k in range(len(SEGMENT_COLORS)) if k not in used)
+        colors.append(next(free, index % len(SEGMENT_COLORS)))
+    return np.array(colors, dtype=np.int64)
+
+
 def _edges(
-    places: np.ndarray, source: np.ndarray, target: np.ndarray, color: str, size: float
+    places: FloatArray, source: NDArray[Any], target: NDArray[Any], color: str, size: float
 ) -> Markup:
     xy = np.stack([places[source], places[target]], axis=1).reshape(-1, 2) * (1.0, -1.0)
     data = path_data(xy, np.arange(len(source) + 1, dtype=np.int64) * 2)
     return element("path", d=data, stroke=color, stroke_width=round(size * 40))
 
 
-def _dots(places: np.ndarray, color: str, size: float) -> Markup:
+def _dots(places: FloatArray, color: str, size: float) -> Markup:
     whole = np.rint(places * (100.0, -100.0)).astype(np.int64).tolist()
     data = "".join(f"M{x} {y}h0" for x, y in whole).replace(" -", "-")
     return element("path", d=data, stroke=color, stroke_width=round(size * 200))

@@ -17,7 +17,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _VOID = frozenset({"meta", "input", "br"})
-_FORBIDDEN = dict.fromkeys(code for code in range(32) if chr(code) not in "\t\n\r")
+# What XML 1.0 cannot hold; carriage returns do not survive a parser.
+_FORBIDDEN = dict.fromkeys([*(c for c in range(32) if chr(c) not in "\t\n"), 0xFFFE, 0xFFFF])
 
 
 class Markup(str):

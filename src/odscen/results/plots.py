@@ -88,8 +88,9 @@ def line_chart(
     description
         One sentence for those who cannot see it.
     """
-    unit = TimeUnit.for_span(float(time[-1]))
-    x_ticks = nice_ticks(0.0, float(time[-1]) / unit.seconds, count=8)
+    end = max(float(time[-1]), 1.0)
+    unit = TimeUnit.for_span(end)
+    x_ticks = nice_ticks(0.0, end / unit.seconds, count=8)
     top = max((_peak(line) for line in series), default=0.0)
     y_ticks = nice_ticks(0.0, top if top > 0 else 1.0)
     frame = _Frame(x_ticks[-1] * unit.seconds, y_ticks[-1])

@@ -255,16 +255,21 @@ def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
         parts.append(line_chart(curve.time, [line], y_label="speed, km/h", description=text))
     present = [key for key in CATEGORIES if (traces["category"] == key).any()]
     if len(present) > 1:
+        # Fewer and longer bins: a handful of lines over each other must stay apart by eye.
+        width_each = bin_width(end, bins=40)
         lines = []
         for key in present:
-            curve = speed_over_time(traces.filter(traces["category"] == key), end=end, width=width)
+            curve = speed_over_time(
+                traces.filter(traces["category"] == key), end=end, width=width_each
+            )
             lines.append(Series(CATEGORIES[key], f"c-{key}", curve.mean * 3.6))
-        text = "Mean speed of each category over time"
-        parts.append(element("h3", "By category"))
+        text = f"Mean speed of each category over time, every {duration(width_each)}"
+        parts.append(element("h3", f"By category, mean over {duration(width_each)}"))
         parts.append(line_chart(curve.time, lines, y_label="speed, km/h", description=text))
     explained = (
-        f"each point is the mean over {duration(width)} of everyone on the road then, those who "
-        "stand included. A wide band means that some drive freely while others wait."
+        f"each point of the upper chart is the mean over {duration(width)} of all vehicles on the "
+        "road then, those that stand included. A wide band means that some drive freely while "
+        "others wait. A line ends where nobody is left."
     )
     return report_section("Speed over time", *parts, explained=explained, ident="speed")
 

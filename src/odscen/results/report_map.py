@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from odscen.catalog.layers import LayerOptions, map_layers
 from odscen.catalog.markup import Markup, element, number, path_data
+from odscen.catalog.render import length_text, round_length
 from odscen.results.records import EventKind
 from odscen.results.traces import speed_by_place, thinned_paths
 
@@ -204,16 +205,9 @@ def _dots(places: FloatArray) -> str:
     return "".join(f"M{x} {y}h0" for x, y in whole)
 
 
-def round_length(limit: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that is not above ``limit`` metres."""
-    power = 10.0 ** np.floor(np.log10(limit))
-    return float(max(f * power for f in (1.0, 2.0, 5.0) if f * power <= limit * (1 + 1e-9)))
-
-
 def _scale_bar(bounds: Bounds) -> Markup:
     wide = bounds[2] - bounds[0]
     length = round_length(wide / 5.0)
-    text = f"{number(length / 1000)} km" if length >= 1000 else f"{number(length)} m"
     x, y = bounds[0] + wide * 0.02, -bounds[1] - wide * 0.02
     tick = wide * 0.008
     bar = path_data(
@@ -221,9 +215,9 @@ def _scale_bar(bounds: Bounds) -> Markup:
     )
     label = element(
         "text",
-        text,
+        length_text(length),
         x=round((x + length / 2) * 100),
-        y=round((y - tick) * 100),
+        y=round((y - tick * 1.4) * 100),
         font_size=round(wide * 1.7),
         text_anchor="middle",
     )
