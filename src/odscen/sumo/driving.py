@@ -1,0 +1,176 @@
+"""How somebody drives or walks: the attributes of a vType, from category, style and weather.
+
+Nothing is left to SUMO's random numbers but dawdling (``sigma``): each actor's speed factor is
+drawn here, from the scenario's seed and the actor's id, and written down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.categories import Category
+from odscen.scenario.goals import stream
+
+if TYPE_CHECKING:
+    from odscen.categories import Body
+    from odscen.scenario.document import DrivingStyle
+    from odscen.sumo.weather import WeatherEffect
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What SUMO needs to know of a category; m/s and m/s^2."""
+
+    vclass: str
+    max_speed: float
+    accel: float
+    decel: float
+    emergency_decel: float
+    shape: str
+
+
+KINDS: dict[Category, Kind] = {
+    # https://sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html, SUMO 1.28
+    Category.CAR: Kind("passenger", 55.56, 2.6, 4.5, 9.0, "passenger"),
+    Category.VAN: Kind("delivery", 55.56, 2.6, 4.5, 9.0, "delivery"),
+    Category.TRUCK: Kind("truck", 36.11, 1.3, 4.0, 7.0, "truck"),
+    Category.BUS: Kind("bus", 23.61, 1.2, 4.0, 7.0, "bus"),
+    Category.MOTORCYCLE: Kind("motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle"),
+    Category.BICYCLE: Kind("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle"),
+    Category.PEDESTRIAN: Kind("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian"),
+}
+"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h."""
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """A driving style; the speed factor is normally distributed and cut at 3 deviations."""
+
+    factor_mean: float
+    factor_deviation: float
+    accel: float
+    headway: float
+    sigma: float
+    min_gap: float
+
+
+STYLES: dict[DrivingStyle, Style] = {
+    # "normal" is SUMO's default driver; the others are set about it, see docs/runs.md.
+    "cautious": Style(0.90, 0.05, 0.8, 1.5, 0.3, 3.0),
+    "normal": Style(1.00, 0.08, 1.0, 1.0, 0.5, 2.5),
+    "sporty": Style(1.10, 0.06, 1.2, 0.8, 0.5, 2.0),
+}
+WALKING_DEVIATION = 0.1
+"""Of the speed factor of pedestrians for whom no speed is given."""
+TWO_WHEELER_MIN_GAP = 0.5
+"""Share of a driver's gap that motorcycles and bicycles keep."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A vType's attributes and what belongs to the single vehicle.
+
+    Attributes
+    ----------
+    attributes
+        Of the ``<vType>``, in order, without its id.
+    max_speed
+        Highest speed the actor ever goes, m/s.
+    speed_factor
+        Times the speed limit; 1 for pedestrians, whose own speed is in ``max_speed``.
+    """
+
+    attributes: tuple[tuple[str, str], ...]
+    max_speed: float
+    speed_factor: float
+    accel: float
+
+
+def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) -> float:
+    """Speed factor of one actor, the same whatever else is in the scenario."""
+    z = float(stream(seed, "speed factor", actor).normal())
+    z = min(3.0, max(-3.0, z))
+    if category is Category.PEDESTRIAN:
+        return round(1.0 + WALKING_DEVIATION * z, 4)
+    drawn = STYLES[style]
+    return round(drawn.factor_mean + drawn.factor_deviation * z, 4)
+
+
+def driver(
+    category: Category,
+    body: Body,
+    *,
+    style: DrivingStyle,
+    factor: float,
+    speed: float | None,
+    limit: float | None,
+    weather: WeatherEffect,
+) -> Driver:
+    """Attributes of somebody who drives, or walks, like this.
+
+    Parameters
+    ----------
+    factor
+        Drawn speed factor, see :func:`draw_factor`.
+    speed
+        Desired speed, m/s. A vehicle never goes faster. Where it is above ``limit * factor``, the
+        factor is raised so that the desired speed is reached at the spawn, and other limits are
+        exceeded in the same proportion.
+    limit
+        Speed limit at the spawn, m/s; ``None`` if unknown.
+    """
+    if category is Category.PEDESTRIAN:
+        return _walker(body, speed=KINDS[category].max_speed * factor if speed is None else speed)
+    kind, manner = KINDS[category], STYLES[style]
+    max_speed = kind.max_speed
+    if speed is not None:
+        max_speed = speed
+        if limit:
+            factor = max(factor, speed / limit)
+    max_speed = min(max_speed * weather.speed, weather.sight_speed)
+    factor *= weather.speed
+    accel = kind.accel * manner.accel * weather.grip
+    two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
+    min_gap = manner.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0)
+    attributes = (
+        ("vClass", kind.vclass),
+        ("guiShape", kind.shape),
+        *_body(body),
+        ("maxSpeed", number(max_speed)),
+        ("speedDev", "0"),
+        ("accel", number(accel)),
+        ("decel", number(kind.decel * weather.grip)),
+        ("emergencyDecel", number(kind.emergency_decel * weather.grip)),
+        ("tau", number(manner.headway * weather.headway)),
+        ("sigma", number(manner.sigma)),
+        ("minGap", number(min_gap)),
+    )
+    return Driver(attributes, max_speed, round(factor, 4), accel)
+
+
+def _walker(body: Body, *, speed: float) -> Driver:
+    attributes = (
+        ("vClass", "pedestrian"),
+        ("guiShape", "pedestrian"),
+        *_body(body),
+        ("maxSpeed", number(speed)),
+        ("desiredMaxSpeed", number(speed)),
+        ("speedFactor", "1"),
+        ("speedDev", "0"),
+    )
+    return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
+
+
+def _body(body: Body) -> tuple[tuple[str, str], ...]:
+    return (
+        ("length", number(body.length)),
+        ("width", number(body.width)),
+        ("height", number(body.height)),
+    )
+
+
+def number(value: float, *, digits: int = 3) -> str:
+    """Write fixed notation with ``digits`` decimals, without trailing zeros and without ``-0``."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
