@@ -75,6 +75,10 @@ class Area(NamedTuple):
     rings: Lines
 
 
+BRIDGE = "bridge"
+"""Colour of a :class:`Mark` that is no paint but the two sides of a bridge."""
+
+
 class Mark(NamedTuple):
     """Road markings of one style; ``width`` and ``dash`` (painted, gap) in metres."""
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from odscen.catalog.drawing import BRIDGE
 from odscen.catalog.markup import Markup, element, join, number, path_data
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ MARK_COLORS = {
     "blue": "#3f7fd1",
     "green": "#4a9a5a",
     "orange": "#ea8a2c",
+    "curb": "#7c8289",
 }
 
 CROSSWALK_COLOR = "#ff8a1f"
@@ -142,13 +144,13 @@ def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
     )
     data = {area.kind: svg_rings(area.rings) for area in areas}
     parts = []
-    if level > 0:
-        # A light edge and a dark one under it lift a bridge off what it crosses.
-        for width, color, style in ((170, "#6b6f75", "m-edge"), (110, "#f3f1ea", "m-casing")):
-            everything = "".join(data.values())
-            parts.append(
-                element("path", d=everything, class_=style, stroke=color, stroke_width=width)
-            )
+    for mark in drawing.marks:
+        if mark.level == level and mark.color == BRIDGE:
+            # A light edge and a dark one under it lift a bridge off what it crosses.
+            sides = svg_xy(mark.lines)
+            for width, color, style in ((200, "#6b6f75", "m-edge"), (130, "#f3f1ea", "m-casing")):
+                line = element("path", d=sides, class_=style, stroke=color, stroke_width=width)
+                parts.append(element("g", line, fill="none"))
     for kind, rings in data.items():
         # The thin stroke in the same colour closes hairlines between neighbouring lanes.
         color = AREA_COLORS[kind]
@@ -162,7 +164,7 @@ def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
 def _markings(drawing: MapDrawing, level: int) -> Markup:
     parts = []
     for mark in drawing.marks:
-        if mark.level != level:
+        if mark.level != level or mark.color == BRIDGE:
             continue
         dash = None if mark.dash is None else " ".join(number(d * 100, 0) for d in mark.dash)
         parts.append(
@@ -215,7 +217,7 @@ def symbol_shapes(prefix: str) -> Markup:
     for y, color in ((-15, "#ff4b3e"), (15, "#35c46a")):
         walker += element("circle", cx=0, cy=y, r=11, fill=color)
     stop = element("polygon", points=octagon, fill="#c8102e", stroke="#fff", stroke_width=9)
-    stop += element("rect", x=-24, y=-6, width=48, height=12, fill="#fff")
+    stop += symbol_text("STOP", size=27, fill="#fff")
     give_way = element(
         "polygon",
         points="-44,-36 44,-36 0,40",
@@ -233,6 +235,20 @@ def symbol_shapes(prefix: str) -> Markup:
         "speed_limit": limit,
     }
     return element("defs", *(element("g", s, id=f"{prefix}s-{k}") for k, s in shapes.items()))
+
+
+def symbol_text(text: str, *, size: float, fill: str) -> Markup:
+    """Text in the middle of a symbol."""
+    return element(
+        "text",
+        text,
+        y=round(size * 0.36, 1),
+        font_size=size,
+        font_weight=700,
+        text_anchor="middle",
+        font_family=FONT,
+        fill=fill,
+    )
 
 
 def _symbols(drawing: MapDrawing, options: LayerOptions) -> Markup:
@@ -254,16 +270,7 @@ def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
     scale = number(options.symbol_size, 2)
     use = element("use", href=f"#{options.prefix}s-{symbol.kind}")
     if symbol.text:
-        use += element(
-            "text",
-            symbol.text,
-            y=13,
-            font_size=40 if len(symbol.text) < 3 else 31,
-            font_weight=700,
-            text_anchor="middle",
-            font_family=FONT,
-            fill="#1d2126",
-        )
+        use += symbol_text(symbol.text, size=40 if len(symbol.text) < 3 else 31, fill="#1d2126")
     return element("g", use, transform=f"{place} scale({scale})")
 
 

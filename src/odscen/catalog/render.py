@@ -22,6 +22,7 @@ from odscen.catalog.layers import (
     map_layers,
     segment_layer,
     symbol_shapes,
+    symbol_text,
 )
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.errors import MissingDependencyError
@@ -38,7 +39,7 @@ _SHEET = 1200.0
 """Width of the sheet; all sizes below are in these units."""
 _MARGIN, _HEAD, _ROW = 36.0, 74.0, 24.0
 _TALLEST = 1350.0
-_SYMBOL = 15.0
+_SYMBOL = 21.0
 _CHAR = 0.56
 """Width of a letter over its font size, on average."""
 
@@ -219,8 +220,9 @@ def _text(
 
 def _head(drawing: MapDrawing, statistics: MapStatistics | None, frame: _Frame) -> Markup:
     name = drawing.name if len(drawing.name) <= 60 else drawing.name[:59] + "…"
+    size = min(30.0, 800.0 / (0.62 * max(len(name), 1)))
     parts = [
-        _text(frame.left, frame.margin + 26, name or "Map", size=30, font_weight="700"),
+        _text(frame.left, frame.margin + 26, name or "Map", size=size, font_weight="700"),
         _scale_bar(frame),
         _north(frame.width - frame.margin - 14, frame.margin + 30),
     ]
@@ -268,7 +270,7 @@ def _scale_bar(frame: _Frame) -> Markup:
     length = round_length(190.0 / frame.scale)
     right = frame.width - frame.margin - 60
     wide = length * frame.scale
-    y = frame.margin + 44
+    y = frame.margin + 20
     halves = element("rect", x=right - wide, y=y, width=wide, height=7.0, fill=_PAPER, stroke=_INK)
     halves += element("rect", x=right - wide, y=y, width=wide / 2, height=7.0, fill=_INK)
     parts = [halves]
@@ -304,11 +306,7 @@ def _entries(
     if options.symbols:
         kinds = {symbol.kind for symbol in drawing.symbols}
         kinds -= set() if options.speed_limits else {"speed_limit"}
-        entries += [
-            (element("use", href=f"#k-s-{kind}", transform="translate(9 0) scale(.17)"), text)
-            for kind, text in SYMBOL_NAMES.items()
-            if kind in kinds
-        ]
+        entries += [(_sign(kind), text) for kind, text in SYMBOL_NAMES.items() if kind in kinds]
     if graph is not None and options.graph:
         entries += _graph_entries(graph)
     return entries
@@ -336,6 +334,13 @@ def _zebra() -> Markup:
     ]
     ground = element("rect", y=-8, width=18, height=16, rx=3, fill=CROSSWALK_COLOR)
     return join([ground, element("rect", x=1.5, y=-5, width=15, height=10, fill="#7b828b"), *bars])
+
+
+def _sign(kind: str) -> Markup:
+    parts = [element("use", href=f"#k-s-{kind}")]
+    if kind == "speed_limit":
+        parts.append(symbol_text("50", size=40, fill="#1d2126"))
+    return element("g", *parts, transform="translate(9 0) scale(.19)")
 
 
 def _dot(color: str) -> Markup:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.catalog.drawing import Area, Bounds, Lines, MapDrawing, Mark, offsets, ranges
+from odscen.catalog.drawing import BRIDGE, Area, Bounds, Lines, MapDrawing, Mark, offsets, ranges
 from odscen.catalog.furniture import add_furniture
 from odscen.opendrive.model import DRIVABLE_TYPES, GeometryKind
 
@@ -119,7 +119,7 @@ def map_drawing(
         name=name,
         bounds=_bounds([area.rings for area in areas]),
         areas=areas,
-        marks=_marks(borders, levels, tolerance),
+        marks=(*_bridge_sides(thin, borders, table, levels), *_marks(borders, levels, tolerance)),
     )
     return add_furniture(drawing, odr, table)
 
@@ -309,6 +309,23 @@ def _levels(borders: _Borders, table: RoadTable) -> IntArray:
     for _ in range(3):  # no junction has more than four storeys, and a loop must end
         np.maximum.at(levels, high, levels[low] + 1)
     return np.minimum(levels, 3)
+
+
+def _bridge_sides(thin: Lines, borders: _Borders, table: RoadTable, levels: IntArray) -> list[Mark]:
+    """Outermost borders of the drawn lanes of every section above ground."""
+    lanes = len(table.lane_keys)
+    ids, drawn = np.asarray(table.lane_id), np.array(table.lane_type) != "none"
+    sides: dict[int, list[int]] = {}
+    for section in np.flatnonzero(levels).tolist():
+        rows = np.arange(borders.sections.rows[section], borders.sections.rows[section + 1])
+        rows = rows[drawn[rows]]
+        left, right = rows[ids[rows] > 0], rows[ids[rows] < 0]
+        outer = [left[-1] if len(left) else lanes + section]
+        outer.append(right[0] if len(right) else lanes + section)
+        sides.setdefault(int(levels[section]), []).extend(int(row) for row in outer)
+    return [
+        Mark(level, BRIDGE, 1.0, None, thin.take(np.array(sides[level]))) for level in sorted(sides)
+    ]
 
 
 class _Stroke(NamedTuple):
