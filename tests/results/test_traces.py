@@ -37,9 +37,9 @@ def recorded(prefix="vehicle_"):
 @pytest.mark.parametrize("prefix", ["vehicle_", "person_"])
 def test_columns_named_after_vehicles_or_persons_are_read_alike(prefix):
     traces = tidy(recorded(prefix), {"a": "car"}, net_offset=(100.0, 200.0))
-    assert traces.columns == ["time", "id", "x", "y", "speed", "category"]
+    assert traces.columns == ["time", "id", "x", "y", "speed", "category", "piece"]
     assert traces["category"].unique().sort().to_list() == ["car", "other"]
-    assert traces.row(0) == (0.0, "a", 0.0, 0.0, 10.0, "car")
+    assert traces.row(0) == (0.0, "a", 0.0, 0.0, 10.0, "car", 0)
 
 
 def test_rows_without_anybody_and_files_without_columns_are_left_out():
@@ -55,6 +55,16 @@ def test_only_the_points_that_matter_are_kept_and_who_stands_has_no_way():
     assert paths.xy.tolist() == [[100.0, 200.0], [150.0, 200.0], [150.0, 250.0]]
     assert paths.start.tolist() == [0, 3]
     assert thinned_paths(tidy(recorded(), {}).clear()).ids == ()
+
+
+def test_a_teleport_splits_the_way_and_is_not_travelled():
+    gap = recorded().filter(~pl.col("timestep_time").is_between(3.0, 7.0))
+    traces = tidy(gap, {"a": "car"})
+    paths = thinned_paths(traces)
+    assert paths.ids == ("a", "a")
+    assert paths.last == (False, True)
+    assert paths.xy.tolist() == [[100.0, 200.0], [120.0, 200.0], [150.0, 230.0], [150.0, 250.0]]
+    assert travel(traces).distance["a"] == 40.0
 
 
 def test_travel_is_metres_driven_and_mean_speed():

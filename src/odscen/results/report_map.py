@@ -78,7 +78,8 @@ def run_map(
     if drawing is not None:
         options = LayerOptions(symbol_size=dot * 2.2, prefix="map-")
         layers.append(element("g", map_layers(drawing.clipped(bounds), options), class_="map"))
-    layers.append(_speed_layer(speed_by_place(traces)))
+    vehicles = traces.filter(traces["category"] != "pedestrian")
+    layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
     cm = [round(value * 100) for value in (bounds[0], -bounds[3])]
@@ -98,7 +99,7 @@ def run_map(
 def _controls() -> list[Markup]:
     """Radio buttons before the drawing: the style sheet shows what is checked, without a script."""
     parts = []
-    for key, label in (("ways", "Ways by category"), ("speeds", "Mean speed by place")):
+    for key, label in (("ways", "Ways by category"), ("speeds", "Mean speed of vehicles by place")):
         checked = "checked" if key == "ways" else None
         name = f"show-{key}"
         parts.append(
@@ -177,7 +178,7 @@ def _path_layer(paths: Paths, actors: Sequence[ActorOutcome], dot: float) -> Mar
 
 
 def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: float) -> Markup:
-    ends = paths.xy[paths.start[1:] - 1] if len(paths.ids) else np.empty((0, 2))
+    ends = paths.xy[paths.start[1:][np.array(paths.last, dtype=np.bool_)] - 1]
     incidents = np.array(
         [
             (event.x, event.y)
@@ -191,12 +192,12 @@ def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: 
         element("path", d=_dots(ends), class_="goal", stroke_width=round(width * 0.8)),
         element("path", d=_dots(spawns), class_="spawn", stroke_width=width),
     ]
-    r = round(dot * 90)
+    r = round(dot * 120)
     crosses = "".join(
         f"M{x - r} {y - r}l{2 * r} {2 * r}M{x - r} {y + r}l{2 * r} {-2 * r}"
         for x, y in np.rint(incidents * (100.0, -100.0)).astype(np.int64).tolist()
     )
-    shown = element("path", d=crosses, class_="incident", stroke_width=round(dot * 45))
+    shown = element("path", d=crosses, class_="incident", stroke_width=round(dot * 60))
     return element("g", element("g", *parts, class_="for-ways"), shown if crosses else None)
 
 

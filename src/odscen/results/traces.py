@@ -33,7 +33,7 @@ def tidy(
     *,
     net_offset: tuple[float, float] = (0.0, 0.0),
 ) -> pl.DataFrame:
-    """Trajectories with columns ``time``, ``id``, ``x``, ``y``, ``speed``, ``category``.
+    """Trajectories with columns ``time, id, x, y, speed, category, piece``.
 
     Parameters
     ----------
@@ -47,20 +47,21 @@ def tidy(
     Returns
     -------
     polars.DataFrame
-        Sorted by id, then time; OpenDRIVE frame; rows without a place left out.
+        Sorted by id, then time; OpenDRIVE frame; rows without a place left out. ``piece`` numbers
+        the stretches without interruption: whoever is teleported is away for a while.
     """
     import polars as pl
 
     columns = _column_names(trajectories.columns)
     schema = {"time": pl.Float64, "id": pl.String, "x": pl.Float64, "y": pl.Float64}
-    schema |= {"speed": pl.Float64, "category": pl.String}
+    schema |= {"speed": pl.Float64, "category": pl.String, "piece": pl.UInt32}
     if columns is None:
         return pl.DataFrame(schema=schema)
     lookup = pl.DataFrame(
         {"id": list(categories), "category": list(categories.values())},
         schema={"id": pl.String, "category": pl.String},
     )
-    return (
+    rows = (
         trajectories.select(pl.col(old).alias(new) for new, old in columns.items())
         .with_columns(pl.col("time", "x", "y", "speed").cast(pl.Float64))
         .filter(pl.col("id").is_not_null() & pl.all_horizontal(pl.col("x", "y").is_finite()))
@@ -69,6 +70,11 @@ def tidy(
         .with_columns(pl.col("category").fill_null(OTHER))
         .sort("id", "time", maintain_order=True)
     )
+    another = (pl.col("id") != pl.col("id").shift()).fill_null(value=False)
+    pause = pl.col("time").diff()
+    step = rows.select(pause.filter(pause > 0).min()).item() or 1.0
+    away = (pause > 1.5 * step).fill_null(value=False)
+    return rows.with_columns((another | away).cum_sum().cast(pl.UInt32).alias("piece"))
 
 
 def _column_names(columns: list[str]) -> dict[str, str] | None:
@@ -153,7 +159,7 @@ def counts_over_time(
 
 
 class Paths(NamedTuple):
-    """Thinned ways of all actors.
+    """Thinned ways of all actors, one for every stretch without interruption.
 
     Attributes
     ----------
@@ -161,6 +167,8 @@ class Paths(NamedTuple):
         Actor per way, sorted.
     categories
         Category per way.
+    last
+        Whether it is the actor's last way.
     xy
         Shape ``(N, 2)``, metres, OpenDRIVE frame.
     start
@@ -169,6 +177,7 @@ class Paths(NamedTuple):
 
     ids: tuple[str, ...]
     categories: tuple[str, ...]
+    last: tuple[bool, ...]
     xy: FloatArray
     start: IntArray
 
@@ -178,26 +187,22 @@ def thinned_paths(traces: pl.DataFrame, *, tolerance: float = 0.25) -> Paths:
     import polars as pl
     import shapely
 
-    moved = traces.filter(
-        (pl.col("id") != pl.col("id").shift())
-        | (pl.col("x") != pl.col("x").shift())
-        | (pl.col("y") != pl.col("y").shift())
-        | pl.col("x").shift().is_null()
+    stands = (pl.col("x") == pl.col("x").shift()) & (pl.col("y") == pl.col("y").shift())
+    begins = (pl.col("piece") != pl.col("piece").shift()).fill_null(value=True)
+    moved = traces.filter(begins | ~stands).filter(pl.len().over("piece") > 1)
+    if moved.is_empty():
+        return Paths((), (), (), np.empty((0, 2)), np.zeros(1, dtype=np.int64))
+    several = moved.group_by("piece", maintain_order=True).agg(
+        pl.len().alias("n"), pl.col("id").first(), pl.col("category").first()
     )
-    sizes = moved.group_by("id", maintain_order=True).agg(
-        pl.len().alias("n"), pl.col("category").first()
-    )
-    several = sizes.filter(pl.col("n") > 1)
-    kept = moved.filter(pl.col("id").is_in(several["id"].implode()))
-    if several.is_empty():
-        return Paths((), (), np.empty((0, 2)), np.zeros(1, dtype=np.int64))
+    last = several["id"] != several["id"].shift(-1, fill_value="")
     lines = shapely.linestrings(
-        kept.select("x", "y").to_numpy(), indices=np.repeat(np.arange(len(several)), several["n"])
+        moved.select("x", "y").to_numpy(), indices=np.repeat(np.arange(len(several)), several["n"])
     )
     lines = shapely.simplify(lines, tolerance, preserve_topology=False)
     xy, index = shapely.get_coordinates(lines, return_index=True)
     start = np.searchsorted(index, np.arange(len(several) + 1)).astype(np.int64)
-    return Paths(tuple(several["id"]), tuple(several["category"]), xy, start)
+    return Paths(tuple(several["id"]), tuple(several["category"]), tuple(last), xy, start)
 
 
 class SpeedCells(NamedTuple):
@@ -208,7 +213,7 @@ class SpeedCells(NamedTuple):
     size: float
 
 
-def speed_by_place(traces: pl.DataFrame, *, size: float = 4.0) -> SpeedCells:
+def speed_by_place(traces: pl.DataFrame, *, size: float = 3.0) -> SpeedCells:
     """Mean speed of everyone who passed, in square cells of ``size`` metres."""
     import polars as pl
 
@@ -224,7 +229,10 @@ def speed_by_place(traces: pl.DataFrame, *, size: float = 4.0) -> SpeedCells:
 
 
 class ActorTravel(NamedTuple):
-    """Per actor: metres travelled (straight between recorded points) and mean speed in m/s."""
+    """Per actor: metres travelled (straight between recorded points) and mean speed in m/s.
+
+    What a teleport skips is not travelled.
+    """
 
     distance: dict[str, float]
     speed: dict[str, float]
@@ -234,9 +242,10 @@ def travel(traces: pl.DataFrame) -> ActorTravel:
     """Distance and mean speed of every actor, from what was recorded."""
     import polars as pl
 
-    step = ((pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()).sum()
+    step = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
+    same = pl.col("piece") == pl.col("piece").shift()
     rows = traces.group_by("id", maintain_order=True).agg(
-        step.alias("distance"), pl.col("speed").mean().alias("speed")
+        step.filter(same).sum().alias("distance"), pl.col("speed").mean().alias("speed")
     )
     ids = rows["id"].to_list()
     return ActorTravel(
