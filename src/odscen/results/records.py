@@ -42,6 +42,8 @@ class PlannedActor:
         Seconds that the way takes at the desired speed without anybody else; ``None`` if unknown.
     flow
         Id of the flow it belongs to, if any.
+    problem
+        Why it is not in the SUMO files, if it is not.
     """
 
     id: str
@@ -62,6 +64,7 @@ class PlannedActor:
     model: str | None = None
     flow: str | None = None
     ego: bool = False
+    problem: str | None = None
 
     @property
     def person(self) -> bool:

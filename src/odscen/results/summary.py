@@ -49,6 +49,8 @@ class ActorOutcome:
         Travel time beyond the time that the way takes undisturbed, including getting up to speed.
     mean_speed
         Route length over travel time.
+    problem
+        Why the SUMO network had no way for it, if so; it is then ``waiting``.
     """
 
     id: str
@@ -72,6 +74,7 @@ class ActorOutcome:
     teleports: int
     collisions: int
     emergency_stops: int
+    problem: str | None = None
 
 
 def actor_outcomes(plan: Plan, events: Sequence[Event]) -> tuple[ActorOutcome, ...]:
@@ -139,6 +142,7 @@ def _outcome(
         teleports=teleports,
         collisions=collisions,
         emergency_stops=emergency_stops,
+        problem=actor.problem,
     )
 
 

@@ -1,0 +1,93 @@
+"""The routes file: vTypes, then vehicles and persons by departure, as deterministic text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+from odscen.sumo.driving import number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from odscen.sumo.driving import Driver
+    from odscen.sumo.people import RoadUser
+    from odscen.sumo.routes import Route
+    from odscen.sumo.walks import Walk
+
+
+class Demand:
+    """Collects vehicles and persons; equal vTypes are written once.
+
+    Everybody who departs at 0 is inserted unconditionally: the scenario has checked that bodies do
+    not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of a dense
+    standing crowd. Those who come later wait until SUMO finds room.
+    """
+
+    def __init__(self) -> None:
+        self._types: dict[tuple[tuple[str, str], ...], str] = {}
+        self._counts: dict[str, int] = {}
+        self._lines: list[tuple[float, str, list[str]]] = []
+
+    def add_vehicle(self, user: RoadUser, driver: Driver, route: Route) -> None:
+        """Add a vehicle that drives ``route``."""
+        attributes = [
+            ("id", user.id),
+            ("type", self._type(user.category.value, driver)),
+            ("depart", number(user.depart)),
+            ("departLane", str(route.depart_lane)),
+            ("departPos", number(route.depart_pos, digits=4)),
+            ("departSpeed", "0"),
+            ("departPosLat", number(user.lateral_offset, digits=4)),
+            ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
+            ("arrivalPos", number(route.arrival_pos, digits=4)),
+            ("speedFactor", number(driver.speed_factor, digits=4)),
+        ]
+        if user.depart == 0.0:
+            attributes.append(("insertionChecks", "none"))
+        lines = [
+            f"    <vehicle{_xml(attributes)}>",
+            f'        <route edges="{" ".join(route.edges)}"/>',
+            "    </vehicle>",
+        ]
+        self._lines.append((user.depart, user.id, lines))
+
+    def add_walk(self, user: RoadUser, driver: Driver, walk: Walk) -> None:
+        """Add a person that walks ``walk``."""
+        person = [
+            ("id", user.id),
+            ("type", self._type(user.category.value, driver)),
+            ("depart", number(user.depart)),
+            ("departPos", number(walk.depart_pos, digits=4)),
+        ]
+        stage = [
+            ("edges", " ".join(walk.edges)),
+            ("departPosLat", number(walk.depart_pos_lat, digits=4)),
+            ("arrivalPos", number(walk.arrival_pos, digits=4)),
+        ]
+        lines = [f"    <person{_xml(person)}>", f"        <walk{_xml(stage)}/>", "    </person>"]
+        self._lines.append((user.depart, user.id, lines))
+
+    def to_xml(self) -> str:
+        """Text of ``routes.rou.xml``."""
+        head = [
+            f'    <vType id="{name}"{_xml(attributes)}/>'
+            for attributes, name in self._types.items()
+        ]
+        body = [line for _, _, lines in sorted(self._lines) for line in lines]
+        return "\n".join(
+            ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>", *head, *body, "</routes>", ""]
+        )
+
+    def _type(self, category: str, driver: Driver) -> str:
+        """Name of the vType with these attributes: category and a running number."""
+        name = self._types.get(driver.attributes)
+        if name is None:
+            count = self._counts.get(category, 0)
+            self._counts[category] = count + 1
+            name = self._types[driver.attributes] = f"{category}.{count}"
+        return name
+
+
+def _xml(attributes: Iterable[tuple[str, str]]) -> str:
+    return "".join(f" {name}={quoteattr(value)}" for name, value in attributes)

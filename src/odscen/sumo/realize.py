@@ -1,0 +1,271 @@
+"""From a scenario to the files that SUMO runs, and the plan that the run is held against.
+
+Pure: the scenario, the map's graph and its SUMO network go in, texts come out, the same for the
+same input. Everybody's type, speed factor, route and place are written out; nothing is left to
+SUMO's random numbers but the dawdling of drivers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from odscen.categories import DEFAULT_BODY, Body
+from odscen.errors import ScenarioError
+from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.results.records import Plan, PlannedActor
+from odscen.scenario.region import Region
+from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.demand import Demand
+from odscen.sumo.driving import KINDS, draw_factor, driver
+from odscen.sumo.layout import CONFIG_FILE, ROUTES_FILE
+from odscen.sumo.people import RoadUser, road_users
+from odscen.sumo.routes import NoRouteError, RoutePlanner
+from odscen.sumo.walks import WalkPlanner
+from odscen.sumo.weather import NO_EFFECT, weather_effect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.lanegraph.model import IntArray, MapGraph
+    from odscen.scenario.document import Environment, Scenario
+    from odscen.sumo.driving import Driver
+    from odscen.sumo.network import RoadNet
+    from odscen.sumo.routes import Places
+    from odscen.sumo.weather import WeatherEffect
+
+UNKNOWN_LIMIT = 13.89
+"""Speed (m/s) that free-flow times assume where the map gives no limit: 50 km/h."""
+
+
+class Assets(Protocol):
+    """What realization asks of the asset catalogue."""
+
+    def dimensions(self, model: str) -> Body | None:
+        """Size of a model, ``None`` if there is no such model."""
+
+    def weather(self, preset: str) -> Mapping[str, float] | None:
+        """Parameters of a weather preset, ``None`` if there is no such preset."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SumoMap:
+    """A map as realization needs it: its graphs, its SUMO network, and where they meet.
+
+    Attributes
+    ----------
+    net_offset
+        Added to OpenDRIVE x and y to give SUMO's, metres.
+    elevation
+        Whether the network has heights.
+    """
+
+    graph: MapGraph
+    net: RoadNet
+    lane_places: Places
+    walk_places: Places
+    net_offset: tuple[float, float]
+    elevation: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Realization:
+    """SUMO files by name, the plan, and what could not be done as designed.
+
+    ``problems`` name actors that are in the plan but not in the files, because the SUMO network has
+    no way for them; ``notes`` name routes that had to be repaired.
+    """
+
+    files: dict[str, str]
+    plan: Plan
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def realize(
+    scenario: Scenario,
+    sumo_map: SumoMap,
+    assets: Assets | None = None,
+    *,
+    seed: int | None = None,
+    until: float | None = None,
+    step_length: float | None = None,
+    weather: bool = True,
+) -> Realization:
+    """Derive SUMO files and plan from a scenario.
+
+    Parameters
+    ----------
+    assets
+        Knows the size of models and the parameters of weather presets; without it all bodies are
+        their category's and only single parameters of the environment count.
+    seed, until, step_length
+        Instead of the scenario's own.
+    weather
+        Whether weather acts on driving; the scenario can also switch it off itself.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    if seed is not None:
+        scenario = scenario.model_copy(update={"seed": seed})
+    until = scenario.simulation.duration if until is None else until
+    step_length = scenario.simulation.step_length if step_length is None else step_length
+    region = Region.of(sumo_map.graph, scenario.roi)
+    users = road_users(scenario, sumo_map.graph, region, until=until)
+    _refuse_twins(users)
+    effect = _effect(scenario.environment, assets) if weather else NO_EFFECT
+    writer = _Writer(sumo_map, region, assets, scenario.seed, effect)
+    planned = tuple(writer.add(user) for user in users)
+    plan = Plan(
+        scenario=scenario.name,
+        seed=scenario.seed,
+        until=until,
+        step_length=step_length,
+        net_offset=sumo_map.net_offset,
+        actors=planned,
+        elevation=sumo_map.elevation,
+    )
+    settings = RunSettings(
+        until=until, step_length=step_length, seed=scenario.seed, elevation=sumo_map.elevation
+    )
+    files = {ROUTES_FILE: writer.demand.to_xml(), CONFIG_FILE: sumo_config(settings)}
+    return Realization(files, plan, tuple(writer.problems), tuple(writer.notes))
+
+
+class _Writer:
+    """Adds road users to the demand one by one; collects what could not be done."""
+
+    def __init__(
+        self,
+        sumo_map: SumoMap,
+        region: Region,
+        assets: Assets | None,
+        seed: int,
+        effect: WeatherEffect,
+    ) -> None:
+        graph = sumo_map.graph
+        self.demand = Demand()
+        self.problems: list[str] = []
+        self.notes: list[str] = []
+        self._graph = graph
+        self._region = region
+        self._assets = assets
+        self._seed = seed
+        self._effect = effect
+        self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
+        self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
+
+    def add(self, user: RoadUser) -> PlannedActor:
+        """Write one road user and return the plan for it."""
+        body = self._body(user)
+        manner = self._driver(user, body)
+        router = self._region.walk_router if user.person else self._region.router
+        path = router.path(user.spawn, user.goal)
+        problem = None
+        try:
+            repairs = self._write(user, body, manner, path)
+        except NoRouteError as error:
+            problem = str(error)
+            self.problems.append(f"{user.id}: {error}")
+        else:
+            self.notes += [f"{user.id}: {repair}" for repair in repairs]
+        return self._planned(user, body, manner, path, problem)
+
+    def _write(self, user: RoadUser, body: Body, manner: Driver, path: IntArray) -> tuple[str, ...]:
+        if user.person:
+            walk = self._walks.plan(path, length=body.length, lateral_offset=user.lateral_offset)
+            self.demand.add_walk(user, manner, walk)
+            return walk.repairs
+        vclass = KINDS[user.category].vclass
+        route = self._routes.plan(path, length=body.length, vclass=vclass)
+        self.demand.add_vehicle(user, manner, route)
+        return route.repairs
+
+    def _driver(self, user: RoadUser, body: Body) -> Driver:
+        limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
+        return driver(
+            user.category,
+            body,
+            style=user.style,
+            factor=draw_factor(self._seed, user.id, user.style, user.category),
+            speed=user.speed,
+            limit=limit if limit is not None and math.isfinite(limit) else None,
+            weather=self._effect,
+        )
+
+    def _body(self, user: RoadUser) -> Body:
+        known = None
+        if user.model is not None and self._assets is not None:
+            known = self._assets.dimensions(user.model)
+        return DEFAULT_BODY[user.category] if known is None else known
+
+    def _planned(
+        self, user: RoadUser, body: Body, manner: Driver, path: IntArray, problem: str | None
+    ) -> PlannedActor:
+        graph = self._graph.walks if user.person else self._graph.lanes
+        name = walk_node_id if user.person else node_id
+        spawn = user.spawn
+        hdg = float(graph.hdg[spawn])
+        length = float(np.sum(self._steps(user, path)))
+        return PlannedActor(
+            id=user.id,
+            category=user.category.value,
+            spawn=name(self._graph, spawn),
+            goal=name(self._graph, user.goal),
+            depart=user.depart,
+            length=body.length,
+            width=body.width,
+            x=float(graph.x[spawn]) - math.sin(hdg) * user.lateral_offset,
+            y=float(graph.y[spawn]) + math.cos(hdg) * user.lateral_offset,
+            z=float(graph.z[spawn]),
+            hdg=hdg,
+            speed=user.speed,
+            speed_factor=manner.speed_factor,
+            route_length=length,
+            free_flow_time=self._free_flow_time(user, manner, path),
+            model=user.model,
+            flow=user.flow,
+            ego=user.ego,
+            problem=problem,
+        )
+
+    def _steps(self, user: RoadUser, path: IntArray) -> np.ndarray:
+        """Distances between the nodes of a path, shape ``(len(path) - 1,)``, metres."""
+        graph = self._graph.walks if user.person else self._graph.lanes
+        return np.hypot(np.diff(graph.x[path]), np.diff(graph.y[path]))
+
+    def _free_flow_time(self, user: RoadUser, manner: Driver, path: IntArray) -> float | None:
+        """Seconds along the path at the speed the actor wants, from standing.
+
+        ``sum(ds / v) + v0 / (2 a)``: the second term is what getting up to the first speed costs.
+        """
+        if len(path) < 2:
+            return None
+        steps = self._steps(user, path)
+        if user.person:
+            return float(np.sum(steps)) / manner.max_speed
+        limit = self._graph.lanes.speed_limit[path[:-1]]
+        limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
+        speed = np.minimum(limit * manner.speed_factor, manner.max_speed)
+        return float(np.sum(steps / speed) + speed[0] / (2.0 * manner.accel))
+
+
+def _effect(environment: Environment, assets: Assets | None) -> WeatherEffect:
+    if not environment.affects_driving:
+        return NO_EFFECT
+    preset = None if assets is None else assets.weather(environment.preset)
+    return weather_effect({**(preset or {}), **environment.parameters})
+
+
+def _refuse_twins(users: tuple[RoadUser, ...]) -> None:
+    """Flow members are named ``<flow>.<k>``, which an actor's own id may equal."""
+    twins = sorted(name for name, n in Counter(user.id for user in users).items() if n > 1)
+    if twins:
+        msg = "two road users have the same name; flows name theirs <flow>.<number>"
+        raise ScenarioError(msg, problems=twins[:10])

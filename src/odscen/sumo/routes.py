@@ -1,0 +1,240 @@
+"""From a path on the lane graph to a SUMO route: edges, where it departs, where it arrives.
+
+The centre of the body is to be on the spawn node; SUMO's ``departPos`` is where the front is, half
+a body further on. Near the end of a lane that place is on the next one, which may be an internal
+lane of a junction: the route then starts with it. How far along is counted from the last node of
+the spawn's lane that lies on a normal SUMO lane, and followed through the links of the route,
+because several internal lanes overlap where they begin and geometry alone cannot tell them apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.model import IntArray, LaneGraph
+    from odscen.sumo.network import NetLane, RoadNet
+
+FloatArray = NDArray[np.float64]
+
+DETOUR = 60.0
+"""Metres of road that a repair of a route may put between two of its edges."""
+
+
+class NoRouteError(Exception):
+    """Somebody cannot get from spawn to goal on the SUMO network; the message says why."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Where the nodes of a graph are on the SUMO network.
+
+    Attributes
+    ----------
+    lanes
+        Ids of SUMO lanes.
+    lane
+        Shape ``(N,)``: row of ``lanes`` for each node, -1 where the network has nothing there.
+    pos
+        Shape ``(N,)``: metres along that lane.
+    """
+
+    lanes: tuple[str, ...]
+    lane: IntArray
+    pos: FloatArray
+
+    def of(self, node: int) -> tuple[str, float] | None:
+        """SUMO lane and position of a node."""
+        row = int(self.lane[node])
+        return None if row < 0 else (self.lanes[row], float(self.pos[node]))
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A SUMO route; ``repairs`` says in words where it differs from the path on the lane graph."""
+
+    edges: tuple[str, ...]
+    depart_lane: int
+    depart_pos: float
+    arrival_lane: int | None
+    arrival_pos: float
+    repairs: tuple[str, ...] = ()
+
+
+class RoutePlanner:
+    """Routes of vehicles on one map.
+
+    Parameters
+    ----------
+    graph
+        The lane graph.
+    net
+        The SUMO network.
+    places
+        Where the nodes of the lane graph are on it.
+    """
+
+    def __init__(self, graph: LaneGraph, net: RoadNet, places: Places) -> None:
+        self._graph = graph
+        self._net = net
+        self._places = places
+
+    def plan(self, path: IntArray, *, length: float, vclass: str) -> Route:
+        """Route of a vehicle of this length along a path of the lane graph.
+
+        Parameters
+        ----------
+        path
+            Nodes from spawn to goal, both included.
+        length
+            Of the body, metres.
+        vclass
+            SUMO's vehicle class.
+
+        Raises
+        ------
+        NoRouteError
+            If the SUMO network has no way along the path, or the class may not use it.
+        """
+        edges, repairs = connected(self._net, self._edges(path, vclass), vclass)
+        edges, start, pos = self._anchor(path, edges, vclass)
+        edges, lane, front = self._front(edges, start, pos + length / 2.0)
+        if not lane.allows(vclass):
+            msg = f"lane {lane.id} of the SUMO network does not admit {vclass}"
+            raise NoRouteError(msg)
+        edges, arrival_lane, arrival_pos = self._arrival(edges, path, vclass, length)
+        if len(edges) == 1:  # there and back again is not meant: stop where it has just started
+            arrival_pos = min(max(arrival_pos, front + 0.1), lane.length)
+        return Route(edges, lane.index, front, arrival_lane, arrival_pos, repairs)
+
+    def _edges(self, path: IntArray, vclass: str) -> list[str]:
+        """Return normal edges that the path runs over, in order, each run of equal ones once."""
+        rows = self._places.lane[path]
+        rows = rows[rows >= 0]
+        if not len(rows):
+            msg = "the SUMO network has no lane anywhere on the way"
+            raise NoRouteError(msg)
+        changed = np.ones(len(rows), dtype=np.bool_)
+        changed[1:] = rows[1:] != rows[:-1]
+        edges: list[str] = []
+        for row in rows[changed].tolist():
+            lane = self._net.lanes[self._places.lanes[row]]
+            if not lane.internal and lane.edge not in edges[-1:] and self._admits(lane, vclass):
+                edges.append(lane.edge)
+        if edges:
+            return edges
+        exit_lane = self._net.exit_of(self._places.lanes[int(rows[0])])
+        if exit_lane is None:
+            msg = "the way never leaves the junction it starts in"
+            raise NoRouteError(msg)
+        return [exit_lane.edge]
+
+    def _admits(self, lane: NetLane, vclass: str) -> bool:
+        return any(other.allows(vclass) for other in self._net.edge_lanes[lane.edge])
+
+    def _anchor(
+        self, path: IntArray, edges: tuple[str, ...], vclass: str
+    ) -> tuple[tuple[str, ...], NetLane, float]:
+        """Edges, lane and position of the spawn; the position may lie beyond the lane's end.
+
+        The lane is the normal one of the last node of the spawn's lane, up to the spawn, that lies
+        on the route or just before it; without such a node it is where geometry says.
+        """
+        spawn = int(path[0])
+        row = int(self._graph.lane[spawn])
+        first = int(self._graph.lanes.first_node[row])
+        for node in range(spawn, first - 1, -1):
+            place = self._places.of(node)
+            if place is None or (lane := self._net.lanes[place[0]]).internal:
+                continue
+            behind = float(self._graph.offset[spawn] - self._graph.offset[node])
+            if lane.edge == edges[0]:
+                return edges, lane, place[1] + behind
+            if edges[0] in self._net.followers(lane.edge, vclass):
+                return (lane.edge, *edges), lane, place[1] + behind
+        place = self._places.of(spawn)
+        if place is None:
+            msg = "the SUMO network has no lane at the spawn"
+            raise NoRouteError(msg)
+        lane = self._net.lanes[place[0]]
+        return (edges if lane.edge == edges[0] else (lane.edge, *edges)), lane, place[1]
+
+    def _front(
+        self, edges: tuple[str, ...], start: NetLane, pos: float
+    ) -> tuple[tuple[str, ...], NetLane, float]:
+        """Follow the route from ``start`` to ``pos``: the edges left, the lane, and where on it."""
+        lane = start
+        while pos > lane.length:
+            if len(edges) < 2:
+                return edges, lane, lane.length
+            passage = self._net.passage(lane.id, edges[1])
+            if passage is None:  # another lane of the edge goes there; it changes lanes at its end
+                return edges, lane, lane.length
+            pos -= lane.length
+            lane = passage[0]
+            edges = (lane.edge, *edges[1:]) if lane.internal else edges[1:]
+        return edges, lane, max(pos, 0.0)
+
+    def _arrival(
+        self, edges: tuple[str, ...], path: IntArray, vclass: str, length: float
+    ) -> tuple[tuple[str, ...], int | None, float]:
+        """Edges, lane and position of the arrival: body centre on the goal as far as the edge goes.
+
+        A goal inside a junction is reached by leaving the junction: routes end on normal edges.
+        """
+        last = self._net.edge_lanes[edges[-1]]
+        place = self._places.of(int(path[-1]))
+        if place is None:
+            return edges, None, last[0].length
+        lane = self._net.lanes[place[0]]
+        if lane.edge == edges[-1] and not lane.internal:
+            index = lane.index if lane.allows(vclass) else None
+            return edges, index, min(place[1] + length / 2.0, lane.length)
+        if lane.internal:
+            leaving = self._net.exit_of(lane.id)
+            if leaving is not None and leaving.edge in self._net.followers(edges[-1], vclass):
+                return (*edges, leaving.edge), None, min(1.0, leaving.length)
+        return edges, None, last[0].length
+
+
+def connected(
+    net: RoadNet, edges: list[str], vclass: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Make a list of edges a connected route.
+
+    Where two edges have no link, the shortest way between them is put in; where there is none of at
+    most :data:`DETOUR` metres, the second one is left out. The last edge is never left out.
+
+    Returns
+    -------
+    The edges, and the repairs in words.
+
+    Raises
+    ------
+    NoRouteError
+        If the last edge cannot be reached.
+    """
+    route, repairs = [edges[0]], []
+    for position, edge in enumerate(edges[1:], start=1):
+        if edge in net.next_edges(route[-1], vclass):
+            route.append(edge)
+            continue
+        way = net.way(route[-1], edge, vclass)
+        last = position == len(edges) - 1
+        if way is None or (not last and _between(net, way) > DETOUR):
+            if last:
+                msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {edge}"
+                raise NoRouteError(msg)
+            repairs.append(f"edge {edge} left out: no link from {route[-1]}")
+            continue
+        route.extend(way[1:])
+        repairs.append(f"{' '.join(way[1:-1]) or edge} put in between {way[0]} and {edge}")
+    return tuple(route), tuple(repairs)
+
+
+def _between(net: RoadNet, way: tuple[str, ...]) -> float:
+    return sum(net.edge_length(edge) for edge in way[1:-1])

@@ -1,0 +1,114 @@
+"""From a path on the pedestrian graph to the edges of a SUMO walk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.sumo.network import PEDESTRIAN
+from odscen.sumo.routes import NoRouteError, connected
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.model import IntArray, PedestrianGraph
+    from odscen.sumo.network import NetLane, RoadNet
+    from odscen.sumo.routes import Places
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A SUMO walk; ``depart_pos`` is where the front of the body is."""
+
+    edges: tuple[str, ...]
+    depart_pos: float
+    depart_pos_lat: float
+    arrival_pos: float
+    repairs: tuple[str, ...] = ()
+
+
+class WalkPlanner:
+    """Walks on one map; like :class:`odscen.sumo.routes.RoutePlanner`, for the pedestrian graph."""
+
+    def __init__(self, graph: PedestrianGraph, net: RoadNet, places: Places) -> None:
+        self._graph = graph
+        self._net = net
+        self._places = places
+
+    def plan(self, path: IntArray, *, length: float, lateral_offset: float) -> Walk:
+        """Walk along a path of the pedestrian graph.
+
+        Parameters
+        ----------
+        path
+            Nodes from spawn to goal, both included.
+        length
+            Of the body, metres.
+        lateral_offset
+            Metres to the left, looking along growing s.
+
+        Raises
+        ------
+        NoRouteError
+            If the SUMO network has no way to walk there.
+        """
+        start = self._place(int(path[0]), "spawn")
+        end = self._place(int(path[-1]), "goal")
+        edges, repairs = connected(self._net, self._edges(path), PEDESTRIAN)
+        onwards = self._onwards(path, start, end, edges)
+        front = start[1] + length / 2.0 * onwards
+        return Walk(
+            edges=edges,
+            depart_pos=min(max(front, 0.0), start[0].length),
+            depart_pos_lat=lateral_offset * self._along(int(path[0]), start),
+            arrival_pos=min(max(end[1], 0.0), end[0].length),
+            repairs=repairs,
+        )
+
+    def _place(self, node: int, what: str) -> tuple[NetLane, float]:
+        place = self._places.of(node)
+        if place is None:
+            msg = f"the SUMO network has nothing to walk on at the {what}"
+            raise NoRouteError(msg)
+        lane = self._net.lanes[place[0]]
+        if lane.internal or not lane.allows(PEDESTRIAN):
+            msg = f"lane {lane.id} of the SUMO network at the {what} is not for walking"
+            raise NoRouteError(msg)
+        return lane, place[1]
+
+    def _edges(self, path: IntArray) -> list[str]:
+        rows = self._places.lane[path]
+        edges: list[str] = []
+        for row in rows[rows >= 0].tolist():
+            lane = self._net.lanes[self._places.lanes[row]]
+            if not lane.internal and lane.allows(PEDESTRIAN) and lane.edge not in edges[-1:]:
+                edges.append(lane.edge)
+        return edges
+
+    def _along(self, node: int, start: tuple[NetLane, float]) -> float:
+        """Return 1 if the SUMO lane at a node runs with growing s, -1 if against it."""
+        row = int(self._graph.lane[node])
+        first, end = (int(n) for n in self._graph.first_node[row : row + 2])
+        for other in (node + 1, node - 1):
+            place = self._places.of(other) if first <= other < end else None
+            if place is not None and place[0] == start[0].id and place[1] != start[1]:
+                return float(np.sign(place[1] - start[1])) * (other - node)
+        return 1.0
+
+    def _onwards(
+        self,
+        path: IntArray,
+        start: tuple[NetLane, float],
+        end: tuple[NetLane, float],
+        edges: tuple[str, ...],
+    ) -> float:
+        """Return 1 if the walk begins along its first lane, -1 if against it."""
+        if len(edges) == 1:
+            return 1.0 if end[1] >= start[1] else -1.0
+        for node in path[1:].tolist():
+            place = self._places.of(node)
+            if place is None or place[0] != start[0].id:
+                break
+            if place[1] != start[1]:
+                return float(np.sign(place[1] - start[1]))
+        return 1.0 if start[1] > start[0].length / 2.0 else -1.0
