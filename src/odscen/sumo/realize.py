@@ -8,6 +8,7 @@ SUMO's random numbers but the dawdling of drivers.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
