@@ -67,6 +67,16 @@ def test_a_teleport_splits_the_way_and_is_not_travelled():
     assert travel(traces).distance["a"] == 40.0
 
 
+def test_a_jump_within_one_step_is_a_teleport_too():
+    jumped = recorded().with_columns(
+        pl.when(pl.col("timestep_time") >= 6.0)
+        .then(pl.col("vehicle_y") + 90.0)
+        .otherwise(pl.col("vehicle_y"))
+        .alias("vehicle_y")
+    )
+    assert thinned_paths(tidy(jumped, {"a": "car"})).ids == ("a", "a")
+
+
 def test_travel_is_metres_driven_and_mean_speed():
     moved = travel(tidy(recorded(), {}))
     assert moved.distance == pytest.approx({"a": 100.0, "b": 0.0})

@@ -73,7 +73,8 @@ def run_map(
     if bounds is None:
         return None
     extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    dot = min(max(extent / 260.0, 0.5), 4.0)
+    # Marks shrink where there are many, so that they do not hide the ways.
+    dot = min(max(extent / 260.0, 0.5), 4.0) * min(1.0, (300.0 / max(len(paths.ids), 1)) ** 0.4)
     layers = []
     if drawing is not None:
         options = LayerOptions(symbol_size=dot * 2.2, prefix="map-")

@@ -73,7 +73,11 @@ def tidy(
     another = (pl.col("id") != pl.col("id").shift()).fill_null(value=False)
     pause = pl.col("time").diff()
     step = rows.select(pause.filter(pause > 0).min()).item() or 1.0
-    away = (pause > 1.5 * step).fill_null(value=False)
+    away = pause > 1.5 * step
+    # Some teleports end in the step they begin: nobody covers ten metres more than driving takes.
+    moved = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
+    away |= moved > 2.0 * pause * pl.max_horizontal("speed", pl.col("speed").shift()) + 10.0
+    away = away.fill_null(value=False)
     return rows.with_columns((another | away).cum_sum().cast(pl.UInt32).alias("piece"))
 
 
