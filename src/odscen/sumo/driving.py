@@ -172,5 +172,7 @@ def _body(body: Body) -> tuple[tuple[str, str], ...]:
 
 def number(value: float, *, digits: int = 3) -> str:
     """Write fixed notation with ``digits`` decimals, without trailing zeros and without ``-0``."""
-    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
+    text = f"{value:.{digits}f}"
+    if digits > 0:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
