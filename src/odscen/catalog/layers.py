@@ -26,14 +26,14 @@ AREA_COLORS = {
     "green": "#c3d2ae",
     "other": "#d5d6d1",
     "rail": "#b9aa9b",
-    "restricted": "#b3b5b2",
+    "restricted": "#b9bbb6",
     "curb": "#c9c6bf",
-    "shoulder": "#b4b9bf",
+    "shoulder": "#bec3c8",
     "sidewalk": "#e0d8c8",
     "parking": "#a9b4c4",
     "bicycle": "#c98f7a",
     "bus": "#a7939c",
-    "road": "#9aa1aa",
+    "road": "#939ba5",
 }
 """Fill per kind of area, in the order they are painted."""
 

@@ -39,7 +39,7 @@ _SHEET = 1200.0
 """Width of the sheet; all sizes below are in these units."""
 _MARGIN, _HEAD, _ROW = 36.0, 74.0, 24.0
 _TALLEST = 1350.0
-_SYMBOL = 21.0
+_SYMBOL = 18.0
 _CHAR = 0.56
 """Width of a letter over its font size, on average."""
 

@@ -31,6 +31,9 @@ TOLERANCE = 0.03
 _STEP_STRAIGHT, _STEP_CURVED, _STEP_JUNCTION = 2.0, 1.0, 0.5
 """Metres between stations before thinning; junctions have the tightest turns."""
 
+_SHORTEST = 0.05
+"""Metres below which a plan-view geometry is an editor's leftover."""
+
 _CLEARANCE = 3.0
 """Metres of height between two lanes in the same place that make one of them a bridge."""
 
@@ -134,7 +137,8 @@ def _sections(odr: OpenDrive, table: RoadTable) -> _Sections:
     road, s0, s1, step, fast, breaks, models, sizes = [], [], [], [], [], [], [], []
     for name, item in odr.roads.items():
         pace = _step(item)
-        kinks = [geometry.s for geometry in item.geometry]
+        # Editors leave geometries of millimetres with any heading at all: no place to draw from.
+        kinks = [geometry.s for geometry in item.geometry if geometry.length > _SHORTEST]
         for section in item.sections:
             n = sum(1 for lane in section.lanes if lane != 0)
             if n == 0:
@@ -180,7 +184,12 @@ def _stations(sections: _Sections, table: RoadTable) -> _Stations:
     s, section = s[order], section[order]
     fresh = np.ones(len(s), dtype=np.bool_)
     fresh[1:] = (np.diff(s) > 1e-6) | (np.diff(section) != 0)
+    # Both ends stay, however short the section: a line needs two points.
+    fresh[:-1] |= np.diff(section) != 0
+    fresh[-1:] = True
     s, section = s[fresh], section[fresh]
+    # Some maps start a width record at the very end of the section; it belongs to nothing.
+    s = np.minimum(s, sections.s1[section] - 1e-6)
     at = table.reference(sections.road[section], s)
     level = np.cos(at.roll)
     return _Stations(

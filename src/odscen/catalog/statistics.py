@@ -116,7 +116,7 @@ def _lanes(table: RoadTable, rows: NDArray[np.int64]) -> tuple[float, Bounds]:
     n = np.maximum(np.ceil(s1 - s0), 1.0).astype(np.int64) + 1
     lane = np.repeat(np.arange(len(rows)), n)
     share = ranges(np.zeros(len(n), dtype=np.int64), n) / (n - 1)[lane]
-    s = s0[lane] * (1.0 - share) + s1[lane] * share
+    s = np.minimum(s0[lane] * (1.0 - share) + s1[lane] * share, s1[lane] - 1e-6)
     centre = table.lane_points(rows[lane], s)
     steps = np.sqrt(np.diff(centre.x) ** 2 + np.diff(centre.y) ** 2 + np.diff(centre.z) ** 2)
     length = float(steps[np.diff(lane) == 0].sum())
