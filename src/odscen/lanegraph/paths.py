@@ -102,8 +102,9 @@ class _PathFinder:
 
     def _reached_with_degree(self, spawn: int, degree: int) -> IntArray:
         finite = np.isfinite(self._from(spawn)[0])
-        found: IntArray = self.nodes[finite & (self.out_degree <= degree)].astype(np.int32)
-        return found[found != spawn]
+        found = self.nodes[finite & (self.out_degree <= degree)]
+        others: IntArray = found[found != spawn].astype(np.int32)
+        return others
 
 
 class Router(_PathFinder):

@@ -1,0 +1,153 @@
+"""Edges of the lane graph: successor, left and right (requirement R21)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.lanegraph.model import (
+    CHANGE_LEFT,
+    CHANGE_RIGHT,
+    BoolArray,
+    ByteArray,
+    FloatArray,
+    IntArray,
+    Relation,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.ids import LaneKey
+    from odscen.lanegraph.nodes import NodeTable
+
+
+class Edges(NamedTuple):
+    """Edges, each array of shape ``(E,)``, sorted by (source, relation, target)."""
+
+    source: IntArray
+    target: IntArray
+    relation: ByteArray
+    length: FloatArray
+
+
+def connect(
+    nodes: NodeTable, keys: Sequence[LaneKey], successors: Mapping[LaneKey, Sequence[LaneKey]]
+) -> Edges:
+    """Make all edges of a map.
+
+    Parameters
+    ----------
+    nodes
+        The nodes.
+    keys
+        Name of each lane of ``nodes``.
+    successors
+        Lanes that follow each lane in driving direction, of all types.
+    """
+    number = {key: lane for lane, key in enumerate(keys)}
+    follow = [
+        [number[after] for after in successors.get(key, ()) if after in number] for key in keys
+    ]
+    parts = [
+        _along_lanes(nodes),
+        _across_joints(nodes, follow),
+        _to_the_side(nodes, follow, Relation.LEFT),
+        _to_the_side(nodes, follow, Relation.RIGHT),
+    ]
+    source, target, relation, length = (
+        np.concatenate(columns) for columns in zip(*parts, strict=True)
+    )
+    order = np.lexsort((length, target, relation, source))
+    source, target, relation, length = (
+        column[order] for column in (source, target, relation, length)
+    )
+    keep = source != target  # a ring so short that it has one node
+    keep[1:] &= (
+        (source[1:] != source[:-1]) | (target[1:] != target[:-1]) | (relation[1:] != relation[:-1])
+    )
+    return Edges(
+        source[keep].astype(np.int32),
+        target[keep].astype(np.int32),
+        relation[keep].astype(np.uint8),
+        length[keep],
+    )
+
+
+def _along_lanes(nodes: NodeTable) -> Edges:
+    """From each node to the next one of its lane."""
+    source = np.flatnonzero(nodes.lane[:-1] == nodes.lane[1:])
+    length = nodes.offset[source + 1] - nodes.offset[source]
+    return _edges(source, source + 1, Relation.SUCCESSOR, length)
+
+
+def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
+    """From the last node of each lane to the first of each lane that follows it."""
+    lengths = nodes.lines.lengths.tolist()
+    first = nodes.first.tolist()
+    empty = [begin == end for begin, end in zip(first[:-1], first[1:], strict=True)]
+    pairs = [
+        (lane, after, between)
+        for lane in range(len(lengths))
+        if not empty[lane]
+        for after, between in _following(lane, follow, lengths, empty)
+    ]
+    table = np.array(pairs, dtype=np.float64).reshape(-1, 3)
+    lane, after = table[:, 0].astype(np.int32), table[:, 1].astype(np.int32)
+    source, target = nodes.first[lane + 1] - 1, nodes.first[after]
+    rest = nodes.lines.lengths[lane] - nodes.offset[source]
+    length = rest + table[:, 2] + nodes.offset[target]
+    return _edges(source, target, Relation.SUCCESSOR, length)
+
+
+def _following(
+    lane: int, follow: list[list[int]], lengths: list[float], empty: list[bool]
+) -> Iterator[tuple[int, float]]:
+    """Lanes with nodes that follow ``lane``, and the metres of lanes without nodes in between."""
+    todo = [(after, 0.0) for after in follow[lane]]
+    seen = {lane}
+    while todo:
+        after, between = todo.pop()
+        if not empty[after]:
+            yield after, between
+        elif after not in seen:
+            seen.add(after)
+            todo += [(further, between + lengths[after]) for further in follow[after]]
+
+
+def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) -> Edges:
+    """From each node to the adjacent lane's node about one spacing ahead, where that is permitted.
+
+    Near the end of the lane section that node may lie in the one lane that follows the adjacent
+    one; if several lanes follow it, or none, there is no edge.
+    """
+    bit, beside = (
+        (CHANGE_LEFT, nodes.left) if relation is Relation.LEFT else (CHANGE_RIGHT, nodes.right)
+    )
+    source = np.flatnonzero(nodes.lane_change & bit)
+    lane = beside[source]
+    lines = nodes.lines
+    planned = np.diff(nodes.planned)
+    gap = np.maximum(lines.lengths / planned, 1e-6)
+    ahead = lines.offset_at(lane, nodes.s[source]) + gap[lane]
+    beyond = ahead - lines.lengths[lane]
+    k = np.rint(ahead / gap[lane] - 0.5).astype(np.int32)
+    over = k >= planned[lane]
+    only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int32)
+    goal = np.where(over, only[lane], lane)
+    k_over = np.rint(np.maximum(beyond, 0.0) / gap[goal] - 0.5).astype(np.int32)
+    k = np.clip(np.where(over, k_over, k), 0, planned[goal] - 1)
+    target = nodes.kept[nodes.planned[goal] + k]
+    found: BoolArray = (goal >= 0) & (target >= 0)
+    source, target = source[found], target[found]
+    gone = (
+        nodes.x[target] - nodes.x[source],
+        nodes.y[target] - nodes.y[source],
+        nodes.z[target] - nodes.z[source],
+    )
+    return _edges(source, target, relation, np.sqrt(sum(part**2 for part in gone)))
+
+
+def _edges(source: IntArray, target: IntArray, relation: Relation, length: FloatArray) -> Edges:
+    return Edges(source, target, np.full(len(source), relation, dtype=np.uint8), length)

@@ -1,0 +1,325 @@
+"""Segments: the pieces of a map that a region of interest is made of (requirements R25 to R27).
+
+Each junction with roads of its own is one segment. Roads that follow each other without a junction
+between them are joined to a chain, and each chain is divided into equal pieces of about
+:data:`TARGET_LENGTH`. A junction that owns no roads (direct, or a virtual one without connecting
+roads) has nothing that could be placed in it: the chains that meet there are neighbours directly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.ids import JunctionId, RoadId, SegmentId
+from odscen.lanegraph.model import FloatArray, IntArray, SegmentPart, Segments
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from odscen.opendrive.model import ContactPoint, OpenDrive, Road, RoadLink
+
+TARGET_LENGTH = 100.0
+"""Metres; a chain of length L has ``max(1, round(L / TARGET_LENGTH))`` pieces."""
+
+MIN_PART = 1e-3
+"""Metres; a shorter stretch of a road is not listed as a part of a segment."""
+
+
+class _End(NamedTuple):
+    """One end of a road."""
+
+    road: RoadId
+    side: ContactPoint
+
+
+class _Step(NamedTuple):
+    """A road in a chain; ``forward`` if the chain runs with growing s."""
+
+    road: RoadId
+    forward: bool
+
+
+class _Place(NamedTuple):
+    """Which segments a road lies in: row ``base + floor((start + sign * s) / piece)``."""
+
+    base: int
+    start: float
+    sign: float
+    piece: float
+    last: int
+
+    def row(self, s: float) -> int:
+        return self.base + min(max(int((self.start + self.sign * s) // self.piece), 0), self.last)
+
+
+@dataclass(frozen=True, slots=True)
+class _Chain:
+    steps: tuple[_Step, ...]
+    closed: bool
+    length: float
+    pieces: int
+
+    @property
+    def piece_length(self) -> float:
+        return self.length / self.pieces
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentMap:
+    """The segments, and which of them each place of a road belongs to.
+
+    The arrays have one row per road, in the order of the file: place s of that road lies in segment
+    ``base + clip(floor((start + sign * s) / piece), 0, last)``.
+    """
+
+    segments: Segments
+    base: IntArray
+    start: FloatArray
+    sign: FloatArray
+    piece: FloatArray
+    last: IntArray
+
+    def at(self, road: IntArray, s: FloatArray) -> IntArray:
+        """Rows of the segments at road coordinates s of the roads in rows ``road``."""
+        position = (self.start[road] + self.sign[road] * s) / self.piece[road]
+        piece = np.clip(np.floor(position), 0, self.last[road]).astype(np.int32)
+        rows: IntArray = self.base[road] + piece
+        return rows
+
+
+def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> SegmentMap:
+    """Divide a map into segments.
+
+    Parameters
+    ----------
+    odr
+        The road model.
+    target_length
+        Metres; see :data:`TARGET_LENGTH`.
+    """
+    owned = _roads_of_junctions(odr)
+    chains = _chains(odr, target_length)
+    rows = _Rows([], [], [], {}, {})
+    for chain in chains:
+        rows.add_chain(chain, odr)
+    for junction, roads in owned.items():
+        rows.add_junction(junction, roads)
+    pairs = {*_inside_chains(chains, rows.places), *_across_links(odr, rows)}
+    adjacency = sorted({(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]})
+    segments = Segments(
+        ids=_distinct(rows.ids),
+        kinds=tuple("junction" if name.startswith("j") else "road" for name in rows.ids),
+        parts=tuple(rows.parts),
+        lengths=np.array(rows.lengths, dtype=np.float64),
+        adjacency=np.array(adjacency, dtype=np.int32).reshape(-1, 2),
+    )
+    table = [rows.places[road] for road in odr.roads]
+    return SegmentMap(
+        segments=segments,
+        base=np.array([place.base for place in table], dtype=np.int32),
+        start=np.array([place.start for place in table], dtype=np.float64),
+        sign=np.array([place.sign for place in table], dtype=np.float64),
+        piece=np.array([place.piece for place in table], dtype=np.float64),
+        last=np.array([place.last for place in table], dtype=np.int32),
+    )
+
+
+@dataclass(slots=True)
+class _Rows:
+    """The segments while they are listed."""
+
+    ids: list[str]
+    parts: list[tuple[SegmentPart, ...]]
+    lengths: list[float]
+    places: dict[RoadId, _Place]
+    junctions: dict[JunctionId, int]
+
+    def add_chain(self, chain: _Chain, odr: OpenDrive) -> None:
+        self.places.update(_places(chain, odr, base=len(self.ids)))
+        name = f"r{chain.steps[0].road}"
+        self.ids += [name] if chain.pieces == 1 else [f"{name}-{k}" for k in range(chain.pieces)]
+        self.parts += _parts(chain, odr)
+        self.lengths += [chain.piece_length] * chain.pieces
+
+    def add_junction(self, junction: JunctionId, roads: list[Road]) -> None:
+        row = len(self.ids)
+        self.junctions[junction] = row
+        self.places.update({road.id: _Place(row, 0.0, 1.0, 1.0, 0) for road in roads})
+        self.ids.append(f"j{junction}")
+        self.parts.append(tuple(SegmentPart(road.id, 0.0, road.length) for road in roads))
+        self.lengths.append(sum(road.length for road in roads))
+
+
+def _distinct(ids: list[str]) -> tuple[SegmentId, ...]:
+    """Mark an id that occurs again (roads ``1`` and ``1-0``) with underscores."""
+    seen: dict[str, None] = {}
+    for name in ids:
+        fresh = name
+        while fresh in seen:
+            fresh += "_"
+        seen[fresh] = None
+    return tuple(map(SegmentId, seen))
+
+
+def _roads_of_junctions(odr: OpenDrive) -> dict[JunctionId, list[Road]]:
+    """Group connecting roads by junction; junctions named only by a road come last."""
+    owned: dict[JunctionId, list[Road]] = {junction: [] for junction in odr.junctions}
+    for road in odr.roads.values():
+        if road.junction is not None:
+            owned.setdefault(road.junction, []).append(road)
+    return {junction: roads for junction, roads in owned.items() if roads}
+
+
+def _link(road: Road, side: ContactPoint) -> RoadLink | None:
+    return road.predecessor if side == "start" else road.successor
+
+
+def _opposite(end: _End) -> _End:
+    return _End(end.road, "end" if end.side == "start" else "start")
+
+
+def _joints(odr: OpenDrive) -> dict[_End, _End]:
+    """Find the ends of ordinary roads that name each other: each with the one that it meets."""
+    named: dict[_End, _End] = {}
+    for road in odr.roads.values():
+        if road.junction is not None:
+            continue
+        for side in ("start", "end"):
+            link = _link(road, side)
+            if link is None or link.element_type != "road" or link.contact_point is None:
+                continue
+            other = odr.roads.get(RoadId(link.element_id))
+            if other is not None and other.junction is None and link.element_s is None:
+                named[_End(road.id, side)] = _End(other.id, link.contact_point)
+    return {end: other for end, other in named.items() if named.get(other) == end}
+
+
+def _chains(odr: OpenDrive, target_length: float) -> list[_Chain]:
+    """Maximal chains of ordinary roads: open ones first, then rings, each in file order."""
+    joints = _joints(odr)
+    ordinary = [road.id for road in odr.roads.values() if road.junction is None]
+    seen: set[RoadId] = set()
+    chains: list[_Chain] = []
+    for rings in (False, True):
+        for road in ordinary:
+            starts = [_End(road, "start"), _End(road, "end")]
+            start = next((end for end in starts if rings or end not in joints), None)
+            if road in seen or start is None:
+                continue
+            steps = _walk(start, joints)
+            seen.update(step.road for step in steps)
+            length = sum(odr.roads[step.road].length for step in steps)
+            pieces = max(1, round(length / target_length))
+            chains.append(_Chain(tuple(steps), rings, max(length, MIN_PART), pieces))
+    return chains
+
+
+def _walk(start: _End, joints: Mapping[_End, _End]) -> list[_Step]:
+    """Roads met when one enters at ``start`` and goes on to the end or once round the ring."""
+    steps: list[_Step] = []
+    seen: set[RoadId] = set()
+    entry: _End | None = start
+    while entry is not None and entry.road not in seen:
+        steps.append(_Step(entry.road, entry.side == "start"))
+        seen.add(entry.road)
+        entry = joints.get(_opposite(entry))
+    return steps
+
+
+def _places(chain: _Chain, odr: OpenDrive, *, base: int) -> Iterator[tuple[RoadId, _Place]]:
+    done = 0.0
+    for step in chain.steps:
+        length = odr.roads[step.road].length
+        start, sign = (done, 1.0) if step.forward else (done + length, -1.0)
+        yield step.road, _Place(base, start, sign, chain.piece_length, chain.pieces - 1)
+        done += length
+
+
+def _parts(chain: _Chain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
+    """List the stretches of roads in each piece of the chain."""
+    pieces: list[list[SegmentPart]] = [[] for _ in range(chain.pieces)]
+    done = 0.0
+    for step in chain.steps:
+        length = odr.roads[step.road].length
+        first = min(int(done // chain.piece_length), chain.pieces - 1)
+        last = min(int((done + length) // chain.piece_length), chain.pieces - 1)
+        for piece in range(first, last + 1):
+            low = max(0.0, piece * chain.piece_length - done)
+            high = min(length, (piece + 1) * chain.piece_length - done)
+            if high - low < MIN_PART and pieces[piece]:
+                continue
+            s_from, s_to = (low, high) if step.forward else (length - high, length - low)
+            pieces[piece].append(SegmentPart(step.road, s_from, s_to))
+        done += length
+    return [tuple(parts) for parts in pieces]
+
+
+def _inside_chains(
+    chains: list[_Chain], places: Mapping[RoadId, _Place]
+) -> Iterator[tuple[int, int]]:
+    for chain in chains:
+        base = places[chain.steps[0].road].base
+        for piece in range(chain.pieces - 1):
+            yield base + piece, base + piece + 1
+        if chain.closed:
+            yield base, base + chain.pieces - 1
+
+
+def _across_links(odr: OpenDrive, rows: _Rows) -> Iterator[tuple[int, int]]:
+    """Pairs of segments that meet at the end of a road, as its link or a junction says."""
+    places = rows.places
+    for road in odr.roads.values():
+        for side in ("start", "end"):
+            link = _link(road, side)
+            here = places[road.id].row(0.0 if side == "start" else road.length)
+            if link is None:
+                continue
+            if link.element_type == "junction":
+                there = rows.junctions.get(JunctionId(link.element_id))
+            else:
+                there = _row_at_link(odr, link, places)
+            if there is not None:
+                yield here, there
+    yield from _across_connections(odr, places)
+
+
+def _across_connections(
+    odr: OpenDrive, places: Mapping[RoadId, _Place]
+) -> Iterator[tuple[int, int]]:
+    """Pairs of segments that a junction's connections name."""
+    for junction in odr.junctions.values():
+        for connection in junction.connections:
+            incoming = odr.roads.get(connection.incoming_road)
+            connecting = odr.roads.get(connection.connecting_road)
+            if incoming is None or connecting is None:
+                continue
+            there = places[connecting.id].row(
+                0.0 if connection.contact_point == "start" else connecting.length
+            )
+            for s in _places_at_junction(incoming, junction.id):
+                yield places[incoming.id].row(s), there
+
+
+def _row_at_link(odr: OpenDrive, link: RoadLink, places: Mapping[RoadId, _Place]) -> int | None:
+    other = odr.roads.get(RoadId(link.element_id))
+    if other is None:
+        return None
+    if link.element_s is not None:
+        return places[other.id].row(link.element_s)
+    return places[other.id].row(other.length if link.contact_point == "end" else 0.0)
+
+
+def _places_at_junction(incoming: Road, junction: JunctionId) -> list[float]:
+    """Find the ends (their s) of ``incoming`` that lead into the junction.
+
+    Any place will do for a connecting road: it lies in one segment.
+    """
+    places = [
+        s
+        for s, link in ((0.0, incoming.predecessor), (incoming.length, incoming.successor))
+        if link is not None and link.element_type == "junction" and link.element_id == junction
+    ]
+    return places or ([0.0] if incoming.junction is not None else [])
