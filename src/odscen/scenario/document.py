@@ -7,17 +7,25 @@ Rules that need the graph live in :mod:`odscen.scenario.checks`, not here.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from odscen.categories import Category
 
-FORMAT = "odscen-scenario"
-VERSION = 1
+FORMAT: Final = "odscen-scenario"
+VERSION: Final = 1
+
+_PRINTABLE = r"^[^\x00-\x1f\x7f\u0085\u2028\u2029\ufffe\uffff]*$"
+_PROSE = r"^[^\x00-\x08\x0b-\x1f\x7f\ufffe\uffff]*$"
+_IDENTIFIER = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 DrivingStyle = Literal["cautious", "normal", "sporty"]
-Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Label = Annotated[str, Field(min_length=1, max_length=200, pattern=_PRINTABLE)]
+"""One line of text that JSON and XML can both carry."""
+Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
+Identifier = Annotated[str, Field(pattern=_IDENTIFIER, max_length=64)]
+Seconds = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 
 
@@ -28,9 +36,9 @@ class Part(BaseModel):
 
 
 class MapReference(Part):
-    """The map, by name *and* content."""
+    """The map, by name *and* content, and the spacing of the graph that node names refer to."""
 
-    name: str
+    name: Label
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     spacing: Annotated[float, Field(gt=0, le=100)] = 2.0
 
@@ -38,8 +46,8 @@ class MapReference(Part):
 class Environment(Part):
     """Weather and time of day: a preset of the asset catalogue and single values that differ."""
 
-    preset: str = "ClearNoon"
-    parameters: dict[str, float] = Field(default_factory=dict)
+    preset: Label = "ClearNoon"
+    parameters: dict[Label, float] = Field(default_factory=dict)
     affects_driving: bool = True
 
 
@@ -52,11 +60,11 @@ class Actor(Part):
     positive to the left of the driving direction.
     """
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
+    id: Identifier
     category: Category
-    model: str | None = None
-    spawn: str
-    goal: str | None = None
+    model: Label | None = None
+    spawn: Label
+    goal: Label | None = None
     speed: Speed | None = None
     lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
     depart: Seconds = 0.0
@@ -70,25 +78,26 @@ class Flow(Part):
     """A stream of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
 
     ``mix`` gives the share of each category; shares are relative, they need not sum to one.
-    Pedestrian nodes take pedestrians only, lane nodes the other six.
+    Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
+    actor of the flow draws its own goal from the candidates.
     """
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=64)]
-    spawn: str
-    goal: str | None = None
+    id: Identifier
+    spawn: Label
+    goal: Label | None = None
     per_hour: Annotated[float, Field(gt=0, le=20_000)]
     begin: Seconds = 0.0
     end: Seconds = 3600.0
     mix: dict[Category, Annotated[float, Field(gt=0)]] = Field(
-        default_factory=lambda: {Category.CAR: 1.0}
+        default_factory=lambda: {Category.CAR: 1.0}, min_length=1
     )
     speed: Speed | None = None
 
 
 class Simulation(Part):
-    """How the scenario is run unless the command says otherwise."""
+    """How the scenario is run unless the command says otherwise; seconds."""
 
-    duration: Annotated[float, Field(gt=0)] = 600.0
+    duration: Annotated[float, Field(gt=0, le=1e9)] = 600.0
     step_length: Annotated[float, Field(gt=0, le=1)] = 0.5
 
 
@@ -97,11 +106,11 @@ class Scenario(Part):
 
     format: Literal["odscen-scenario"] = FORMAT
     version: Literal[1] = VERSION
-    name: Annotated[str, Field(min_length=1, max_length=120)]
-    description: str = ""
+    name: Annotated[str, Field(min_length=1, max_length=120, pattern=_PRINTABLE)]
+    description: Prose = ""
     map: MapReference
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
-    roi: tuple[str, ...]
+    roi: tuple[Label, ...]
     environment: Environment = Environment()
     actors: tuple[Actor, ...] = ()
     flows: tuple[Flow, ...] = ()

@@ -1,0 +1,143 @@
+"""Where a body can stand on the lane graph, node by node, and the largest crowd that fits (R47)."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.categories import Body, Category
+from odscen.lanegraph.model import BoolArray, FloatArray, LaneGraph, PedestrianGraph, Relation
+from odscen.scenario.bodies import SIDE_GAP, Crowd, box_at
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+LANE_MARGIN = 0.05
+"""Free width kept between a body and the border of its lane, metres."""
+SAGITTA = 0.05
+"""A rigid body of length L on curvature k sits ``L^2 |k| / 8`` beside the lane centre; no more than
+this many metres are accepted for sampled spawns."""
+
+
+class Fit(NamedTuple):
+    """A maximal crowd: nodes in the order of the graph, and the category that stands on each."""
+
+    nodes: tuple[int, ...]
+    categories: tuple[Category, ...]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+
+def standing_room(graph: LaneGraph, body: Body, *, allowed: BoolArray) -> BoolArray:
+    """Nodes on which a body can be placed so that it lies along its lane.
+
+    Parameters
+    ----------
+    allowed
+        Shape ``(N,)``: nodes that the body's centre, and what is under its length, may use.
+
+    Returns
+    -------
+    Shape ``(N,)``: the lane is wide enough, it goes on for half a length either way, all nodes
+    under the body are ``allowed``, and none of them bends more than :data:`SAGITTA` permits.
+    """
+    bends = body.length**2 * np.abs(graph.curvature) / 8 > SAGITTA
+    good = allowed & ~bends
+    follows = graph.relation == Relation.SUCCESSOR
+    source, target = graph.source[follows], graph.target[follows]
+    ahead, behind = good.copy(), good.copy()
+    for _ in range(ceil(body.length / 2 / graph.spacing)):
+        ahead &= _step(ahead, source, target)
+        behind &= _step(behind, target, source)
+    return ahead & behind & (graph.width >= body.width + 2 * LANE_MARGIN)
+
+
+def max_fit(
+    graph: LaneGraph | PedestrianGraph,
+    bodies: Mapping[Category, Body],
+    allowed: Mapping[Category, BoolArray],
+    *,
+    shares: Mapping[Category, float],
+    minimum_gap: float,
+) -> Fit:
+    """Place as many bodies as fit: lane after lane, from its start, at the first node that is free.
+
+    The result is maximal (nothing can be added), depends on nothing but its arguments, and keeps
+    the ``shares`` as closely as the places allow: each next body is of the category that is
+    furthest behind its share among those that may stand there.
+
+    Parameters
+    ----------
+    bodies, allowed
+        Size, and mask of nodes (shape ``(N,)``), of each category.
+    shares
+        Relative share of each category; those with share 0 are left out.
+    minimum_gap
+        Free length between two bodies, metres.
+    """
+    categories = [category for category, share in shares.items() if share > 0]
+    quota = {c: shares[c] / sum(shares[d] for d in categories) for c in categories}
+    core = Body(*(min(bodies[c][i] for c in categories) for i in range(3)))
+    crowd = crowd_for(bodies, minimum_gap=minimum_gap)
+    placed: dict[Category, int] = dict.fromkeys(categories, 0)
+    fit: list[tuple[int, Category]] = []
+    for node in np.flatnonzero(np.any([allowed[c] for c in categories], axis=0)).tolist():
+        place = box_at(graph, node, core, gap=minimum_gap)
+        if not crowd.is_free(place):  # then no larger body fits either
+            continue
+        wanted = len(fit) + 1
+        for category in sorted(categories, key=lambda c: placed[c] - wanted * quota[c]):
+            box = box_at(graph, node, bodies[category], gap=minimum_gap)
+            if allowed[category][node] and crowd.is_free(box):
+                crowd.add(node, box)
+                placed[category] += 1
+                fit.append((node, category))
+                break
+    return Fit(tuple(node for node, _ in fit), tuple(category for _, category in fit))
+
+
+def crowd_for(bodies: Mapping[Category, Body], *, minimum_gap: float) -> Crowd:
+    """Return an empty crowd that boxes of these bodies, grown by the gap, can be added to."""
+    largest = max(
+        np.hypot(body.length + minimum_gap, body.width + SIDE_GAP) for body in bodies.values()
+    )
+    return Crowd(float(largest))
+
+
+def distance_to_end(
+    ends: Sequence[int], graph: LaneGraph | PedestrianGraph, mask: BoolArray
+) -> FloatArray:
+    """Metres from each node to the nearest of ``ends``, inside ``mask``; infinite without.
+
+    For the lane graph the way follows the edges' direction.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    count = len(graph.x)
+    if not len(ends):
+        return np.full(count, np.inf)
+    inside = mask[graph.source] & mask[graph.target]
+    backward = (graph.target[inside], graph.source[inside])
+    weights = np.maximum(graph.length[inside], 1e-6)
+    order = np.lexsort((weights, *backward))
+    keys = np.stack(backward, axis=1)[order]
+    first = np.ones(len(keys), dtype=bool)
+    first[1:] = np.any(keys[1:] != keys[:-1], axis=1)
+    matrix = csr_array(
+        (weights[order][first], (keys[first, 0], keys[first, 1])), shape=(count, count)
+    )
+    directed = isinstance(graph, LaneGraph)
+    found = dijkstra(matrix, directed=directed, indices=list(ends), min_only=True)
+    return np.asarray(found, dtype=np.float64)
+
+
+def _step(good: BoolArray, source: np.ndarray, target: np.ndarray) -> BoolArray:
+    """Nodes with at least one edge out, all of whose edges lead to good nodes."""
+    some = np.zeros(len(good), dtype=bool)
+    some[source] = True
+    some[source[~good[target]]] = False
+    return some

@@ -1,0 +1,119 @@
+"""A region of interest on its map graph: what is inside, and what the names in a document mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.categories import Category
+from odscen.errors import NotFoundError
+from odscen.ids import NodeId, SegmentId
+from odscen.lanegraph.paths import Router, WalkRouter
+from odscen.lanegraph.query import (
+    induced,
+    is_walk_node_id,
+    node_id,
+    node_index,
+    walk_node_id,
+    walk_node_index,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from odscen.lanegraph.model import BoolArray, IntArray, LaneGraph, MapGraph, PedestrianGraph
+
+
+class Place(NamedTuple):
+    """A node by its index; ``walk`` tells the pedestrian graph from the lane graph."""
+
+    walk: bool
+    node: int
+
+
+@dataclass(frozen=True)
+class Region:
+    """The segments of a scenario that the map has, and their nodes.
+
+    Attributes
+    ----------
+    graph
+        The whole map.
+    segments
+        Ids of the segments inside; unknown ones have been left out.
+    lanes, walks
+        Masks over the nodes of the lane graph and of the pedestrian graph.
+    """
+
+    graph: MapGraph
+    segments: tuple[SegmentId, ...]
+    lanes: BoolArray
+    walks: BoolArray
+
+    @classmethod
+    def of(cls, graph: MapGraph, segments: Iterable[str]) -> Region:
+        """Make the region of these segments; names that the map does not have are left out."""
+        known = set(graph.segments.ids)
+        inside = tuple(SegmentId(name) for name in dict.fromkeys(segments) if name in known)
+        roi = induced(graph, inside)
+        return cls(graph, inside, roi.nodes, roi.walk_nodes)
+
+    @cached_property
+    def router(self) -> Router:
+        """Ways on the lane graph inside the region."""
+        return Router(self.graph, self.lanes)
+
+    @cached_property
+    def walk_router(self) -> WalkRouter:
+        """Ways on the pedestrian graph inside the region."""
+        return WalkRouter(self.graph, self.walks)
+
+    def place(self, node: str) -> Place | None:
+        """Where a node id leads on the map, inside the region or not; ``None`` if nowhere."""
+        return place_of(self.graph, node)
+
+    def holds(self, place: Place) -> bool:
+        """Whether a place is inside the region."""
+        return bool((self.walks if place.walk else self.lanes)[place.node])
+
+    def nodes_of(self, place: Place) -> LaneGraph | PedestrianGraph:
+        """Return the graph that a place is on."""
+        return self.graph.walks if place.walk else self.graph.lanes
+
+    def candidates(self, spawn: Place) -> IntArray:
+        """Goal candidates of a spawn (R38), as indices of nodes of the same graph."""
+        if spawn.walk:
+            return self.walk_router.goal_candidates(spawn.node)
+        return self.router.goal_candidates(spawn.node)
+
+    def reaches(self, spawn: Place, goal: Place) -> bool:
+        """Whether a way inside the region leads from ``spawn`` to ``goal``."""
+        if spawn.walk != goal.walk:
+            return False
+        router = self.walk_router if spawn.walk else self.router
+        return bool(router.reachable(spawn.node)[goal.node])
+
+    def segment_of(self, place: Place) -> SegmentId:
+        """Return the segment that a place lies in."""
+        return self.graph.segments.ids[int(self.nodes_of(place).segment[place.node])]
+
+
+def place_of(graph: MapGraph, node: str) -> Place | None:
+    """Where a node id leads; ``None`` if the map has no such node."""
+    walk = is_walk_node_id(node)
+    try:
+        row = (walk_node_index if walk else node_index)(graph, node)
+    except NotFoundError:
+        return None
+    return Place(walk, row)
+
+
+def on_foot(category: Category) -> bool:
+    """Whether a category belongs on the pedestrian graph."""
+    return category is Category.PEDESTRIAN
+
+
+def name_of(graph: MapGraph, place: Place) -> NodeId:
+    """Id of a node; the inverse of :func:`place_of`."""
+    return (walk_node_id if place.walk else node_id)(graph, place.node)
