@@ -1,0 +1,256 @@
+"""The plan view evaluated (section 9): line, arc, spiral, poly3, paramPoly3, all roads at once.
+
+s is the arc length of the reference line in the x/y plane. Lines and arcs share one closed form,
+spirals are Fresnel integrals; the cubics are run through by arc length, which is found from their
+parameter by quadrature and inverted by Newton's method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import fresnel
+
+from odscen.opendrive.model import Geometry, GeometryKind
+from odscen.opendrive.profiles import FloatArray, IntArray, locate, offsets
+
+_BEND, _SPIRAL, _CUBIC = 0, 1, 2
+_KINDS = {
+    GeometryKind.LINE: _BEND,
+    GeometryKind.ARC: _BEND,
+    GeometryKind.SPIRAL: _SPIRAL,
+    GeometryKind.POLY3: _CUBIC,
+    GeometryKind.PARAM_POLY3: _CUBIC,
+}
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
+_PIECES = 32
+_PIECE_NODES, _PIECE_WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+class PlanPoints(NamedTuple):
+    """Points of reference lines; ``curvature`` and its change by s in 1/m and 1/m^2."""
+
+    x: FloatArray
+    y: FloatArray
+    hdg: FloatArray
+    curvature: FloatArray
+    change: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanView:
+    """Flattened geometries of all roads; rows ``first[i]`` to ``first[i + 1]`` are of road ``i``.
+
+    ``cubic`` names the row of :class:`CubicCurves` of a poly3 or paramPoly3, -1 for the others.
+    """
+
+    first: IntArray
+    s: FloatArray
+    x: FloatArray
+    y: FloatArray
+    hdg: FloatArray
+    length: FloatArray
+    kind: IntArray
+    curvature: FloatArray
+    change: FloatArray
+    cubic: IntArray
+    curves: CubicCurves
+
+    @classmethod
+    def of(cls, roads: Sequence[tuple[Geometry, ...]]) -> PlanView:
+        """Table of one tuple of geometries per road."""
+        flat = [geometry for road in roads for geometry in road]
+        rows = np.array([g[:5] for g in flat], dtype=np.float64).reshape(-1, 5)
+        kind = np.fromiter((_KINDS[g.kind] for g in flat), np.int64, len(flat))
+        bends = np.array([_bend(g) for g in flat], dtype=np.float64).reshape(-1, 2)
+        is_cubic = kind == _CUBIC
+        cubics = [g for g in flat if _KINDS[g.kind] == _CUBIC]
+        return cls(
+            first=offsets(map(len, roads)),
+            s=rows[:, 0].copy(),
+            x=rows[:, 1].copy(),
+            y=rows[:, 2].copy(),
+            hdg=rows[:, 3].copy(),
+            length=rows[:, 4].copy(),
+            kind=kind,
+            curvature=bends[:, 0].copy(),
+            change=bends[:, 1].copy(),
+            cubic=np.where(is_cubic, np.cumsum(is_cubic) - 1, -1),
+            curves=CubicCurves.of(cubics),
+        )
+
+    def at(self, road: IntArray, s: FloatArray) -> PlanPoints:
+        """Points at ``s`` of each road; beyond its ends a road goes on as its last shape does."""
+        row = locate(self.s, self.first, road, s)
+        return self.at_rows(row, s - self.s[row])
+
+    def at_rows(self, row: IntArray, ds: FloatArray) -> PlanPoints:
+        """Points ``ds`` metres behind the start of each geometry."""
+        hdg = self.hdg[row]
+        curvature = self.curvature[row]
+        change = self.change[row]
+        # The chord of an arc: ds sinc(curvature ds / 2), turned by half its angle. Lines are arcs
+        # of curvature 0.
+        half = 0.5 * curvature * ds
+        chord = ds * np.sinc(half / np.pi)
+        u = chord * np.cos(half)
+        v = chord * np.sin(half)
+        turn = ds * (curvature + 0.5 * change * ds)
+        bend = curvature + change * ds
+        kind = self.kind[row]
+        if (kind != _BEND).any():
+            at = np.flatnonzero(kind == _SPIRAL)
+            u[at], v[at] = _spiral(curvature[at], change[at], ds[at])
+            at = np.flatnonzero(kind == _CUBIC)
+            if at.size:
+                change = change.copy()
+                u[at], v[at], turn[at], bend[at], change[at] = self.curves.at(
+                    self.cubic[row[at]], ds[at]
+                )
+        cos, sin = np.cos(hdg), np.sin(hdg)
+        x = self.x[row] + u * cos - v * sin
+        y = self.y[row] + u * sin + v * cos
+        return PlanPoints(x, y, hdg + turn, bend, change)
+
+
+def _bend(geometry: Geometry) -> tuple[float, float]:
+    """Curvature at the start and its change by s."""
+    if geometry.kind is GeometryKind.ARC:
+        return geometry.params[0], 0.0
+    if geometry.kind is GeometryKind.SPIRAL:
+        start, end = geometry.params
+        return start, (end - start) / geometry.length
+    return 0.0, 0.0
+
+
+def _spiral(
+    curvature: FloatArray, change: FloatArray, ds: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    r"""End of a spiral that starts at the origin along u.
+
+    .. math:: u + i v = \int_0^{ds} e^{i (\kappa \tau + \sigma \tau^2 / 2)} d\tau
+
+    With sigma > 0 the square is completed: the integral is a difference of Fresnel integrals at
+    :math:`(\kappa + \sigma \tau) / \sqrt{\pi \sigma}`, turned by
+    :math:`-\kappa^2 / (2 \sigma)`; sigma < 0 is its mirror image. Where these arguments are large
+    (the curvature hardly changes) the difference loses digits; Gauss-Legendre quadrature of the
+    integral itself is then exact to rounding, as the whole turns by less than 100 rad.
+    """
+    scale = np.sqrt(np.pi * np.abs(change))
+    ends = np.maximum(np.abs(curvature), np.abs(curvature + change * ds))
+    closed = (scale > 0.0) & (ends < 30.0 * scale)
+    point = np.empty(ds.shape, dtype=np.complex128)
+    at = np.flatnonzero(closed)
+    if at.size:
+        sign = np.sign(change[at])
+        k, sigma, root = sign * curvature[at], np.abs(change[at]), scale[at]
+        sin0, cos0 = fresnel(k / root)
+        sin1, cos1 = fresnel((k + sigma * ds[at]) / root)
+        moved = (cos1 - cos0) + 1j * (sin1 - sin0)
+        moved *= np.exp(-0.5j * k * k / sigma) * (np.pi / root)
+        point[at] = moved.real + 1j * sign * moved.imag
+    at = np.flatnonzero(~closed)
+    if at.size:
+        tau = 0.5 * ds[at, None] * (_NODES + 1.0)
+        phase = tau * (curvature[at, None] + 0.5 * change[at, None] * tau)
+        point[at] = 0.5 * ds[at] * (np.exp(1j * phase) @ _WEIGHTS)
+    return point.real, point.imag
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CubicCurves:
+    """poly3 and paramPoly3 as ``u(p), v(p)``, with arc length by p tabulated piece by piece.
+
+    ``coefficients`` has shape ``(M, 2, 4)`` (u and v), ``p_end`` ``(M,)``, ``lengths``
+    ``(M, pieces + 1)``: arc length from the start to each p of an even division of [0, p_end].
+    ``stretch`` is arc length per metre of s: a paramPoly3 is run through in exactly its ``length``,
+    which differs from its arc length by the rounding of the file.
+    """
+
+    coefficients: FloatArray
+    p_end: FloatArray
+    lengths: FloatArray
+    stretch: FloatArray
+
+    @classmethod
+    def of(cls, geometries: Sequence[Geometry]) -> CubicCurves:
+        """Table of poly3 and paramPoly3 geometries."""
+        is_param = np.array([len(g.params) == 8 for g in geometries], dtype=bool)  # noqa: PLR2004
+        # poly3: v(u) = a + b u + c u^2 + d u^3, that is u = p.
+        rows = [g.params if len(g.params) == 8 else (0, 1, 0, 0, *g.params) for g in geometries]  # noqa: PLR2004
+        coefficients = np.array(rows, dtype=np.float64).reshape(-1, 2, 4)
+        # A poly3 with v(u) bent covers less than its length in u, never more.
+        p_end = np.array([g.length for g in geometries], dtype=np.float64)
+        curves = cls(coefficients, p_end, np.zeros((len(rows), _PIECES + 1)), np.ones(len(rows)))
+        if not geometries:
+            return curves
+        width = p_end[:, None, None] / _PIECES
+        p = width * (np.arange(_PIECES)[None, :, None] + 0.5 * (_PIECE_NODES + 1.0))
+        speed = np.hypot(*_derivatives(coefficients.transpose(1, 2, 0)[..., None, None], p)[1])
+        pieces = 0.5 * width[:, :, 0] * (speed @ _PIECE_WEIGHTS)
+        lengths = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(pieces, axis=1)], axis=1)
+        stretch = np.where(is_param, lengths[:, -1] / p_end, 1.0)
+        return cls(coefficients, p_end, lengths, stretch)
+
+    def parameter(self, row: IntArray, ds: FloatArray) -> FloatArray:
+        """p at ``ds`` metres of s: the inverse of the arc length by p."""
+        wanted = ds * self.stretch[row]
+        table = self.lengths[row]
+        piece = np.clip((table <= wanted[:, None]).sum(axis=1) - 1, 0, _PIECES - 1)
+        width = self.p_end[row] / _PIECES
+        start = piece * width
+        before = np.take_along_axis(table, piece[:, None], axis=1)[:, 0]
+        after = np.take_along_axis(table, piece[:, None] + 1, axis=1)[:, 0]
+        span = np.where(after > before, after - before, 1.0)
+        p = start + (wanted - before) / span * width
+        coefficients = self.coefficients[row].transpose(1, 2, 0)
+        for _ in range(4):  # Newton: the derivative of arc length by p is the speed
+            half = 0.5 * (p - start)
+            nodes = start[:, None] + half[:, None] * (_PIECE_NODES + 1.0)
+            speed = np.hypot(*_derivatives(coefficients[..., None], nodes)[1])
+            length = before + half * (speed @ _PIECE_WEIGHTS)
+            here = np.hypot(*_derivatives(coefficients, p)[1])
+            p = p + (wanted - length) / np.maximum(here, 1e-9)
+        return p
+
+    def at(
+        self, row: IntArray, ds: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """u, v, heading, curvature and its change by s, ``ds`` metres behind the start."""
+        p = self.parameter(row, ds)
+        (u, v), (u1, v1), (u2, v2), (u3, v3) = _derivatives(
+            self.coefficients[row].transpose(1, 2, 0), p
+        )
+        speed2 = np.maximum(u1 * u1 + v1 * v1, 1e-18)
+        speed = np.sqrt(speed2)
+        cross = u1 * v2 - v1 * u2
+        curvature = cross / (speed2 * speed)
+        # d/dp of cross / speed^3, per metre of arc length
+        change = (u1 * v3 - v1 * u3) / (speed2 * speed2)
+        change -= 3.0 * cross * (u1 * u2 + v1 * v2) / (speed2 * speed2 * speed2)
+        return u, v, np.arctan2(v1, u1), curvature, change
+
+
+Pair = tuple[FloatArray, FloatArray]
+
+
+def _derivatives(coefficients: FloatArray, p: FloatArray) -> tuple[Pair, Pair, Pair, Pair]:
+    """(u, v) and their first three derivatives by p; the first two axes of ``coefficients`` are
+    (u or v, power), the others broadcast with ``p``.
+    """
+    parts = []
+    for a, b, c, d in (coefficients[0], coefficients[1]):
+        zero = np.zeros(p.shape)
+        parts.append(
+            (
+                a + p * (b + p * (c + p * d)),
+                b + p * (2.0 * c + p * 3.0 * d),
+                2.0 * c + 6.0 * d * p,
+                6.0 * d + zero,
+            )
+        )
+    (u0, u1, u2, u3), (v0, v1, v2, v3) = parts
+    return (u0, v0), (u1, v1), (u2, v2), (u3, v3)

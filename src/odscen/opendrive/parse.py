@@ -1,0 +1,144 @@
+"""OpenDRIVE text to road model (ASAM OpenDRIVE 1.4 to 1.8).
+
+The parser refuses what it does not understand and never invents: each tolerance is a
+:class:`~odscen.opendrive.parse_rules.Rule`, and each use of one is a sentence in
+:attr:`OpenDrive.notes <odscen.opendrive.model.OpenDrive.notes>`.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import Final, TypeVar
+
+from odscen.errors import in_file
+from odscen.ids import RoadId
+from odscen.opendrive.model import Controller, Header, OpenDrive, Road
+from odscen.opendrive.parse_checks import check_geometry, check_references
+from odscen.opendrive.parse_junctions import parse_controller, parse_junction
+from odscen.opendrive.parse_road import parse_road
+from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
+from odscen.opendrive.parse_xml import (
+    Element,
+    children,
+    integer,
+    load,
+    number_or,
+    only,
+    optional_number,
+    refusal,
+    shown,
+)
+
+READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
+IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
+    """Road model of an OpenDRIVE file.
+
+    Parameters
+    ----------
+    text
+        The whole file; bytes are decoded as the XML declaration says.
+    file
+        Name of the file for error messages.
+
+    Returns
+    -------
+    OpenDrive
+        Lengths in metres, angles in radians, speeds in m/s; ``notes`` lists all tolerances used.
+
+    Raises
+    ------
+    OpenDriveError
+        If the text is malformed or uses something that is not supported; the message names the
+        element and the value.
+    """
+    with in_file(file) if file else nullcontext():
+        return _parse_root(load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS))
+
+
+def _parse_root(root: Element) -> OpenDrive:
+    if root.tag != "OpenDRIVE":
+        raise refusal(root, f"the root element is <{str(root.tag)[:60]}>, not <OpenDRIVE>")
+    notes = Notes()
+    groups = children(root)
+    for tag, found in groups.items():
+        if tag not in READ:
+            rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
+            notes.skip(rule, "OpenDRIVE", tag, len(found))
+    header = _header(root, only(groups, "header"), notes)
+    roads: dict[RoadId, Road] = {}
+    for element in groups.get("road", ()):
+        road = parse_road(element, notes)
+        _add(roads, road.id, road, element)
+    if not roads:
+        raise refusal(root, "there is no <road>")
+    junctions = {}
+    for element in groups.get("junction", ()):
+        junction = parse_junction(element, notes)
+        _add(junctions, junction.id, junction, element)
+    controllers: dict[str, Controller] = {}
+    for element in groups.get("controller", ()):
+        controller = parse_controller(element, notes)
+        _add(controllers, controller.id, controller, element)
+    check_geometry(roads, notes)
+    roads, junctions = check_references(roads, junctions, controllers, notes)
+    return OpenDrive(header, roads, junctions, controllers, notes.sentences())
+
+
+def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:
+    if key in known:
+        raise refusal(element, f"there is another {element.tag} with the id {shown(str(key))}")
+    known[key] = value
+
+
+def _header(root: Element, element: Element | None, notes: Notes) -> Header:
+    if element is None:
+        raise refusal(root, "there is no <header>")
+    major, minor = integer(element, "revMajor"), integer(element, "revMinor")
+    if major != 1 or minor < 0:
+        raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")
+    if not 4 <= minor <= 8:  # noqa: PLR2004
+        detail = f"OpenDRIVE {major}.{minor} is read by the rules of 1.4 to 1.8"
+        notes.add(Rule.VERSION, element, detail)
+    groups = children(element)
+    reference = only(groups, "geoReference")
+    text = "" if reference is None else (reference.text or "").strip()
+    offset = only(groups, "offset")
+    return Header(
+        rev_major=major,
+        rev_minor=minor,
+        name=element.get("name", ""),
+        north=optional_number(element, "north"),
+        south=optional_number(element, "south"),
+        east=optional_number(element, "east"),
+        west=optional_number(element, "west"),
+        geo_reference=text,
+        crs=_crs(text, element, notes),
+        offset=_offset(offset),
+    )
+
+
+def _offset(element: Element | None) -> tuple[float, float, float, float]:
+    if element is None:
+        return (0.0, 0.0, 0.0, 0.0)
+    x, y, z, hdg = (number_or(element, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    return (x, y, z, hdg)
+
+
+def _crs(text: str, element: Element, notes: Notes) -> str | None:
+    """WKT of a geoReference, if pyproj understands it."""
+    if not text:
+        return None
+    import pyproj
+
+    try:
+        return str(pyproj.CRS.from_user_input(text).to_wkt())
+    except (pyproj.exceptions.ProjError, ValueError, TypeError) as err:
+        reason = str(err).splitlines()[0][:200]
+        detail = f"geoReference {shown(text)} is not understood ({reason}); kept as text"
+        notes.add(Rule.GEO_REFERENCE, element, detail)
+        return None

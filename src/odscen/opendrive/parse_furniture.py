@@ -1,0 +1,186 @@
+"""``<objects>`` and ``<signals>`` of a road (sections 13 and 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from odscen.opendrive.model import (
+    Corner,
+    ObjectRepeat,
+    Outline,
+    RoadObject,
+    Signal,
+    SignalReference,
+)
+from odscen.opendrive.parse_rules import MAX_COORDINATE, Notes, Rule
+from odscen.opendrive.parse_values import speed_factor, validities
+from odscen.opendrive.parse_xml import (
+    Element,
+    boolean,
+    children,
+    number,
+    number_or,
+    only,
+    optional_number,
+    required,
+    shown,
+)
+
+IGNORED: Final = frozenset({"bridge", "tunnel", "objectReference"})
+
+
+def parse_objects(container: Element | None, notes: Notes) -> tuple[RoadObject, ...]:
+    """All objects of a road, in the order of the file."""
+    if container is None:
+        return ()
+    objects = []
+    for element in container:
+        if element.tag == "object":
+            objects.append(_object(element, notes))
+        elif element.tag != "userData":
+            rule = Rule.IGNORED if element.tag in IGNORED else Rule.UNKNOWN
+            notes.skip(rule, "objects", str(element.tag))
+    return tuple(objects)
+
+
+_OBJECT_READ: Final = frozenset({"outline", "outlines", "repeat", "validity", "userData"})
+_OBJECT_IGNORED: Final = frozenset({"material", "parkingSpace", "markings", "borders", "surface"})
+
+
+def _object(element: Element, notes: Notes) -> RoadObject:
+    groups = children(element)
+    for tag in groups:
+        if tag not in _OBJECT_READ:
+            rule = Rule.IGNORED if tag in _OBJECT_IGNORED else Rule.UNKNOWN
+            notes.skip(rule, "object", tag)
+    outlines = only(groups, "outlines")
+    found = [*groups.get("outline", ())]  # 1.4: directly below the object
+    if outlines is not None:
+        found += children(outlines).get("outline", [])
+    return RoadObject(
+        id=required(element, "id"),
+        type=element.get("type", ""),
+        subtype=element.get("subtype", ""),
+        name=element.get("name", ""),
+        s=number(element, "s"),
+        t=number(element, "t"),
+        z_offset=number_or(element, "zOffset", 0.0),
+        hdg=number_or(element, "hdg", 0.0),
+        pitch=number_or(element, "pitch", 0.0),
+        roll=number_or(element, "roll", 0.0),
+        orientation=element.get("orientation", "none"),
+        length=optional_number(element, "length"),
+        width=optional_number(element, "width"),
+        height=optional_number(element, "height"),
+        radius=optional_number(element, "radius"),
+        valid_length=optional_number(element, "validLength"),
+        outlines=tuple(_outline(outline) for outline in found),
+        repeats=tuple(_repeat(repeat) for repeat in groups.get("repeat", ())),
+        validities=validities(groups.get("validity", ())),
+    )
+
+
+def _outline(element: Element) -> Outline:
+    corners = []
+    for child in element:
+        if child.tag == "cornerLocal":
+            u, v, z = (number(child, name, limit=MAX_COORDINATE) for name in ("u", "v", "z"))
+            corners.append(Corner(True, u, v, z, number_or(child, "height", 0.0)))
+        elif child.tag == "cornerRoad":
+            s, t = (number(child, name, limit=MAX_COORDINATE) for name in ("s", "t"))
+            z = number_or(child, "dz", 0.0)
+            corners.append(Corner(False, s, t, z, number_or(child, "height", 0.0)))
+    return Outline(
+        tuple(corners),
+        closed=boolean(element, "closed", default=True),
+        outer=boolean(element, "outer", default=True),
+    )
+
+
+def _repeat(element: Element) -> ObjectRepeat:
+    t_start = number_or(element, "tStart", 0.0)
+    return ObjectRepeat(
+        number(element, "s"),
+        number(element, "length"),
+        number(element, "distance"),
+        t_start,
+        number_or(element, "tEnd", t_start),
+    )
+
+
+def parse_signals(
+    container: Element | None, notes: Notes
+) -> tuple[tuple[Signal, ...], tuple[SignalReference, ...]]:
+    """All signals and signal references of a road, in the order of the file."""
+    if container is None:
+        return (), ()
+    signals = []
+    references = []
+    for element in container:
+        if element.tag == "signal":
+            signals.append(_signal(element, notes))
+        elif element.tag == "signalReference":
+            references.append(_reference(element))
+        elif element.tag != "userData":
+            notes.skip(Rule.UNKNOWN, "signals", str(element.tag))
+    return tuple(signals), tuple(references)
+
+
+_SIGNAL_READ: Final = frozenset({"validity", "dependency", "userData"})
+_SIGNAL_IGNORED: Final = frozenset(
+    {"reference", "positionRoad", "positionInertial", "physicalPosition", "semantics"}
+    | {"staticBoard", "vmsBoard", "vmsGroup"}
+)
+
+
+def _signal(element: Element, notes: Notes) -> Signal:
+    groups = children(element)
+    for tag in groups:
+        if tag not in _SIGNAL_READ:
+            rule = Rule.IGNORED if tag in _SIGNAL_IGNORED else Rule.UNKNOWN
+            notes.skip(rule, "signal", tag)
+    unit = element.get("unit", "")
+    value = optional_number(element, "value")
+    factor = speed_factor(unit)
+    return Signal(
+        id=required(element, "id"),
+        name=element.get("name", ""),
+        s=number(element, "s"),
+        t=number(element, "t"),
+        z_offset=number_or(element, "zOffset", 0.0),
+        h_offset=number_or(element, "hOffset", 0.0),
+        orientation=element.get("orientation", "none"),
+        dynamic=_dynamic(element, notes),
+        country=element.get("country", ""),
+        type=element.get("type", ""),
+        subtype=element.get("subtype", ""),
+        value=value if value is None or factor is None else value * factor,
+        unit="m/s" if factor is not None else unit,
+        text=element.get("text", ""),
+        width=optional_number(element, "width"),
+        height=optional_number(element, "height"),
+        validities=validities(groups.get("validity", ())),
+        dependencies=_dependencies(groups.get("dependency", ())),
+    )
+
+
+def _dynamic(element: Element, notes: Notes) -> bool:
+    text = element.get("dynamic", "no")
+    if text not in {"yes", "no"}:
+        notes.add(Rule.UNKNOWN_VALUE, element, f"dynamic={shown(text)} counts as 'no'")
+    return text == "yes"
+
+
+def _dependencies(elements: Sequence[Element]) -> tuple[tuple[str, str], ...]:
+    return tuple((required(element, "id"), element.get("type", "")) for element in elements)
+
+
+def _reference(element: Element) -> SignalReference:
+    return SignalReference(
+        id=required(element, "id"),
+        s=number(element, "s"),
+        t=number(element, "t"),
+        orientation=element.get("orientation", "none"),
+        validities=validities(children(element).get("validity", ())),
+    )

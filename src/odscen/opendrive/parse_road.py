@@ -1,0 +1,231 @@
+"""``<road>``: attributes, links, types, plan view and profiles (sections 8 to 10)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from odscen.ids import JunctionId, RoadId
+from odscen.opendrive.model import (
+    ContactPoint,
+    Cubic,
+    Geometry,
+    GeometryKind,
+    Road,
+    RoadLink,
+    RoadType,
+    TrafficRule,
+)
+from odscen.opendrive.parse_furniture import parse_objects, parse_signals
+from odscen.opendrive.parse_lanes import parse_sections
+from odscen.opendrive.parse_rules import (
+    MAX_COORDINATE,
+    MAX_ROAD_LENGTH,
+    MAX_TURNING,
+    S_TOLERANCE,
+    Notes,
+    Rule,
+)
+from odscen.opendrive.parse_values import cubics, speed
+from odscen.opendrive.parse_xml import (
+    Element,
+    children,
+    choice,
+    number,
+    only,
+    positive,
+    refusal,
+    required,
+)
+
+READ: Final = frozenset(
+    {"link", "type", "planView", "elevationProfile", "lateralProfile", "lanes", "objects"}
+    | {"signals"}
+)
+IGNORED: Final = frozenset({"surface", "railroad"})
+_TRAFFIC_RULES: Final[dict[str | None, TrafficRule]] = {None: "RHT", "RHT": "RHT", "LHT": "LHT"}
+_CONTACT_POINTS: Final[dict[str | None, ContactPoint | None]] = {
+    None: None,
+    "": None,
+    "start": "start",
+    "end": "end",
+}
+
+
+def parse_road(element: Element, notes: Notes) -> Road:
+    """One road; references to other elements are checked later."""
+    groups = children(element)
+    for tag, found in groups.items():
+        if tag not in READ and tag != "userData":
+            rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
+            notes.skip(rule, "road", tag, len(found))
+    length = positive(element, "length", limit=MAX_ROAD_LENGTH)
+    link = only(groups, "link")
+    lateral = _container(groups, "lateralProfile", {"superelevation"}, notes)
+    lanes = only(groups, "lanes")
+    if lanes is None:
+        raise refusal(element, "there is no <lanes>")
+    lane_groups = children(lanes)
+    signals, references = parse_signals(only(groups, "signals"), notes)
+    return Road(
+        id=RoadId(required(element, "id")),
+        name=element.get("name", ""),
+        length=length,
+        junction=_junction(element, notes),
+        rule=choice(element, "rule", _TRAFFIC_RULES),
+        predecessor=_road_link(link, "predecessor", notes),
+        successor=_road_link(link, "successor", notes),
+        types=tuple(_road_type(found, notes) for found in groups.get("type", ())),
+        geometry=_plan_view(element, groups, length, notes),
+        elevation=_profile(
+            _container(groups, "elevationProfile", {"elevation"}, notes), "elevation", notes
+        ),
+        superelevation=_profile(lateral, "superelevation", notes),
+        lane_offset=_profile(lane_groups, "laneOffset", notes),
+        sections=parse_sections(lanes, lane_groups, length, notes),
+        objects=parse_objects(only(groups, "objects"), notes),
+        signals=signals,
+        signal_references=references,
+    )
+
+
+def _junction(element: Element, notes: Notes) -> JunctionId | None:
+    text = element.get("junction")
+    if text is None or not text.strip():
+        detail = "junction is missing" if text is None else "junction is empty"
+        notes.add(Rule.JUNCTION_ATTRIBUTE, element, f"{detail}; the road is in no junction")
+        return None
+    return None if text == "-1" else JunctionId(text)
+
+
+def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
+    if link is None:
+        return None
+    element = only(children(link), tag)
+    if element is None:
+        return None
+    element_type = choice(element, "elementType", {"road": "road", "junction": "junction"})
+    contact_point = choice(element, "contactPoint", _CONTACT_POINTS)
+    element_s = element.get("elementS")
+    if element_type == "road" and contact_point is None and element_s is None:
+        notes.add(Rule.MISSING_CONTACT, element, "contactPoint is missing; the link is left out")
+        return None
+    return RoadLink(
+        "road" if element_type == "road" else "junction",
+        required(element, "elementId"),
+        contact_point,
+        None if element_s is None else number(element, "elementS", limit=MAX_ROAD_LENGTH),
+        element.get("elementDir"),
+    )
+
+
+def _road_type(element: Element, notes: Notes) -> RoadType:
+    limit = only(children(element), "speed")
+    return RoadType(
+        number(element, "s", limit=MAX_ROAD_LENGTH),
+        element.get("type", ""),
+        None if limit is None else speed(limit, notes),
+    )
+
+
+def _container(
+    groups: dict[str, list[Element]], tag: str, read: set[str], notes: Notes
+) -> dict[str, list[Element]]:
+    """Children of an optional container; those without effect are noted."""
+    element = only(groups, tag)
+    if element is None:
+        return {}
+    found = children(element)
+    for child, elements in found.items():
+        if child not in read and child != "userData":
+            known = child in {"shape", "crossSectionSurface", "crossfall"}
+            notes.skip(Rule.IGNORED if known else Rule.UNKNOWN, tag, child, len(elements))
+    return found
+
+
+# ----------------------------------------------------------------------------- plan view
+def _plan_view(
+    road: Element, groups: dict[str, list[Element]], length: float, notes: Notes
+) -> tuple[Geometry, ...]:
+    plan_view = only(groups, "planView")
+    elements = [] if plan_view is None else children(plan_view).get("geometry", [])
+    if not elements:
+        raise refusal(road, "there is no planView geometry")
+    geometry = []
+    for element in elements:
+        s = number(element, "s", limit=MAX_ROAD_LENGTH)
+        if number(element, "length", limit=MAX_ROAD_LENGTH) == 0.0:
+            notes.add(Rule.ZERO_LENGTH, element, "length is 0; the geometry is left out")
+            continue
+        if geometry and s <= geometry[-1].s:
+            problem = f"s={s:g} is not beyond the s={geometry[-1].s:g} of the geometry before"
+            raise refusal(element, problem)
+        geometry.append(_geometry(element, s))
+    if not geometry:
+        raise refusal(road, "every planView geometry has the length 0")
+    if abs(geometry[0].s) > S_TOLERANCE:
+        raise refusal(road, f"the planView starts at s={geometry[0].s:g}, not at 0")
+    end = geometry[-1].s
+    if end >= length + S_TOLERANCE:
+        raise refusal(elements[-1], f"s={end:g} is beyond the road's length of {length:g}")
+    return tuple(geometry)
+
+
+def _geometry(element: Element, s: float) -> Geometry:
+    shapes = [shape for shape in element if shape.tag != "userData"]
+    if len(shapes) != 1:
+        raise refusal(element, f"there are {len(shapes)} shapes where one must be")
+    shape = shapes[0]
+    try:
+        kind = GeometryKind(str(shape.tag))
+    except ValueError as err:
+        raise refusal(element, f"<{shape.tag}> is no known shape") from err
+    length = positive(element, "length", limit=MAX_ROAD_LENGTH)
+    params = _params(shape, kind, length)
+    turning = length * max(map(abs, params), default=0.0)
+    if kind in {GeometryKind.ARC, GeometryKind.SPIRAL} and turning > MAX_TURNING:
+        problem = f"turns by about {turning:g} rad; the limit is {MAX_TURNING:g}"
+        raise refusal(shape, problem)
+    return Geometry(
+        s,
+        number(element, "x", limit=MAX_COORDINATE),
+        number(element, "y", limit=MAX_COORDINATE),
+        number(element, "hdg"),
+        length,
+        kind,
+        params,
+    )
+
+
+_PARAMETERS: Final[dict[GeometryKind, tuple[str, ...]]] = {
+    GeometryKind.LINE: (),
+    GeometryKind.ARC: ("curvature",),
+    GeometryKind.SPIRAL: ("curvStart", "curvEnd"),
+    GeometryKind.POLY3: ("a", "b", "c", "d"),
+    GeometryKind.PARAM_POLY3: ("aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV"),
+}
+
+
+def _params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, ...]:
+    values = tuple(number(shape, name) for name in _PARAMETERS[kind])
+    if kind is not GeometryKind.PARAM_POLY3:
+        return values
+    if not (any(values[1:4]) or any(values[5:8])):
+        raise refusal(shape, "all coefficients but aU and aV are 0: the curve is a point")
+    normalized = choice(
+        shape, "pRange", {"arcLength": False, "normalized": True, None: True, "": True}
+    )
+    if not normalized:
+        return values
+    # p = ds / length, so that the k-th coefficient is divided by length^k.
+    return tuple(value / length ** (i % 4) for i, value in enumerate(values))
+
+
+def _profile(groups: dict[str, list[Element]], tag: str, notes: Notes) -> tuple[Cubic, ...]:
+    """Records of a whole road; zero where the file starts late."""
+    elements = groups.get(tag, [])
+    records = cubics(elements, "s", 0.0, notes)
+    if records and records[0].s > S_TOLERANCE:
+        detail = f"starts at s={records[0].s:g}; the {tag} is 0 before"
+        notes.add(Rule.LATE_START, elements[0], detail)
+        records = (Cubic(0.0, 0.0, 0.0, 0.0, 0.0), *records)
+    return records

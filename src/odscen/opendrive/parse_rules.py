@@ -1,0 +1,124 @@
+"""What the parser tolerates and where it stops: every rule has a name, every use of one is noted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from enum import StrEnum
+from typing import Final
+
+from odscen.opendrive.parse_xml import Element, element_path
+
+
+class Rule(StrEnum):
+    """A named tolerance; the name ends the note of each use."""
+
+    VERSION = "version"
+    """Versions before 1.4 and after 1.8 are read as far as their elements are known."""
+    GEO_REFERENCE = "geo-reference"
+    """A geoReference that pyproj does not understand is kept as text; coordinates do not change."""
+    JUNCTION_ATTRIBUTE = "junction-attribute"
+    """A road without ``junction``, or with an empty one, belongs to no junction."""
+    DANGLING_LINK = "dangling-link"
+    """A reference to something that is not in the file is left out: the road or lane ends there."""
+    MISSING_CONTACT = "missing-contact-point"
+    """A road link without ``contactPoint`` is left out: which end it means is not guessed."""
+    DUPLICATE_ID = "duplicate-id"
+    """Objects and signals may share an id; references mean the first."""
+    PLAN_VIEW_S = "plan-view-s"
+    """Lengths of geometries and the next s may disagree by up to a metre: s decides."""
+    PLAN_VIEW_GAP = "plan-view-gap"
+    """Successive geometries may miss each other by up to 10 m; positions stay as written."""
+    ZERO_LENGTH = "zero-length"
+    """Geometries and lane sections too short to hold a point have no effect."""
+    LATE_START = "late-start"
+    """A profile of the road that starts after s = 0 is zero before."""
+    SAME_S = "same-s"
+    """Of two records at the same s the later one holds."""
+    WIDTH_AND_BORDER = "width-and-border"
+    """A lane with width and border records uses the widths (section 11.7)."""
+    NO_WIDTH = "no-width"
+    """A lane without width and border has zero width."""
+    NEGATIVE_WIDTH = "negative-width"
+    """A width may fall below zero by up to 5 cm; it counts as zero there."""
+    LANE_NUMBERS = "lane-numbers"
+    """Lane ids may leave numbers out; lanes lie side by side in the order of their ids."""
+    NO_CENTER = "no-center-lane"
+    """A lane section without centre lane has an unmarked centre line."""
+    SPEED = "speed"
+    """A speed that is no positive number, "no limit" or "undefined" counts as not given."""
+    OUTSIDE_ROAD = "outside-road"
+    """Objects and signals may lie before the start or behind the end of their road."""
+    IGNORED = "ignored"
+    """Elements without effect on lanes and traffic are not read (docs/opendrive-coverage.md)."""
+    UNKNOWN = "unknown-element"
+    """Elements that no version of the standard names here are not read."""
+    UNKNOWN_VALUE = "unknown-value"
+    """A value that the standard does not name is kept as text, or left out where it decides."""
+
+
+MAX_BYTES: Final = 256_000_000
+"""Bytes of a file."""
+MAX_TAGS: Final = 4_000_000
+"""Tags of a file, opening and closing."""
+MAX_NUMBER: Final = 1e9
+"""Any number of a file, absolute; lengths and positions have limits of their own."""
+MAX_ROAD_LENGTH: Final = 1e6
+"""Metres of one road."""
+MAX_LANE_LENGTH: Final = 1e7
+"""Metres of all lanes of a map together."""
+MAX_COORDINATE: Final = 1e8
+"""Metres from the origin."""
+MAX_TURNING: Final = 100.0
+"""Radians that one geometry may turn through."""
+MAX_LANE_ID: Final = 1000
+"""Absolute lane id."""
+MAX_WIDTH: Final = 1000.0
+"""Metres of one lane."""
+
+S_TOLERANCE: Final = 1e-3
+"""Metres by which s values may disagree without a note."""
+MAX_S_GAP: Final = 1.0
+"""Metres by which s values of the plan view may disagree with a note (:attr:`Rule.PLAN_VIEW_S`)."""
+GAP_TOLERANCE: Final = 0.01
+"""Metres between successive geometries without a note."""
+MAX_GAP: Final = 10.0
+"""Metres between successive geometries with a note (:attr:`Rule.PLAN_VIEW_GAP`)."""
+WIDTH_TOLERANCE: Final = 1e-3
+"""Metres below zero that a width may have without a note."""
+MAX_NEGATIVE_WIDTH: Final = 0.05
+"""Metres below zero that a width may have with a note (:attr:`Rule.NEGATIVE_WIDTH`)."""
+
+_LISTED_PER_RULE = 1000
+
+
+class Notes:
+    """Collects one sentence per use of a tolerance; beyond a thousand of a rule only counts."""
+
+    def __init__(self) -> None:
+        self._sentences: list[str] = []
+        self._uses: Counter[Rule] = Counter()
+        self._skipped: Counter[tuple[Rule, str, str]] = Counter()
+
+    def add(self, rule: Rule, place: Element | str, detail: str) -> None:
+        """Note that ``rule`` was used at ``place``."""
+        self._uses[rule] += 1
+        if self._uses[rule] <= _LISTED_PER_RULE:
+            path = place if isinstance(place, str) else element_path(place)
+            self._sentences.append(f"{path}: {detail} [{rule}]" if path else f"{detail} [{rule}]")
+
+    def skip(self, rule: Rule, parent: str, tag: str, count: int = 1) -> None:
+        """Count elements ``tag`` below ``parent`` that are not read; one note per kind."""
+        self._skipped[rule, parent[:60], tag[:60]] += count
+
+    def sentences(self) -> tuple[str, ...]:
+        """All notes, those of single elements first."""
+        more = [
+            f"{count - _LISTED_PER_RULE} further uses of this rule [{rule}]"
+            for rule, count in self._uses.items()
+            if count > _LISTED_PER_RULE
+        ]
+        skipped = [
+            f"{parent}: {count} x <{tag}> not read [{rule}]"
+            for (rule, parent, tag), count in list(self._skipped.items())[:_LISTED_PER_RULE]
+        ]
+        return (*self._sentences, *more, *skipped)

@@ -1,0 +1,88 @@
+"""Records that several elements of the standard share: cubics over s, speeds, validities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, cast
+
+from odscen.opendrive.model import Cubic, Validity
+from odscen.opendrive.parse_rules import MAX_LANE_ID, MAX_NUMBER, Notes, Rule
+from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal, shown
+
+_SPEED_UNITS: Final[dict[str | None, float]] = {
+    None: 1.0,
+    "": 1.0,
+    "m/s": 1.0,
+    "km/h": 1 / 3.6,
+    "mph": 0.44704,
+}
+
+
+def cubics(elements: Sequence[Element], s_name: str, s0: float, notes: Notes) -> tuple[Cubic, ...]:
+    """Records ``a + b ds + c ds^2 + d ds^3``; each starts at ``s0`` plus its ``s_name``.
+
+    Raises
+    ------
+    OpenDriveError
+        For numbers that are none, and records that are not in ascending order of s.
+    """
+    records: list[Cubic] = []
+    last = -math.inf
+    for element in elements:
+        get = element.get
+        try:
+            s = float(cast("str", get(s_name)))
+            a = float(cast("str", get("a")))
+            b = float(cast("str", get("b")))
+            c = float(cast("str", get("c")))
+            d = float(cast("str", get("d")))
+        except (TypeError, ValueError):
+            # The slow way finds the attribute at fault and says so.
+            s, a, b, c, d = (number(element, name) for name in (s_name, "a", "b", "c", "d"))
+        # False for NaN, too.
+        if not abs(s) + abs(a) + abs(b) + abs(c) + abs(d) <= MAX_NUMBER:
+            for name in (s_name, "a", "b", "c", "d"):
+                number(element, name, limit=MAX_NUMBER)
+        if s <= last:
+            _check_same(element, s_name, s, last, notes)
+        last = s
+        records.append(Cubic(s0 + s, a, b, c, d))
+    return tuple(records)
+
+
+def _check_same(element: Element, s_name: str, s: float, last: float, notes: Notes) -> None:
+    """A record that does not start after the one before it."""
+    if s < last:
+        raise refusal(element, f"{s_name}={s:g} is below the {last:g} of the record before")
+    notes.add(Rule.SAME_S, element, f"{s_name}={s:g} is that of the record before; this one holds")
+
+
+def speed(element: Element, notes: Notes) -> float | None:
+    """Speed in m/s of a ``max`` attribute, infinite for "no limit", ``None`` where none is given."""
+    text = element.get("max", "").strip()
+    if text == "no limit":
+        return math.inf
+    if text in {"undefined", ""}:
+        return None
+    value = number(element, "max", limit=MAX_NUMBER) * choice(element, "unit", _SPEED_UNITS)
+    if value <= 0.0:
+        notes.add(Rule.SPEED, element, f"max={shown(text)} is not above zero; no speed is given")
+        return None
+    return value
+
+
+def speed_factor(unit: str) -> float | None:
+    """Factor to m/s of a unit of speed, or ``None`` for other units."""
+    return _SPEED_UNITS.get(unit) if unit else None
+
+
+def validities(elements: Sequence[Element]) -> tuple[Validity, ...]:
+    """``<validity>`` records (section 14.4)."""
+    return tuple(
+        Validity(
+            integer(element, "fromLane", limit=MAX_LANE_ID),
+            integer(element, "toLane", limit=MAX_LANE_ID),
+        )
+        for element in elements
+    )

@@ -1,0 +1,213 @@
+"""Reading XML safely, and numbers and choices out of it with errors that name the place."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Container, Mapping
+from typing import TypeVar
+
+from lxml import etree
+
+from odscen.errors import OpenDriveError
+
+Element = etree._Element
+T = TypeVar("T")
+
+_CONTAINERS = frozenset(
+    {"OpenDRIVE", "planView", "elevationProfile", "lateralProfile", "lanes", "left", "center"}
+    | {"right", "link", "objects", "outlines", "signals"}
+)
+_NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection", "controller"})
+_SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
+_UNDERSCORED_NUMBER = re.compile(rb"[\"'][ \t\r\n]*[-+]?[0-9.]+_[0-9.]*[\"']")
+
+
+def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
+    """Root element without namespaces, comments and processing instructions.
+
+    Entities are refused, the network and external DTDs are never touched.
+
+    Raises
+    ------
+    OpenDriveError
+        For anything that is not well-formed XML of a sensible size.
+    """
+    data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+    if len(data) > max_bytes:
+        msg = f"the file has {len(data)} bytes; the limit is {max_bytes}"
+        raise OpenDriveError(msg)
+    if data.count(b"<") > max_tags:
+        msg = f"the file has {data.count(b'<')} tags; the limit is {max_tags}"
+        raise OpenDriveError(msg)
+    parser = etree.XMLParser(
+        # A str has been decoded already: what its declaration says about the encoding is past.
+        encoding="utf-8" if isinstance(text, str) else None,
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+        remove_blank_text=True,
+    )
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError, LookupError) as err:
+        msg = f"not well-formed XML: {err}"
+        raise OpenDriveError(msg) from err
+    if root is None:
+        msg = "not well-formed XML: no element"
+        raise OpenDriveError(msg)
+    dtd = root.getroottree().docinfo.internalDTD
+    if dtd is not None and any(True for _ in dtd.iterentities()):
+        msg = "the file declares XML entities; these are refused"
+        raise OpenDriveError(msg)
+    found = _UNDERSCORED_NUMBER.search(data)
+    if found is not None and re.search(rb"[0-9]_[0-9]", found[0]):
+        # Python's float() would read "1_000" as a number; XML has no such numbers. Text attributes
+        # that look like this exist only as ids, and are told apart by the caller never seeing them.
+        _refuse_underscored_numbers(root)
+    if b"xmlns" in data:
+        _drop_namespaces(root)
+    return root
+
+
+def _refuse_underscored_numbers(root: Element) -> None:
+    texts = {"id", "name", "text", "elementId", "junction", "incomingRoad", "connectingRoad"}
+    texts |= {"linkedRoad", "signalId", "type", "subtype", "high", "low", "mainRoad", "date"}
+    for element in root.iter(etree.Element):
+        for name, value in element.items():
+            if name not in texts and re.fullmatch(r"\s*[-+]?[0-9.]+_[0-9._]*\s*", str(value)):
+                raise refusal(element, f"{name}={shown(str(value))} is not a number")
+
+
+def _drop_namespaces(root: Element) -> None:
+    for element in root.iter(etree.Element):
+        if "{" in element.tag:
+            element.tag = etree.QName(element).localname
+
+
+def shown(value: str | None) -> str:
+    """A value as it appears in messages: quoted and never long."""
+    if value is None:
+        return "nothing"
+    return repr(value if len(value) <= 60 else value[:57] + "...")
+
+
+def _label(element: Element) -> str:
+    tag = str(element.tag)[:60]
+    if tag in _NAMED and element.get("id"):
+        return f"{tag} {str(element.get('id'))[:60]}"
+    if tag in _SINGLE:
+        return tag
+    return f"{tag} {sum(1 for _ in element.itersiblings(element.tag, preceding=True))}"
+
+
+def element_path(element: Element) -> str:
+    """Where an element is, for people: ``road 7 > laneSection 0 > lane -1 > width 2``."""
+    chain = [element, *element.iterancestors()]
+    return " > ".join(_label(part) for part in reversed(chain) if part.tag not in _CONTAINERS)
+
+
+def refusal(element: Element, problem: str) -> OpenDriveError:
+    """The error for ``element``; the caller raises it."""
+    return OpenDriveError(problem, element=element_path(element) or None)
+
+
+def required(element: Element, name: str) -> str:
+    """Text of an attribute that must be there and not be empty."""
+    value = element.get(name)
+    if value is None or not value.strip():
+        what = "is missing" if value is None else "is empty"
+        raise refusal(element, f"attribute {name} {what}")
+    return str(value)
+
+
+def number(element: Element, name: str, *, limit: float = 1e9) -> float:
+    """A finite number that must be there, absolute value at most ``limit``."""
+    text = required(element, name)
+    try:
+        value = float(text)
+    except ValueError as err:
+        raise refusal(element, f"{name}={shown(text)} is not a number") from err
+    if not math.isfinite(value):
+        raise refusal(element, f"{name}={shown(text)} is not a finite number")
+    if abs(value) > limit:
+        raise refusal(element, f"{name}={shown(text)} is beyond the limit of {limit:g}")
+    return value
+
+
+def positive(element: Element, name: str, *, limit: float = 1e9) -> float:
+    """A finite number above zero."""
+    value = number(element, name, limit=limit)
+    if value <= 0.0:
+        raise refusal(element, f"{name}={shown(element.get(name))} is not above zero")
+    return value
+
+
+def optional_number(element: Element, name: str) -> float | None:
+    """A finite number, or ``None`` if the attribute is missing or empty."""
+    value = element.get(name)
+    return None if value is None or not value.strip() else number(element, name)
+
+
+def number_or(element: Element, name: str, default: float) -> float:
+    """A finite number, or ``default`` if the attribute is missing or empty."""
+    value = optional_number(element, name)
+    return default if value is None else value
+
+
+def integer(element: Element, name: str, *, limit: int = 10**9) -> int:
+    """A whole number that must be there."""
+    text = required(element, name)
+    try:
+        value = int(text)
+    except ValueError as err:
+        raise refusal(element, f"{name}={shown(text)} is not a whole number") from err
+    if abs(value) > limit:
+        raise refusal(element, f"{name}={shown(text)} is beyond the limit of {limit}")
+    return value
+
+
+def choice(element: Element, name: str, options: Mapping[str | None, T]) -> T:
+    """The meaning of an attribute out of ``options``; the key ``None`` stands for its absence."""
+    value = element.get(name)
+    try:
+        return options[value]
+    except KeyError as err:
+        known = ", ".join(sorted(option for option in options if option))
+        raise refusal(element, f"{name}={shown(value)} is none of {known}") from err
+
+
+def boolean(element: Element, name: str, *, default: bool = False) -> bool:
+    """An XML Schema boolean (also ``yes`` and ``no``, which the standard uses)."""
+    return choice(
+        element,
+        name,
+        {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
+        | {None: default, "": default},
+    )
+
+
+def children(element: Element) -> dict[str, list[Element]]:
+    """Child elements by name, in the order of the file."""
+    groups: dict[str, list[Element]] = {}
+    for child in element:
+        groups.setdefault(str(child.tag), []).append(child)
+    return groups
+
+
+def only(groups: Mapping[str, list[Element]], tag: str) -> Element | None:
+    """The one child of that name or ``None``; several are refused."""
+    found = groups.get(tag)
+    if not found:
+        return None
+    if len(found) > 1:
+        raise refusal(found[1], f"there are {len(found)} <{tag}> elements where one is allowed")
+    return found[0]
+
+
+def unread(groups: Mapping[str, list[Element]], read: Container[str]) -> dict[str, int]:
+    """How many children of each name are not in ``read``."""
+    return {tag: len(found) for tag, found in groups.items() if tag not in read}
