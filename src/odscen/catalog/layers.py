@@ -151,12 +151,13 @@ def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:
             for width, color, style in ((200, "#6b6f75", "m-edge"), (130, "#f3f1ea", "m-casing")):
                 line = element("path", d=sides, class_=style, stroke=color, stroke_width=width)
                 parts.append(element("g", line, fill="none"))
+    seam = 24 if level else 6
     for kind, rings in data.items():
-        # The thin stroke in the same colour closes hairlines between neighbouring lanes.
+        # The stroke in the same colour closes hairlines: between lanes, and where a bridge begins.
         color = AREA_COLORS[kind]
         style = f"m-area m-{kind}"
         parts.append(
-            element("path", d=rings, class_=style, fill=color, stroke=color, stroke_width=6)
+            element("path", d=rings, class_=style, fill=color, stroke=color, stroke_width=seam)
         )
     return element("g", *parts, id=f"{options.prefix}level-{level}", stroke_linejoin="round")
 

@@ -15,6 +15,7 @@ from odscen.catalog.layers import (
     FONT,
     PEDESTRIAN_NODE_COLOR,
     RELATION_COLORS,
+    SEGMENT_COLORS,
     SYMBOL_NAMES,
     VEHICLE_NODE_COLOR,
     LayerOptions,
@@ -307,6 +308,8 @@ def _entries(
         kinds = {symbol.kind for symbol in drawing.symbols}
         kinds -= set() if options.speed_limits else {"speed_limit"}
         entries += [(_sign(kind), text) for kind, text in SYMBOL_NAMES.items() if kind in kinds]
+    if graph is not None and options.segments:
+        entries.append((_bands(), "Segments"))
     if graph is not None and options.graph:
         entries += _graph_entries(graph)
     return entries
@@ -345,6 +348,14 @@ def _sign(kind: str) -> Markup:
 
 def _dot(color: str) -> Markup:
     return element("circle", cx=9, r=5.5, fill=color, stroke=_INK, stroke_width=0.5)
+
+
+def _bands() -> Markup:
+    bands = [
+        element("rect", x=6 * k, y=-7, width=6, height=14, fill=color, opacity=0.6)
+        for k, color in enumerate(SEGMENT_COLORS[:3])
+    ]
+    return join(bands)
 
 
 def _stroke(color: str) -> Markup:
