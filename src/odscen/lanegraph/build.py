@@ -116,7 +116,7 @@ def _lane_graph(
         pitch=nodes.pitch,
         curvature=nodes.curvature,
         width=nodes.width,
-        speed_limit=speed_limits(odr, table, nodes),
+        speed_limit=table.speed_limit(rows[nodes.lane], nodes.s),
         left_lane=number[nodes.left],
         right_lane=number[nodes.right],
         lane_change=nodes.lane_change,

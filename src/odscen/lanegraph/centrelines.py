@@ -1,8 +1,8 @@
 """Distances along lanes: from s to metres along the lane's centre line and back.
 
-s runs along the reference line; on the inside of a curve a lane is shorter than that, on the outside
-longer. All lanes of a map are sampled in one pass; lanes of one lane section are sampled at the same
-s, so that no search is needed to find an s in the samples.
+s runs along the reference line; on the inside of a curve a lane is shorter than that, on the
+outside longer. All lanes of a map are sampled in one pass, at equal steps of s, so that no search is
+needed to find an s among the samples.
 """
 
 from __future__ import annotations

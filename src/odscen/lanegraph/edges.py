@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -86,7 +87,7 @@ def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
     """From the last node of each lane to the first of each lane that follows it."""
     lengths = nodes.lines.lengths.tolist()
     first = nodes.first.tolist()
-    empty = [begin == end for begin, end in zip(first[:-1], first[1:], strict=True)]
+    empty = [begin == end for begin, end in itertools.pairwise(first)]
     pairs = [
         (lane, after, between)
         for lane in range(len(lengths))
@@ -136,11 +137,11 @@ def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) 
     over = k >= planned[lane]
     only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int32)
     goal = np.where(over, only[lane], lane)
-    k_over = np.rint(np.maximum(beyond, 0.0) / gap[goal] - 0.5).astype(np.int32)
-    k = np.clip(np.where(over, k_over, k), 0, planned[goal] - 1)
-    target = nodes.kept[nodes.planned[goal] + k]
-    found: BoolArray = (goal >= 0) & (target >= 0)
-    source, target = source[found], target[found]
+    reached = goal >= 0
+    source, goal, over, beyond, k = (part[reached] for part in (source, goal, over, beyond, k))
+    k = np.where(over, np.rint(np.maximum(beyond, 0.0) / gap[goal] - 0.5).astype(np.int32), k)
+    target = nodes.kept[nodes.planned[goal] + np.clip(k, 0, planned[goal] - 1)]
+    source, target = source[target >= 0], target[target >= 0]
     gone = (
         nodes.x[target] - nodes.x[source],
         nodes.y[target] - nodes.y[source],

@@ -16,6 +16,7 @@ from odscen.lanegraph.model import (
     FloatArray,
     IntArray,
 )
+from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 from odscen.opendrive.model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
@@ -131,14 +132,11 @@ def _beside(
 
 
 def _adjacent_rows(table: RoadTable) -> tuple[IntArray, IntArray]:
-    """Row of the lane with the next higher and the next lower id beside each lane, or -1.
+    """Row of the lane with the next higher and the next lower id in each lane's section, or -1.
 
     Rows are sorted by road, section and lane id, and the centre lane has no row: 1 follows -1.
     """
-    step = np.diff(table.lane_id)
-    across_centre = (table.lane_id[:-1] == -1) & (step == 2)
     beside = (np.diff(table.lane_road) == 0) & (np.diff(table.lane_section) == 0)
-    beside &= (step == 1) | across_centre
     count = len(table.lane_keys)
     upper = np.full(count, -1, dtype=np.int32)
     lower = np.full(count, -1, dtype=np.int32)
@@ -174,4 +172,10 @@ def _change_permitted(
     ``increase`` permits changes to higher lane ids, ``decrease`` to lower ones, whatever the driving
     direction (OpenDRIVE 1.8, section 11.9).
     """
-    raise NotImplementedError
+    outer = np.where(np.abs(table.lane_id[row]) >= np.abs(table.lane_id[beside]), row, beside)
+    code = table.inner_lane_change_at(outer, s)
+    needed = np.where(
+        table.lane_id[beside] > table.lane_id[row], LANE_CHANGE_INCREASE, LANE_CHANGE_DECREASE
+    )
+    permitted: BoolArray = (code & needed) != 0
+    return permitted
