@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.sumo.network import Link, NetLane, RoadNet
-from odscen.sumo.realize import SumoMap
 from odscen.sumo.routes import Places
+from odscen.sumo.sumo_map import SumoMap
 from tests.graphs import ToyLane, ToyWalk, key, map_graph
 
 if TYPE_CHECKING:

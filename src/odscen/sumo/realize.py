@@ -31,11 +31,10 @@ from odscen.sumo.weather import NO_EFFECT, weather_effect
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.lanegraph.model import IntArray, MapGraph
+    from odscen.lanegraph.model import IntArray
     from odscen.scenario.document import Environment, Scenario
     from odscen.sumo.driving import Driver
-    from odscen.sumo.network import RoadNet
-    from odscen.sumo.routes import Places
+    from odscen.sumo.sumo_map import SumoMap
     from odscen.sumo.weather import WeatherEffect
 
 UNKNOWN_LIMIT = 13.89
@@ -50,26 +49,6 @@ class Assets(Protocol):
 
     def weather(self, preset: str) -> Mapping[str, float] | None:
         """Parameters of a weather preset, ``None`` if there is no such preset."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SumoMap:
-    """A map as realization needs it: its graphs, its SUMO network, and where they meet.
-
-    Attributes
-    ----------
-    net_offset
-        Added to OpenDRIVE x and y to give SUMO's, metres.
-    elevation
-        Whether the network has heights.
-    """
-
-    graph: MapGraph
-    net: RoadNet
-    lane_places: Places
-    walk_places: Places
-    net_offset: tuple[float, float]
-    elevation: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,97 @@
+"""A map as realization needs it: its graphs, its SUMO network, and where the two meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.sumo.network import Link, NetLane, RoadNet
+from odscen.sumo.routes import Places
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.convert.lane_table import LaneTable
+    from odscen.ids import LaneKey
+    from odscen.lanegraph.model import FloatArray, IntArray, MapGraph
+
+NORMAL = "normal"
+INTERNAL = "internal"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SumoMap:
+    """Made once per map by :meth:`of`; many scenarios are realized on it.
+
+    Attributes
+    ----------
+    lane_places, walk_places
+        Where the nodes of the lane graph and of the pedestrian graph are on the network.
+    net_offset
+        Added to OpenDRIVE x and y to give SUMO's, metres.
+    elevation
+        Whether the network has heights.
+    """
+
+    graph: MapGraph
+    net: RoadNet
+    lane_places: Places
+    walk_places: Places
+    net_offset: tuple[float, float]
+    elevation: bool = False
+
+    @classmethod
+    def of(cls, graph: MapGraph, table: LaneTable) -> SumoMap:
+        """Bring graph and lane table together."""
+        lanes, walks = graph.lanes, graph.walks
+        return cls(
+            graph=graph,
+            net=_road_net(table),
+            lane_places=_places(table, lanes.lanes.keys, lanes.lane, lanes.s),
+            walk_places=_places(table, walks.lane_keys, walks.lane, walks.s),
+            net_offset=table.net_offset,
+            elevation=table.elevation,
+        )
+
+
+def _places(table: LaneTable, keys: Sequence[LaneKey], lane: IntArray, s: FloatArray) -> Places:
+    places = table.sumo_places(keys, lane, s)
+    return Places(tuple(table.lanes), places.lane, places.pos)
+
+
+def _road_net(table: LaneTable) -> RoadNet:
+    lanes: dict[str, NetLane] = {
+        lane.id: NetLane(
+            lane.id,
+            lane.edge,
+            lane.index,
+            lane.length,
+            internal=table.edges[lane.edge].function == INTERNAL,
+            speed=lane.speed,
+            allowed=lane.allowed,
+        )
+        for lane in table.lane_list
+    }
+    links = tuple(Link(link.from_lane, link.to_lane, link.via or None) for link in table.links)
+    return RoadNet(lanes, links, _walk_links(table))
+
+
+def _walk_links(table: LaneTable) -> frozenset[tuple[str, str]]:
+    """Pairs of normal edges between which one can walk, over crossings and walking areas.
+
+    A SUMO walk names normal edges only; what lies between them at a junction SUMO finds itself.
+    """
+    normal = {edge.id for edge in table.edges.values() if edge.function == NORMAL}
+    found: set[tuple[str, str]] = set()
+    for start in sorted(normal & table.walk_neighbours.keys()):
+        todo, seen = [start], {start}
+        while todo:
+            for other in table.walk_neighbours.get(todo.pop(), ()):
+                if other in seen:
+                    continue
+                seen.add(other)
+                if other in normal:
+                    found.add((start, other))
+                else:
+                    todo.append(other)
+    return frozenset(found)
