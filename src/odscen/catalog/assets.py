@@ -1,0 +1,115 @@
+"""The asset catalogue that ships: blueprints and weather presets, as plain data.
+
+The files under ``data/`` name their sources; ``docs/assets.md`` discusses them. Another simulator
+needs only another pair of such files (requirement R13).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any, Literal
+
+from odscen.categories import Body, Category
+from odscen.errors import NotFoundError
+
+TimeOfDay = Literal["day", "sunset", "night"]
+
+
+@dataclass(frozen=True, slots=True)
+class Blueprint:
+    """A model of road user; ``special_type`` is ``emergency``, ``taxi`` or empty."""
+
+    id: str
+    category: Category
+    base_type: str
+    special_type: str
+    generation: int | None
+    body: Body
+
+
+@dataclass(frozen=True, slots=True)
+class WeatherPreset:
+    """Weather and time of day.
+
+    ``parameters`` have CARLA's names and units: shares from 0 to 100, angles in degrees,
+    ``fog_distance`` in metres.
+    """
+
+    name: str
+    kind: str
+    time_of_day: TimeOfDay
+    source: str
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Assets:
+    """Blueprints by id and presets by name, in the order of their files."""
+
+    blueprints: Mapping[str, Blueprint]
+    presets: Mapping[str, WeatherPreset]
+
+    def blueprint(self, name: str) -> Blueprint:
+        """One blueprint; :class:`NotFoundError` with close names if there is none."""
+        if name not in self.blueprints:
+            raise NotFoundError("model", name, list(self.blueprints))
+        return self.blueprints[name]
+
+    def preset(self, name: str) -> WeatherPreset:
+        """One weather preset; :class:`NotFoundError` with close names if there is none."""
+        if name not in self.presets:
+            raise NotFoundError("weather preset", name, list(self.presets))
+        return self.presets[name]
+
+    def of_category(self, category: Category) -> tuple[Blueprint, ...]:
+        """All blueprints of a category."""
+        return tuple(b for b in self.blueprints.values() if b.category is category)
+
+    def category_of(self, model: str) -> Category | None:
+        """Category of a model, ``None`` if there is no such model."""
+        found = self.blueprints.get(model)
+        return found and found.category
+
+    def dimensions(self, model: str) -> Body | None:
+        """Size of a model, ``None`` if there is no such model."""
+        found = self.blueprints.get(model)
+        return found and found.body
+
+    def weather(self, preset: str) -> Mapping[str, float] | None:
+        """Parameters of a weather preset, ``None`` if there is no such preset."""
+        found = self.presets.get(preset)
+        return found and found.parameters
+
+
+def parse_assets(blueprints: str, weather: str) -> Assets:
+    """Make the catalogue from the text of the two data files."""
+    models = [_blueprint(row) for row in json.loads(blueprints)["blueprints"]]
+    presets = [WeatherPreset(**row) for row in json.loads(weather)["presets"]]
+    return Assets(
+        {model.id: model for model in models}, {preset.name: preset for preset in presets}
+    )
+
+
+@cache
+def shipped_assets() -> Assets:
+    """The catalogue that ships with odscen."""
+    data = files("odscen.catalog") / "data"
+    return parse_assets(
+        (data / "blueprints.json").read_text(encoding="utf-8"),
+        (data / "weather.json").read_text(encoding="utf-8"),
+    )
+
+
+def _blueprint(row: Mapping[str, Any]) -> Blueprint:
+    return Blueprint(
+        id=row["id"],
+        category=Category(row["category"]),
+        base_type=row["base_type"],
+        special_type=row["special_type"],
+        generation=row.get("generation"),
+        body=Body(row["length"], row["width"], row["height"]),
+    )
