@@ -208,7 +208,8 @@ class RoadTable:
     # ------------------------------------------------------------------------- lanes
     def lane_borders(self, lane: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """t of the inner and the outer border of each lane (row) at s."""
-        inner, outer = self._borders(np.asarray(lane), np.asarray(s, dtype=np.float64))
+        lane = np.asarray(lane)
+        inner, outer = self._borders(lane, self._within(lane, s))
         return inner.t, outer.t
 
     def lane_width(self, lane: IntArray, s: FloatArray) -> FloatArray:
@@ -226,12 +227,13 @@ class RoadTable:
         lane
             Rows of ``lane_keys``, shape ``(N,)``.
         s
-            Road coordinates, shape ``(N,)``.
+            Road coordinates, shape ``(N,)``; held within the section of the lane.
         at
             0 for the inner border, 0.5 for the lane centre, 1 for the outer border; a number or
             shape ``(N,)``.
         """
-        lane, s = np.asarray(lane), np.asarray(s, dtype=np.float64)
+        lane = np.asarray(lane)
+        s = self._within(lane, s)
         road = self.lane_road[lane]
         inner, outer = self._borders(lane, s)
         line = _Offset(*(a + at * (b - a) for a, b in zip(inner, outer, strict=True)))
@@ -254,6 +256,15 @@ class RoadTable:
             curvature=_curvature(plan, line),
             width=np.abs(outer.t - inner.t),
         )
+
+    def _within(self, lane: IntArray, s: FloatArray) -> FloatArray:
+        """s held within the lane's section.
+
+        The end belongs to the next section, whose lane offset may differ: the last number before
+        it is used instead, so that a lane is continuous up to its end.
+        """
+        last = np.nextafter(self.lane_s1[lane], -np.inf)
+        return np.maximum(np.minimum(s, last), self.lane_s0[lane])
 
     def _borders(self, lane: IntArray, s: FloatArray) -> tuple[_Offset, _Offset]:
         """Inner and outer border: widths are summed from the centre line outwards.

@@ -1,0 +1,158 @@
+"""Which lane follows which, in driving direction (sections 8.2, 11.6, 12.4).
+
+A lane ends, in driving direction, at the end or the start of its section. What follows is said by
+the lane's own ``successor`` or ``predecessor`` within a road and across a plain road link, and by
+the lane links of the connections at a junction. Only relations that exist in the file and agree
+with the driving direction of both lanes are given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from odscen.ids import LaneKey
+from odscen.opendrive.lanes import is_forward
+from odscen.opendrive.model import (
+    Connection,
+    ContactPoint,
+    Junction,
+    Lane,
+    OpenDrive,
+    Road,
+    RoadLink,
+)
+
+End = Literal["start", "end"]
+
+
+def lane_successors(odr: OpenDrive) -> dict[LaneKey, tuple[LaneKey, ...]]:
+    """Following lanes of every lane with id other than 0, of every type, in driving direction.
+
+    Returns
+    -------
+    dict[LaneKey, tuple[LaneKey, ...]]
+        One entry per lane, in the order of the file (road, section, lane id ascending); the
+        followers sorted by road in file order, section and lane id, each once.
+    """
+    order = {road_id: index for index, road_id in enumerate(odr.roads)}
+    found: dict[LaneKey, set[LaneKey]] = {
+        LaneKey(road.id, number, lane.id): set()
+        for road in odr.roads.values()
+        for number, section in enumerate(road.sections)
+        for lane in reversed(section.lanes.values())
+        if lane.id
+    }
+    for road in odr.roads.values():
+        for here, there in _within_and_beyond(road, odr):
+            found[here].add(there)
+    for junction in odr.junctions.values():
+        for connection in junction.connections:
+            for here, there in _through_connection(junction, connection, odr):
+                found[here].add(there)
+    return {
+        key: tuple(sorted(keys, key=lambda k: (order[k.road], k.section, k.lane)))
+        for key, keys in found.items()
+    }
+
+
+def _within_and_beyond(road: Road, odr: OpenDrive) -> Iterator[tuple[LaneKey, LaneKey]]:
+    """Relations that the links of the road's own lanes state."""
+    last = len(road.sections) - 1
+    for number, section in enumerate(road.sections):
+        for lane in section.lanes.values():
+            if not lane.id:
+                continue
+            forward = is_forward(road, lane)
+            ids = lane.successors if forward else lane.predecessors
+            if not ids:
+                continue
+            if forward and number < last:
+                places = (road, number + 1, "start")
+            elif not forward and number > 0:
+                places = (road, number - 1, "end")
+            else:
+                link = road.successor if forward else road.predecessor
+                places = _linked(link, odr)
+            if places is None:
+                continue
+            target, target_section, contact = places
+            here = LaneKey(road.id, number, lane.id)
+            for lane_id in ids:
+                if _enters(target, target_section, lane_id, contact):
+                    yield here, LaneKey(target.id, target_section, lane_id)
+
+
+def _linked(link: RoadLink | None, odr: OpenDrive) -> tuple[Road, int, End] | None:
+    """Road, section and end of it that a plain road link leads to."""
+    if link is None or link.element_type != "road" or link.contact_point is None:
+        return None
+    road = odr.roads.get(link.element_id)  # type: ignore[call-overload]
+    if road is None:
+        return None
+    return road, end_section(road, link.contact_point), link.contact_point
+
+
+def end_section(road: Road, contact: ContactPoint) -> int:
+    """Index of the section at the start or the end of a road."""
+    return 0 if contact == "start" else len(road.sections) - 1
+
+
+def _lane(road: Road, section: int, lane_id: int) -> Lane | None:
+    return road.sections[section].lanes.get(lane_id) if lane_id else None
+
+
+def _enters(road: Road, section: int, lane_id: int, contact: End) -> bool:
+    """Whether the lane exists and is driven away from that end of its section."""
+    lane = _lane(road, section, lane_id)
+    return lane is not None and is_forward(road, lane) == (contact == "start")
+
+
+def _through_connection(
+    junction: Junction, connection: Connection, odr: OpenDrive
+) -> Iterator[tuple[LaneKey, LaneKey]]:
+    """Relations between an incoming road and the connecting or linked road."""
+    incoming = odr.roads.get(connection.incoming_road)
+    connecting = odr.roads.get(connection.connecting_road)
+    if incoming is None or connecting is None:
+        return
+    contact = connection.contact_point
+    section = end_section(connecting, contact)
+    for end in _incoming_ends(junction, incoming, connecting, contact):
+        incoming_section = end_section(incoming, end)
+        for from_id, to_id in connection.lane_links:
+            from_lane = _lane(incoming, incoming_section, from_id)
+            to_lane = _lane(connecting, section, to_id)
+            if from_lane is None or to_lane is None:
+                continue
+            # "entering" seen from the junction: driven away from the point where the roads meet
+            from_enters = is_forward(incoming, from_lane) == (end == "start")
+            to_enters = is_forward(connecting, to_lane) == (contact == "start")
+            here = LaneKey(incoming.id, incoming_section, from_id)
+            there = LaneKey(connecting.id, section, to_id)
+            if to_enters and not from_enters:
+                yield here, there
+            elif from_enters and not to_enters:
+                yield there, here
+
+
+def _incoming_ends(
+    junction: Junction, incoming: Road, connecting: Road, contact: ContactPoint
+) -> tuple[End, ...]:
+    """Ends of the incoming road at which it meets the connecting road.
+
+    The connecting road's own link says so; in a direct junction, where that link names the
+    junction, the ends of the incoming road that lead to the junction do.
+    """
+    link = connecting.predecessor if contact == "start" else connecting.successor
+    if link is not None and link.element_type == "road" and link.element_id == incoming.id:
+        return (link.contact_point,) if link.contact_point else ()
+    ends: tuple[tuple[End, RoadLink | None], ...] = (
+        ("start", incoming.predecessor),
+        ("end", incoming.successor),
+    )
+    return tuple(
+        end
+        for end, own in ends
+        if own is not None and own.element_type == "junction" and own.element_id == junction.id
+    )
