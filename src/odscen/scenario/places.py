@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.categories import Body, Category
 from odscen.lanegraph.model import BoolArray, FloatArray, LaneGraph, PedestrianGraph, Relation
 from odscen.scenario.bodies import SIDE_GAP, Crowd, box_at
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from odscen.categories import Body, Category
 
 LANE_MARGIN = 0.05
 """Free width kept between a body and the border of its lane, metres."""
@@ -65,9 +68,9 @@ def max_fit(
 ) -> Fit:
     """Place as many bodies as fit: lane after lane, from its start, at the first node that is free.
 
-    The result is maximal (nothing can be added), depends on nothing but its arguments, and keeps
-    the ``shares`` as closely as the places allow: each next body is of the category that is
-    furthest behind its share among those that may stand there.
+    At each node the body's category is the one furthest behind its share among those that may stand
+    there, so that the crowd keeps the ``shares`` as closely as the places allow. The result depends
+    on nothing but the arguments; with one category nothing can be added to it.
 
     Parameters
     ----------
@@ -80,22 +83,18 @@ def max_fit(
     """
     categories = [category for category, share in shares.items() if share > 0]
     quota = {c: shares[c] / sum(shares[d] for d in categories) for c in categories}
-    core = Body(*(min(bodies[c][i] for c in categories) for i in range(3)))
+    masks = {c: allowed[c].tolist() for c in categories}
     crowd = crowd_for(bodies, minimum_gap=minimum_gap)
     placed: dict[Category, int] = dict.fromkeys(categories, 0)
     fit: list[tuple[int, Category]] = []
     for node in np.flatnonzero(np.any([allowed[c] for c in categories], axis=0)).tolist():
-        place = box_at(graph, node, core, gap=minimum_gap)
-        if not crowd.is_free(place):  # then no larger body fits either
-            continue
-        wanted = len(fit) + 1
-        for category in sorted(categories, key=lambda c: placed[c] - wanted * quota[c]):
-            box = box_at(graph, node, bodies[category], gap=minimum_gap)
-            if allowed[category][node] and crowd.is_free(box):
-                crowd.add(node, box)
-                placed[category] += 1
-                fit.append((node, category))
-                break
+        choices = (c for c in categories if masks[c][node])
+        category = min(choices, key=lambda c: placed[c] - (len(fit) + 1) * quota[c])
+        box = box_at(graph, node, bodies[category], gap=minimum_gap)
+        if crowd.is_free(box):
+            crowd.add(node, box)
+            placed[category] += 1
+            fit.append((node, category))
     return Fit(tuple(node for node, _ in fit), tuple(category for _, category in fit))
 
 
@@ -108,7 +107,7 @@ def crowd_for(bodies: Mapping[Category, Body], *, minimum_gap: float) -> Crowd:
 
 
 def distance_to_end(
-    ends: Sequence[int], graph: LaneGraph | PedestrianGraph, mask: BoolArray
+    ends: NDArray[np.integer], graph: LaneGraph | PedestrianGraph, mask: BoolArray
 ) -> FloatArray:
     """Metres from each node to the nearest of ``ends``, inside ``mask``; infinite without.
 
@@ -131,7 +130,7 @@ def distance_to_end(
         (weights[order][first], (keys[first, 0], keys[first, 1])), shape=(count, count)
     )
     directed = isinstance(graph, LaneGraph)
-    found = dijkstra(matrix, directed=directed, indices=list(ends), min_only=True)
+    found = dijkstra(matrix, directed=directed, indices=ends, min_only=True)
     return np.asarray(found, dtype=np.float64)
 
 
