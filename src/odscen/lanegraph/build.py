@@ -8,7 +8,7 @@ import numpy as np
 
 from odscen.errors import InputError
 from odscen.lanegraph.edges import connect
-from odscen.lanegraph.model import IntArray, LaneGraph, Lanes, MapGraph
+from odscen.lanegraph.model import LaneGraph, Lanes, MapGraph
 from odscen.lanegraph.nodes import NodeTable, place_nodes
 from odscen.lanegraph.pedestrians import build_pedestrians
 from odscen.lanegraph.segments import SegmentMap, build_segments
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from odscen.ids import LaneKey
     from odscen.opendrive.model import OpenDrive
+    from odscen.opendrive.profiles import IntArray
 
 MIN_SPACING, MAX_SPACING = 0.1, 100.0
 """Metres; the range of spacings that make sense for placing vehicles."""
@@ -62,7 +63,7 @@ def build_map_graph(
     nodes = place_nodes(table, spacing)
     segments = build_segments(odr)
     row = {road: index for index, road in enumerate(odr.roads)}
-    road_rows = np.array([row[road] for road in table.road_ids], dtype=np.int32)
+    road_rows = np.array([row[road] for road in table.road_ids], dtype=np.int64)
     return MapGraph(
         map_name=name,
         map_sha256=sha256,
@@ -92,8 +93,8 @@ def _lane_graph(
     keys = [table.lane_keys[row] for row in nodes.lines.rows.tolist()]
     edges = connect(nodes, keys, successors)
     used = np.flatnonzero(np.diff(nodes.first))
-    number = np.full(len(keys) + 1, -1, dtype=np.int32)  # the last answers for lane -1
-    number[used] = np.arange(len(used), dtype=np.int32)
+    number = np.full(len(keys) + 1, -1, dtype=np.int64)  # the last answers for lane -1
+    number[used] = np.arange(len(used))
     rows = nodes.lines.rows
     road = road_rows[table.lane_road[rows]][nodes.lane]
     return LaneGraph(
@@ -106,7 +107,7 @@ def _lane_graph(
             forward=nodes.lines.forward[used],
             first_node=np.append(nodes.first[used], nodes.first[-1]).astype(np.int32),
         ),
-        lane=number[nodes.lane],
+        lane=number[nodes.lane].astype(np.int32),
         s=nodes.s,
         offset=nodes.offset,
         x=nodes.x,
@@ -117,12 +118,12 @@ def _lane_graph(
         curvature=nodes.curvature,
         width=nodes.width,
         speed_limit=table.speed_limit(rows[nodes.lane], nodes.s),
-        left_lane=number[nodes.left],
-        right_lane=number[nodes.right],
+        left_lane=number[nodes.left].astype(np.int32),
+        right_lane=number[nodes.right].astype(np.int32),
         lane_change=nodes.lane_change,
-        segment=segments.at(road, nodes.s),
-        source=edges.source,
-        target=edges.target,
+        segment=segments.at(road, nodes.s).astype(np.int32),
+        source=edges.source.astype(np.int32),
+        target=edges.target.astype(np.int32),
         relation=edges.relation,
         length=edges.length,
     )

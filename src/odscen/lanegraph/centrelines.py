@@ -1,8 +1,8 @@
 """Distances along lanes: from s to metres along the lane's centre line and back.
 
 s runs along the reference line; on the inside of a curve a lane is shorter than that, on the
-outside longer. All lanes of a map are sampled in one pass, at equal steps of s, so that no search is
-needed to find an s among the samples.
+outside longer. All lanes of a map are sampled in one pass, at equal steps of s, so that an s is
+found among the samples without a search.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ import numpy as np
 from odscen.errors import OpenDriveError
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.model import BoolArray, FloatArray, IntArray
+    from odscen.lanegraph.model import BoolArray, FloatArray
     from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.profiles import IntArray
 
 SAMPLE_STEP = 1.0
-"""Metres of s between samples of a centre line. A chord of 1 m on a radius of 5 m is 0.2 % short."""
+"""Metres of s between samples of a centre line; a chord of 1 m at radius 5 m is 0.2 % short."""
 
 MAX_SAMPLES = 3_000_000
 """More samples than this (3,000 km of lanes) are refused: nothing that long is a map."""
@@ -82,9 +83,9 @@ class CentreLines:
             longest = table.lane_keys[int(rows[np.argmax(extent)])]
             problem = f"the lanes are {np.sum(extent):.3g} m long together; that is no map"
             raise OpenDriveError(problem, element=f"road {longest.road}")
-        count = np.ceil(extent / SAMPLE_STEP).astype(np.int32) + 1
+        count = np.ceil(extent / SAMPLE_STEP).astype(np.int64) + 1
         count = np.maximum(count, 2)
-        first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+        first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
         lane = np.repeat(np.arange(len(rows)), count)
         step = (np.arange(first[-1]) - first[lane]) / (count - 1)[lane]
         s = s0[lane] + extent[lane] * step
@@ -106,7 +107,8 @@ class CentreLines:
         part = np.where(chord > 0, (along - self.distance[k]) / np.where(chord > 0, chord, 1), 0.5)
         steps = (self.first[lane + 1] - self.first[lane] - 1).astype(np.float64)
         share = (k - self.first[lane] + part) / steps
-        return self.s0[lane] + (self.s1[lane] - self.s0[lane]) * np.clip(share, 0.0, 1.0)
+        s: FloatArray = self.s0[lane] + (self.s1[lane] - self.s0[lane]) * np.clip(share, 0.0, 1.0)
+        return s
 
     def offset_at(self, lane: IntArray, s: FloatArray) -> FloatArray:
         """Metres along each lane, in its direction, at road coordinate s; inverse of `s_at`."""
@@ -114,15 +116,16 @@ class CentreLines:
         steps = self.first[lane + 1] - self.first[lane] - 1
         share = np.where(extent > 0, (s - self.s0[lane]) / np.where(extent > 0, extent, 1), 0.5)
         place = np.clip(share, 0.0, 1.0) * steps
-        k = np.minimum(place.astype(np.int32), steps - 1)
+        k = np.minimum(place.astype(np.int64), steps - 1)
         start = self.first[lane] + k
         before, after = self.distance[start], self.distance[start + 1]
         along = before + (after - before) * (place - k)
-        return np.where(self.forward[lane], along, self.lengths[lane] - along)
+        offset: FloatArray = np.where(self.forward[lane], along, self.lengths[lane] - along)
+        return offset
 
 
 def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """Place nodes along lanes: equal gaps, as near to ``spacing`` as a whole number of nodes allows.
+    """Place nodes along lanes at equal gaps as near to ``spacing`` as a whole number allows.
 
     Parameters
     ----------
@@ -133,12 +136,12 @@ def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArra
 
     Returns
     -------
-    Shape ``(L + 1,)``: first node of each lane; shapes ``(N,)``: lane and offset of each node. A lane
-    has ``n = max(1, round(length / spacing))`` nodes, node k at ``(k + 0.5) length / n``, so that the
-    gap across the joint of two lanes is about one spacing too.
+    Shape ``(L + 1,)``: first node of each lane; shapes ``(N,)``: lane and offset of each node. A
+    lane has ``n = max(1, round(length / spacing))`` nodes, node k at ``(k + 0.5) length / n``, so
+    that the gap across the joint of two lanes is about one spacing too.
     """
-    count = np.maximum(np.rint(lengths / spacing), 1).astype(np.int32)
-    first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-    lane = np.repeat(np.arange(len(lengths), dtype=np.int32), count)
-    k = np.arange(first[-1], dtype=np.int32) - first[lane]
+    count = np.maximum(np.rint(lengths / spacing), 1).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+    lane = np.repeat(np.arange(len(lengths), dtype=np.int64), count)
+    k = np.arange(first[-1], dtype=np.int64) - first[lane]
     return first, lane, (k + 0.5) * (lengths / count)[lane]

@@ -10,10 +10,8 @@ import numpy as np
 from odscen.lanegraph.model import (
     CHANGE_LEFT,
     CHANGE_RIGHT,
-    BoolArray,
     ByteArray,
     FloatArray,
-    IntArray,
     Relation,
 )
 
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
 
     from odscen.ids import LaneKey
     from odscen.lanegraph.nodes import NodeTable
+    from odscen.opendrive.profiles import IntArray
 
 
 class Edges(NamedTuple):
@@ -68,12 +67,7 @@ def connect(
     keep[1:] &= (
         (source[1:] != source[:-1]) | (target[1:] != target[:-1]) | (relation[1:] != relation[:-1])
     )
-    return Edges(
-        source[keep].astype(np.int32),
-        target[keep].astype(np.int32),
-        relation[keep].astype(np.uint8),
-        length[keep],
-    )
+    return Edges(source[keep], target[keep], relation[keep], length[keep])
 
 
 def _along_lanes(nodes: NodeTable) -> Edges:
@@ -95,7 +89,7 @@ def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
         for after, between in _following(lane, follow, lengths, empty)
     ]
     table = np.array(pairs, dtype=np.float64).reshape(-1, 3)
-    lane, after = table[:, 0].astype(np.int32), table[:, 1].astype(np.int32)
+    lane, after = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
     source, target = nodes.first[lane + 1] - 1, nodes.first[after]
     rest = nodes.lines.lengths[lane] - nodes.offset[source]
     length = rest + table[:, 2] + nodes.offset[target]
@@ -133,14 +127,15 @@ def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) 
     gap = np.maximum(lines.lengths / planned, 1e-6)
     ahead = lines.offset_at(lane, nodes.s[source]) + gap[lane]
     beyond = ahead - lines.lengths[lane]
-    k = np.rint(ahead / gap[lane] - 0.5).astype(np.int32)
+    k = np.rint(ahead / gap[lane] - 0.5).astype(np.int64)
     over = k >= planned[lane]
-    only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int32)
+    only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int64)
     goal = np.where(over, only[lane], lane)
     reached = goal >= 0
-    source, goal, over, beyond, k = (part[reached] for part in (source, goal, over, beyond, k))
-    k = np.where(over, np.rint(np.maximum(beyond, 0.0) / gap[goal] - 0.5).astype(np.int32), k)
-    target = nodes.kept[nodes.planned[goal] + np.clip(k, 0, planned[goal] - 1)]
+    source, goal = source[reached], goal[reached]
+    k_over = np.rint(np.maximum(beyond[reached], 0.0) / gap[goal] - 0.5).astype(np.int64)
+    k = np.clip(np.where(over[reached], k_over, k[reached]), 0, planned[goal] - 1)
+    target = nodes.kept[nodes.planned[goal] + k]
     source, target = source[target >= 0], target[target >= 0]
     gone = (
         nodes.x[target] - nodes.x[source],

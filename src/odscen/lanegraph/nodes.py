@@ -14,13 +14,13 @@ from odscen.lanegraph.model import (
     BoolArray,
     ByteArray,
     FloatArray,
-    IntArray,
 )
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 from odscen.opendrive.model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.profiles import IntArray
 
 MIN_LANE_WIDTH = 1.0
 """Metres; where a lane is narrower nothing can drive, so it has no nodes there."""
@@ -73,15 +73,15 @@ class NodeTable:
 def place_nodes(table: RoadTable, spacing: float) -> NodeTable:
     """Place nodes along all drivable lanes of a map (requirement R20)."""
     drivable = np.array([kind in DRIVABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
-    rows = np.flatnonzero(drivable).astype(np.int32)
+    rows = np.flatnonzero(drivable).astype(np.int64)
     forward = table.lane_forward[rows]
     lines = CentreLines.of(table, rows, forward=forward, at=np.full(len(rows), 0.5))
     planned, lane, offset = node_offsets(lines.lengths, spacing)
     s = lines.s_at(lane, offset)
     points = table.lane_points(rows[lane], s)
     wide = points.width >= MIN_LANE_WIDTH
-    kept = np.where(wide, np.cumsum(wide) - 1, -1).astype(np.int32)
-    first = np.concatenate([[0], np.cumsum(wide)])[planned].astype(np.int32)
+    kept = np.where(wide, np.cumsum(wide) - 1, -1).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(wide)])[planned].astype(np.int64)
     lane, s, offset = lane[wide], s[wide], offset[wide]
     ahead = forward[lane]
     sign = np.where(ahead, 1.0, -1.0)
@@ -120,8 +120,8 @@ def _beside(
 
     A lane beside counts if it is drivable, runs in the same direction and is wide enough here.
     """
-    number = np.full(len(table.lane_keys), -1, dtype=np.int32)
-    number[rows] = np.arange(len(rows), dtype=np.int32)
+    number = np.full(len(table.lane_keys), -1, dtype=np.int64)
+    number[rows] = np.arange(len(rows), dtype=np.int64)
     upper, lower = _adjacent_rows(table)
     ahead = table.lane_forward[rows][lane]
     row = rows[lane]
@@ -138,9 +138,9 @@ def _adjacent_rows(table: RoadTable) -> tuple[IntArray, IntArray]:
     """
     beside = (np.diff(table.lane_road) == 0) & (np.diff(table.lane_section) == 0)
     count = len(table.lane_keys)
-    upper = np.full(count, -1, dtype=np.int32)
-    lower = np.full(count, -1, dtype=np.int32)
-    one = np.flatnonzero(beside).astype(np.int32)
+    upper = np.full(count, -1, dtype=np.int64)
+    lower = np.full(count, -1, dtype=np.int64)
+    one = np.flatnonzero(beside).astype(np.int64)
     upper[one] = one + 1
     lower[one + 1] = one
     return upper, lower
@@ -160,7 +160,7 @@ def _neighbour(
     at = np.flatnonzero(usable)
     permitted = np.zeros(len(row), dtype=np.bool_)
     permitted[at] = _change_permitted(table, row[at], beside[at], s[at])
-    return np.where(usable, number[beside], -1).astype(np.int32), permitted
+    return np.where(usable, number[beside], -1).astype(np.int64), permitted
 
 
 def _change_permitted(
@@ -169,8 +169,8 @@ def _change_permitted(
     """Whether the mark between two adjacent lanes permits a change from ``row`` to ``beside``.
 
     The mark is that on the outer border of the inner lane, or the centre lane's between 1 and -1.
-    ``increase`` permits changes to higher lane ids, ``decrease`` to lower ones, whatever the driving
-    direction (OpenDRIVE 1.8, section 11.9).
+    ``increase`` permits changes to higher lane ids, ``decrease`` to lower ones, whatever the
+    driving direction (OpenDRIVE 1.8, section 11.9).
     """
     outer = np.where(np.abs(table.lane_id[row]) >= np.abs(table.lane_id[beside]), row, beside)
     code = table.inner_lane_change_at(outer, s)

@@ -1,9 +1,9 @@
 """The pedestrian graph: places to walk along roads, and the ways between them (requirement R32).
 
-Walks are the walkable lanes of the map and, where a road with drivable lanes has none on a side, a
-roadside walk beside the outermost lane of that side. Roadside walks are not made along motorways and
-not inside junctions. Walks that meet are joined at their ends; carriageways are crossed on crosswalks
-only.
+Walks are the walkable lanes of the map and, where a road with drivable lanes has none on a side,
+a roadside walk beside the outermost lane of that side. Roadside walks are not made along motorways
+and not inside junctions. Walks that meet are joined at their ends; carriageways are crossed on
+crosswalks only.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from odscen.lanegraph.centrelines import CentreLines, node_offsets
 from odscen.lanegraph.model import (
     BoolArray,
     FloatArray,
-    IntArray,
     PedestrianGraph,
     WalkKind,
 )
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive
     from odscen.opendrive.objects import Crosswalk
+    from odscen.opendrive.profiles import IntArray
 
 MIN_WALK_WIDTH = 0.5
 """Metres; where a walkable lane is narrower it has no nodes."""
@@ -148,7 +148,7 @@ def build_pedestrians(
         z=nodes.place[:, 2].copy(),
         hdg=wrapped(nodes.hdg),
         width=nodes.width,
-        segment=segments.at(road, nodes.s),
+        segment=segments.at(road, nodes.s).astype(np.int32),
         source=np.array([edge.source for edge in edges], dtype=np.int32),
         target=np.array([edge.target for edge in edges], dtype=np.int32),
         kind=np.array([edge.kind for edge in edges], dtype=np.uint8),
@@ -163,7 +163,7 @@ def _walks(odr: OpenDrive, table: RoadTable) -> _Walks:
     drivable = np.array([kind in DRIVABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
     paved = np.array([kind in PAVED_TYPES for kind in table.lane_type], dtype=np.bool_)
     if not len(walkable):
-        return _Walks(np.empty(0, dtype=np.int32), np.empty(0, dtype=np.bool_))
+        return _Walks(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.bool_))
     section_start = np.ones(len(walkable), dtype=np.bool_)
     section_start[1:] = (np.diff(table.lane_road) != 0) | (np.diff(table.lane_section) != 0)
     section = np.cumsum(section_start) - 1
@@ -173,10 +173,10 @@ def _walks(odr: OpenDrive, table: RoadTable) -> _Walks:
     has_traffic = np.zeros(len(side), dtype=np.bool_)
     has_traffic[section[drivable]] = True
     candidate = paved & has_traffic[section] & ~has_walk[side] & _roadside_allowed(odr, table)
-    outermost = np.zeros(2 * len(side), dtype=np.int32)
+    outermost = np.zeros(2 * len(side), dtype=np.int64)
     np.maximum.at(outermost, side[candidate], np.abs(table.lane_id[candidate]))
     roadside = candidate & (np.abs(table.lane_id) == outermost[side])
-    rows = np.flatnonzero(walkable | roadside).astype(np.int32)
+    rows = np.flatnonzero(walkable | roadside).astype(np.int64)
     return _Walks(rows, roadside[rows])
 
 
@@ -207,7 +207,7 @@ def _place(table: RoadTable, walks: _Walks, spacing: float) -> _Nodes:
     begin, _, _ = _points(table, walks, ends, lines.s0)
     end, _, _ = _points(table, walks, ends, lines.s1)
     return _Nodes(
-        first=np.concatenate([[0], np.cumsum(wide)])[planned].astype(np.int32),
+        first=np.concatenate([[0], np.cumsum(wide)])[planned].astype(np.int64),
         lane=lane[wide],
         s=s[wide],
         offset=offset[wide],
@@ -316,7 +316,7 @@ def _joints(nodes: _Nodes, pairs: Sequence[tuple[int, int]]) -> list[_Edge]:
 
 
 def _crossings(nodes: _Nodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge]:
-    """An edge for each crosswalk that has a walk within reach at both of its ends."""
+    """Make an edge for each crosswalk that has a walk within reach at both of its ends."""
     edges: list[_Edge] = []
     if not len(nodes.place):
         return edges
@@ -327,14 +327,14 @@ def _crossings(nodes: _Nodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge]:
             continue
         source, target = sorted(node for node in found if node is not None)
         gap = float(np.linalg.norm(nodes.place[source] - nodes.place[target]))
-        name = f"{crosswalk.road}:{crosswalk.id}"
+        name = f"{crosswalk.road}:{crosswalk.object_id}"
         edges.append(_Edge(source, target, WalkKind.CROSSWALK, gap, name))
     return edges
 
 
 def _nearest(tree: cKDTree, nodes: _Nodes, place: FloatArray, z: float) -> int | None:
     """Nearest node on the level of ``place``, shape ``(2,)``, or ``None``."""
-    near = np.array(sorted(tree.query_ball_point(place, CROSSWALK_REACH)), dtype=np.int32)
+    near = np.array(sorted(tree.query_ball_point(place, CROSSWALK_REACH)), dtype=np.int64)
     near = near[np.abs(nodes.place[near, 2] - z) <= LEVEL_HEIGHT]
     if not len(near):
         return None
@@ -343,7 +343,7 @@ def _nearest(tree: cKDTree, nodes: _Nodes, place: FloatArray, z: float) -> int |
 
 
 def _unique(edges: Sequence[_Edge]) -> list[_Edge]:
-    """Sort the edges; of several between the same nodes one stays: a walk before a crosswalk or joint."""
+    """Sort the edges; of several between the same nodes the first kind found stays."""
     best: dict[tuple[int, int], _Edge] = {}
     for edge in edges:
         best.setdefault((edge.source, edge.target), edge)

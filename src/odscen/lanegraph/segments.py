@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.ids import JunctionId, RoadId, SegmentId
-from odscen.lanegraph.model import FloatArray, IntArray, SegmentPart, Segments
+from odscen.lanegraph.model import FloatArray, SegmentPart, Segments
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from odscen.opendrive.model import ContactPoint, OpenDrive, Road, RoadLink
+    from odscen.opendrive.profiles import IntArray
 
 TARGET_LENGTH = 100.0
 """Metres; a chain of length L has ``max(1, round(L / TARGET_LENGTH))`` pieces."""
@@ -85,7 +86,7 @@ class SegmentMap:
     def at(self, road: IntArray, s: FloatArray) -> IntArray:
         """Rows of the segments at road coordinates s of the roads in rows ``road``."""
         position = (self.start[road] + self.sign[road] * s) / self.piece[road]
-        piece = np.clip(np.floor(position), 0, self.last[road]).astype(np.int32)
+        piece = np.clip(np.floor(position), 0, self.last[road]).astype(np.int64)
         rows: IntArray = self.base[road] + piece
         return rows
 
@@ -119,11 +120,11 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
     table = [rows.places[road] for road in odr.roads]
     return SegmentMap(
         segments=segments,
-        base=np.array([place.base for place in table], dtype=np.int32),
+        base=np.array([place.base for place in table], dtype=np.int64),
         start=np.array([place.start for place in table], dtype=np.float64),
         sign=np.array([place.sign for place in table], dtype=np.float64),
         piece=np.array([place.piece for place in table], dtype=np.float64),
-        last=np.array([place.last for place in table], dtype=np.int32),
+        last=np.array([place.last for place in table], dtype=np.int64),
     )
 
 
