@@ -39,6 +39,7 @@ SUMMARY = {
     "map": "town",
     "sim_seconds": 60.0,
     "wall_seconds": 0.4,
+    "problems": ["bus-2: no way to its goal"],
     "expectations": [
         {"expectation": "arrived>=0.95", "value": 0.333, "passed": False},
         {"expectation": "collided==0", "value": None, "passed": False},
@@ -105,6 +106,7 @@ def test_the_report_is_well_formed_and_says_what_happened():
     assert "8 s a collided with b at x 30 m, y 5 m (junction)" in text
     assert "9 s b was stuck too long and was lifted off the road" in text
     assert "5 s p never entered the road" in text
+    assert "before bus-2: no way to its goal" in text
     assert text.count("How to read this:") == 7
 
 

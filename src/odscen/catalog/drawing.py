@@ -113,7 +113,9 @@ class MapDrawing:
         Sorted by level, then by the order they are painted in.
     crosswalks, bars
         Outlines of crosswalks and the bars of their zebra stripes, rings.
-    stop_lines, parking_spaces, buildings
+    stop_lines
+        Lines along the middle of the paint, two points each.
+    parking_spaces, buildings
         Rings.
     symbols
         Signs and lights, sorted.

@@ -32,7 +32,7 @@ def add_furniture(drawing: MapDrawing, odr: OpenDrive, table: RoadTable) -> MapD
         drawing,
         crosswalks=rings_of([walk.polygon for walk in walks]),
         bars=_bars([(walk.polygon, walk.axis) for walk in walks]),
-        stop_lines=rings_of([line.polygon for line in stop_lines(odr, table)]),
+        stop_lines=_strokes([line.ends for line in stop_lines(odr, table)]),
         parking_spaces=_outlines(odr, table, "parkingSpace"),
         buildings=_outlines(odr, table, "building"),
         symbols=symbols(odr, table),
@@ -41,7 +41,7 @@ def add_furniture(drawing: MapDrawing, odr: OpenDrive, table: RoadTable) -> MapD
 
 def rings_of(polygons: Sequence[NDArray[Any]]) -> Lines:
     """Rings from polygons of shape ``(K, 2)`` or more columns; repeated last points are dropped."""
-    rings = []
+    rings: list[FloatArray] = []
     for polygon in polygons:
         xy = np.asarray(polygon, dtype=np.float64)[:, :2]
         if len(xy) > 1 and np.allclose(xy[0], xy[-1], atol=1e-6):
@@ -50,12 +50,20 @@ def rings_of(polygons: Sequence[NDArray[Any]]) -> Lines:
             rings.append(xy if _signed_area(xy) >= 0 else xy[::-1])
     if not rings:
         return NO_LINES
-    return Lines(np.round(np.concatenate(rings), 2), offsets(np.array([len(r) for r in rings])))
+    return Lines(np.concatenate(rings).round(2), offsets(np.array([len(r) for r in rings])))
 
 
 def _signed_area(xy: FloatArray) -> float:
     x, y = xy.T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) / 2.0)
+
+
+def _strokes(ends: Sequence[FloatArray]) -> Lines:
+    """Lines between two points each, from arrays of shape ``(2, 2)``."""
+    if not ends:
+        return NO_LINES
+    xy = np.concatenate(ends).round(2)
+    return Lines(xy, offsets(np.full(len(ends), 2)))
 
 
 def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
@@ -87,15 +95,15 @@ def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
 
 
 def _outlines(odr: OpenDrive, table: RoadTable, kind: str) -> Lines:
-    polygons = [
-        outline
-        for road in odr.roads.values()
-        for item in road.objects
-        if item.type == kind
-        for outline in [object_outline(table, road, item)]
-        if outline is not None
-    ]
-    return rings_of(polygons)
+    return rings_of(
+        [
+            outline
+            for name, road in odr.roads.items()
+            for item in road.objects
+            if item.type == kind
+            for outline in object_outline(table, name, item)
+        ]
+    )
 
 
 def symbols(odr: OpenDrive, table: RoadTable) -> tuple[Symbol, ...]:

@@ -116,7 +116,7 @@ def _ground(drawing: MapDrawing, options: LayerOptions) -> list[Markup]:
         *parts,
         _rings(drawing.parking_spaces, class_="m-mark", fill="none", stroke="#ffffff"),
         _crosswalks(drawing, options),
-        _rings(drawing.stop_lines, class_="m-stopline", fill="#ffffff"),
+        _stop_lines(drawing.stop_lines),
     ]
 
 
@@ -135,6 +135,13 @@ def _rings(lines: Lines, **attributes: str) -> Markup:
         return Markup("")
     width = 8 if "stroke" in attributes else None
     return element("path", d=svg_rings(lines), stroke_width=width, **attributes)
+
+
+def _stop_lines(lines: Lines) -> Markup:
+    if lines.total == 0:
+        return Markup("")
+    line = element("path", d=svg_xy(lines), class_="m-mark", stroke="#ffffff", stroke_width=40)
+    return element("g", line, fill="none")
 
 
 def _surfaces(drawing: MapDrawing, level: int, options: LayerOptions) -> Markup:

@@ -159,7 +159,7 @@ def map_semantics(odr: OpenDrive, table: RoadTable) -> dict[str, list[dict[str, 
             for walk in crosswalks(odr, table)
         ],
         "stop_lines": [
-            {"road": line.road, "polygon": _rounded(line.polygon)}
+            {"id": f"{line.road}:{line.object_id}", "road": line.road, "ends": _rounded(line.ends)}
             for line in stop_lines(odr, table)
         ],
         "signals": _signals(odr, table),

@@ -81,7 +81,7 @@ def render_report(
         _speed_section(traces, end),
         _progress_section(actors, end),
         expectation_table(summary.get("expectations") or ()),
-        event_list(events, actors),
+        event_list(events, actors, problems=[str(text) for text in summary.get("problems") or ()]),
         actor_table(actors, travel(traces)),
         _foot(summary),
     ]
@@ -306,6 +306,7 @@ def _number(value: object) -> float:
 
 
 def _foot(summary: Mapping[str, Any]) -> Markup:
-    versions = summary.get("versions") or {}
+    versions = dict(summary.get("versions") or {})
+    own = str(versions.pop("odscen", ""))
     made = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
-    return element("footer", f"Made by odscen{' with ' + made if made else ''}.")
+    return element("footer", f"Made by odscen {own}".strip() + (f" with {made}." if made else "."))

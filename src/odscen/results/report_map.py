@@ -169,7 +169,7 @@ def _path_layer(paths: Paths, actors: Sequence[ActorOutcome], dot: float) -> Mar
         name = paths.ids[k]
         title = element("title", f"{name} ({paths.categories[k]}) {status.get(name, '')}".strip())
         groups.setdefault(paths.categories[k], []).append(element("path", title, d=data))
-    width = round(dot * 5.0)
+    width = round(dot * 4.0)
     drawn = [
         element("g", *groups[key], class_=f"way c-{key}", stroke_width=width)
         for key in CATEGORIES

@@ -78,8 +78,10 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
     return report_section("Expectations", table, explained=explained, ident="expectations")
 
 
-def event_list(events: Sequence[Event], actors: Sequence[ActorOutcome]) -> Markup:
-    """Everything unusual, in order of time, in words."""
+def event_list(
+    events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
+) -> Markup:
+    """Everything unusual, in order of time, in words; ``problems`` are known before the start."""
     told = [(event.time, _event(event)) for event in events if event.kind in EVENT_WORDS]
     told += [
         (actor.depart, _item(actor.depart, actor.id, *_NEVER))
@@ -87,14 +89,16 @@ def event_list(events: Sequence[Event], actors: Sequence[ActorOutcome]) -> Marku
         if actor.inserted is None
     ]
     told.sort(key=lambda pair: pair[0])
+    before = [element("li", element("time", "before"), text) for text in problems]
     explained = (
         "teleports, collisions and actors that could not start are listed here, because each is a "
         "place where the scenario, the map or the traffic is worth a second look."
     )
-    if not told:
+    if not told and not before:
         nothing = element("p", "Nothing unusual happened.", class_="good")
         return report_section("Events", nothing, explained=explained, ident="events")
-    listed = element("ol", *(item for _, item in told[:EVENT_LIMIT]), class_="events")
+    items = [*before[:EVENT_LIMIT], *(item for _, item in told[:EVENT_LIMIT])]
+    listed = element("ol", *items, class_="events")
     more = None
     if len(told) > EVENT_LIMIT:
         text = f"{len(told) - EVENT_LIMIT:,} more are in events.json and actors.json."
