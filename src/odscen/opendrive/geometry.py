@@ -83,12 +83,22 @@ class PlanView:
         )
 
     def at(self, road: IntArray, s: FloatArray) -> PlanPoints:
-        """Points at ``s`` of each road; beyond its ends a road goes on as its last shape does."""
+        """Points at ``s`` of each road; beyond its ends a road goes on straight."""
         row = locate(self.s, self.first, road, s)
         return self.at_rows(row, s - self.s[row])
 
     def at_rows(self, row: IntArray, ds: FloatArray) -> PlanPoints:
-        """Points ``ds`` metres behind the start of each geometry."""
+        """Points ``ds`` metres behind the start of each geometry; beyond its ends straight on."""
+        inside = np.minimum(np.maximum(ds, 0.0), self.length[row])
+        points = self._inside(row, inside)
+        over = ds - inside
+        if not over.any():
+            return points
+        x = points.x + over * np.cos(points.hdg)
+        y = points.y + over * np.sin(points.hdg)
+        return points._replace(x=x, y=y)
+
+    def _inside(self, row: IntArray, ds: FloatArray) -> PlanPoints:
         hdg = self.hdg[row]
         curvature = self.curvature[row]
         change = self.change[row]
@@ -194,6 +204,13 @@ class CubicCurves:
         lengths = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(pieces, axis=1)], axis=1)
         stretch = np.where(is_param, lengths[:, -1] / p_end, 1.0)
         return cls(coefficients, p_end, lengths, stretch)
+
+    def start_heading(self, row: IntArray, hdg: FloatArray) -> FloatArray:
+        """``hdg`` turned by the slope at p = 0 where ``row`` names a curve (is not -1)."""
+        if not self.p_end.size:
+            return hdg
+        slope = np.arctan2(self.coefficients[row, 1, 1], self.coefficients[row, 0, 1])
+        return np.where(row >= 0, hdg + slope, hdg)
 
     def parameter(self, row: IntArray, ds: FloatArray) -> FloatArray:
         """p at ``ds`` metres of s: the inverse of the arc length by p."""

@@ -187,9 +187,13 @@ class RoadTable:
 
     # ------------------------------------------------------------------------- reference line
     def reference(self, road: IntArray, s: FloatArray) -> ReferencePoints:
-        """Points of the reference line of each road (row) at s."""
+        """Points of the reference line of each road (row) at s.
+
+        Beyond the ends of a road it goes on straight, with the height and roll of its end.
+        """
         road, s = np.asarray(road), np.asarray(s, dtype=np.float64)
         plan = self.plan.at(road, s)
+        s = np.minimum(np.maximum(s, 0.0), self.road_length[road])
         z, slope, _ = self.elevation.at(road, s)
         roll, _, _ = self.superelevation.at(road, s)
         return ReferencePoints(plan.x, plan.y, z, plan.hdg, plan.curvature, np.arctan(slope), roll)

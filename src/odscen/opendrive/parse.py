@@ -7,14 +7,16 @@ The parser refuses what it does not understand and never invents: each tolerance
 
 from __future__ import annotations
 
+import re
 from contextlib import nullcontext
 from typing import Final, TypeVar
 
 from odscen.errors import in_file
-from odscen.ids import RoadId
-from odscen.opendrive.model import Controller, Header, OpenDrive, Road
-from odscen.opendrive.parse_checks import check_geometry, check_references
+from odscen.ids import JunctionId, RoadId
+from odscen.opendrive.model import Controller, Header, Junction, OpenDrive, Road
+from odscen.opendrive.parse_checks import check_numbers
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
+from odscen.opendrive.parse_references import check_references
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
 from odscen.opendrive.parse_xml import (
@@ -31,6 +33,7 @@ from odscen.opendrive.parse_xml import (
 
 READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
+_CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
 K = TypeVar("K")
 V = TypeVar("V")
 
@@ -76,7 +79,7 @@ def _parse_root(root: Element) -> OpenDrive:
         _add(roads, road.id, road, element)
     if not roads:
         raise refusal(root, "there is no <road>")
-    junctions = {}
+    junctions: dict[JunctionId, Junction] = {}
     for element in groups.get("junction", ()):
         junction = parse_junction(element, notes)
         _add(junctions, junction.id, junction, element)
@@ -84,8 +87,8 @@ def _parse_root(root: Element) -> OpenDrive:
     for element in groups.get("controller", ()):
         controller = parse_controller(element, notes)
         _add(controllers, controller.id, controller, element)
-    check_geometry(roads, notes)
-    roads, junctions = check_references(roads, junctions, controllers, notes)
+    check_numbers(roads, notes)
+    roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
     return OpenDrive(header, roads, junctions, controllers, notes.sentences())
 
 
@@ -132,6 +135,11 @@ def _offset(element: Element | None) -> tuple[float, float, float, float]:
 def _crs(text: str, element: Element, notes: Notes) -> str | None:
     """WKT of a geoReference, if pyproj understands it."""
     if not text:
+        return None
+    if not _CRS_TEXT.search(text):
+        # pyproj would search its whole database for a name like this, for a fifth of a second.
+        detail = f"geoReference {shown(text)} names no projection; kept as text"
+        notes.add(Rule.GEO_REFERENCE, element, detail)
         return None
     import pyproj
 

@@ -28,12 +28,16 @@ class Rule(StrEnum):
     """Lengths of geometries and the next s may disagree by up to a metre: s decides."""
     PLAN_VIEW_GAP = "plan-view-gap"
     """Successive geometries may miss each other by up to 10 m; positions stay as written."""
+    CURVE_LENGTH = "curve-length"
+    """A paramPoly3 may be up to twice or half as long as its ``length``; it is run through evenly."""
     ZERO_LENGTH = "zero-length"
     """Geometries and lane sections too short to hold a point have no effect."""
     LATE_START = "late-start"
     """A profile of the road that starts after s = 0 is zero before."""
     SAME_S = "same-s"
     """Of two records at the same s the later one holds."""
+    JUMP = "jump"
+    """Elevations and lane widths may jump within a road or section; they do so in the model."""
     WIDTH_AND_BORDER = "width-and-border"
     """A lane with width and border records uses the widths (section 11.7)."""
     NO_WIDTH = "no-width"
@@ -70,6 +74,10 @@ MAX_COORDINATE: Final = 1e8
 """Metres from the origin."""
 MAX_TURNING: Final = 100.0
 """Radians that one geometry may turn through."""
+MAX_ELEVATION: Final = 1e5
+"""Metres above or below zero."""
+MAX_ROLL: Final = 1.5
+"""Radians of superelevation."""
 MAX_LANE_ID: Final = 1000
 """Absolute lane id."""
 MAX_WIDTH: Final = 1000.0
@@ -81,6 +89,12 @@ MAX_S_GAP: Final = 1.0
 """Metres by which s values of the plan view may disagree with a note (:attr:`Rule.PLAN_VIEW_S`)."""
 GAP_TOLERANCE: Final = 0.01
 """Metres between successive geometries without a note."""
+KINK_TOLERANCE: Final = 0.1
+"""Radians between the headings of successive geometries without a note."""
+JUMP_TOLERANCE: Final = 0.05
+"""Metres that elevations and widths may jump without a note."""
+CURVE_TOLERANCE: Final = 0.01
+"""Share by which the length of a paramPoly3 may be off without a note."""
 MAX_GAP: Final = 10.0
 """Metres between successive geometries with a note (:attr:`Rule.PLAN_VIEW_GAP`)."""
 WIDTH_TOLERANCE: Final = 1e-3

@@ -1,0 +1,191 @@
+"""References between elements: what leads nowhere is left out and noted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from odscen.ids import JunctionId, RoadId
+from odscen.opendrive.model import (
+    Connection,
+    Controller,
+    Junction,
+    LaneSection,
+    Road,
+    RoadLink,
+    SignalReference,
+)
+from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
+
+Roads = dict[RoadId, Road]
+Junctions = dict[JunctionId, Junction]
+
+
+def check_references(
+    roads: Roads, junctions: Junctions, controllers: dict[str, Controller], notes: Notes
+) -> tuple[Roads, Junctions, dict[str, Controller]]:
+    """Leave out references that lead nowhere, and note each.
+
+    Links of single lanes stay in the model as they are written; those that lead nowhere are noted
+    and :func:`~odscen.opendrive.topology.lane_successors` does not follow them.
+    """
+    signals = _signal_ids(roads, notes)
+    roads = {key: _road(road, roads, junctions, signals, notes) for key, road in roads.items()}
+    for road in roads.values():
+        _note_lane_links(road, roads, notes)
+        _note_places(road, notes)
+    junctions = {
+        key: _junction(junction, roads, controllers, notes) for key, junction in junctions.items()
+    }
+    controllers = {
+        key: _controller(controller, signals, notes) for key, controller in controllers.items()
+    }
+    return roads, junctions, controllers
+
+
+def _signal_ids(roads: Roads, notes: Notes) -> set[str]:
+    """Ids of all signals; ids used twice are noted."""
+    seen: set[str] = set()
+    for road in roads.values():
+        for signal in road.signals:
+            if signal.id in seen:
+                place = f"road {road.id} > signal {signal.id}"
+                notes.add(Rule.DUPLICATE_ID, place, "another signal has the same id")
+            seen.add(signal.id)
+        objects: set[str] = set()
+        for obj in road.objects:
+            if obj.id in objects:
+                place = f"road {road.id} > object {obj.id}"
+                notes.add(Rule.DUPLICATE_ID, place, "another object of the road has the same id")
+            objects.add(obj.id)
+    return seen
+
+
+def _road(road: Road, roads: Roads, junctions: Junctions, signals: set[str], notes: Notes) -> Road:
+    """Return the road itself, or a copy without what leads nowhere."""
+    place = f"road {road.id}"
+    changes: dict[str, object] = {}
+    if road.junction is not None and road.junction not in junctions:
+        detail = f"there is no junction {road.junction!r}; the road is in no junction"
+        notes.add(Rule.DANGLING_LINK, place, detail)
+        changes["junction"] = None
+    for name in ("predecessor", "successor"):
+        link: RoadLink | None = getattr(road, name)
+        if link is None:
+            continue
+        known = roads if link.element_type == "road" else junctions
+        if link.element_id not in known:
+            detail = f"there is no {link.element_type} {link.element_id!r}; the link is left out"
+            notes.add(Rule.DANGLING_LINK, f"{place} > {name}", detail)
+            changes[name] = None
+    lost = [reference for reference in road.signal_references if reference.id not in signals]
+    if lost:
+        changes["signal_references"] = _without(road, lost, notes)
+    return replace(road, **changes) if changes else road  # type: ignore[arg-type]
+
+
+def _without(road: Road, lost: list[SignalReference], notes: Notes) -> tuple[SignalReference, ...]:
+    for reference in lost:
+        detail = f"there is no signal {reference.id!r}; the reference is left out"
+        notes.add(Rule.DANGLING_LINK, f"road {road.id} > signalReference", detail)
+    return tuple(reference for reference in road.signal_references if reference not in lost)
+
+
+def _next_section(
+    road: Road, number: int, link: RoadLink | None, roads: Roads, step: int
+) -> LaneSection | None:
+    """Section that lanes of section ``number`` lead to, forwards (step 1) or backwards (-1)."""
+    if 0 <= number + step < len(road.sections):
+        return road.sections[number + step]
+    if link is None or link.element_type != "road" or link.contact_point is None:
+        return None
+    target = roads[RoadId(link.element_id)]
+    return target.sections[0 if link.contact_point == "start" else -1]
+
+
+def _note_lane_links(road: Road, roads: Roads, notes: Notes) -> None:
+    for number, section in enumerate(road.sections):
+        ahead = _next_section(road, number, road.successor, roads, 1)
+        behind = _next_section(road, number, road.predecessor, roads, -1)
+        for lane in section.lanes.values():
+            for name, ids, target in (
+                ("successor", lane.successors, ahead),
+                ("predecessor", lane.predecessors, behind),
+            ):
+                for lane_id in ids:
+                    if target is not None and lane_id not in target.lanes:
+                        place = f"road {road.id} > laneSection {number} > lane {lane.id} > {name}"
+                        detail = f"there is no lane {lane_id} there; the link is not followed"
+                        notes.add(Rule.DANGLING_LINK, place, detail)
+
+
+def _note_places(road: Road, notes: Notes) -> None:
+    things: Iterable[tuple[str, str, float]] = (
+        *(("object", item.id, item.s) for item in road.objects),
+        *(("signal", item.id, item.s) for item in road.signals),
+        *(("signalReference", item.id, item.s) for item in road.signal_references),
+    )
+    for tag, item_id, s in things:
+        if not -S_TOLERANCE <= s <= road.length + S_TOLERANCE:
+            place = f"road {road.id} > {tag} {item_id}"
+            detail = f"s={s:.6g} is outside the road of {road.length:.6g} m"
+            notes.add(Rule.OUTSIDE_ROAD, place, detail)
+
+
+def _junction(
+    junction: Junction, roads: Roads, controllers: dict[str, Controller], notes: Notes
+) -> Junction:
+    """Return the junction itself, or a copy without what leads nowhere."""
+    place = f"junction {junction.id}"
+    connections = tuple(_connections(junction, roads, notes))
+    kept_controllers = tuple(key for key in junction.controllers if key in controllers)
+    for key in junction.controllers:
+        if key not in controllers:
+            detail = f"there is no controller {key!r}; the reference is left out"
+            notes.add(Rule.DANGLING_LINK, place, detail)
+    priorities = tuple(p for p in junction.priorities if p.high in roads and p.low in roads)
+    if len(priorities) != len(junction.priorities):
+        lost = len(junction.priorities) - len(priorities)
+        detail = f"{lost} priorities name roads that do not exist; they are left out"
+        notes.add(Rule.DANGLING_LINK, place, detail)
+    return replace(
+        junction, connections=connections, controllers=kept_controllers, priorities=priorities
+    )
+
+
+def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Connection]:
+    for connection in junction.connections:
+        place = f"junction {junction.id} > connection {connection.id}"
+        ends = (connection.incoming_road, connection.connecting_road)
+        missing = [road_id for road_id in ends if road_id not in roads]
+        if missing:
+            detail = f"there is no road {missing[0]!r}; the connection is left out"
+            notes.add(Rule.DANGLING_LINK, place, detail)
+            continue
+        incoming, connecting = (roads[road_id] for road_id in ends)
+        contact = 0 if connection.contact_point == "start" else -1
+        there = connecting.sections[contact].lanes
+        here = incoming.sections[0].lanes.keys() | incoming.sections[-1].lanes.keys()
+        links = tuple(
+            link for link in connection.lane_links if link[0] in here and link[1] in there
+        )
+        for link in connection.lane_links:
+            if link not in links:
+                detail = f"there is no lane {link[0]} or no lane {link[1]}; the link is left out"
+                notes.add(Rule.DANGLING_LINK, place, detail)
+        yield (
+            connection
+            if len(links) == len(connection.lane_links)
+            else connection._replace(lane_links=links)
+        )
+
+
+def _controller(controller: Controller, signals: set[str], notes: Notes) -> Controller:
+    lost = [control for control in controller.controls if control[0] not in signals]
+    for signal_id, _ in lost:
+        detail = f"there is no signal {signal_id!r}; the control is left out"
+        notes.add(Rule.DANGLING_LINK, f"controller {controller.id}", detail)
+    if not lost:
+        return controller
+    controls = tuple(control for control in controller.controls if control not in lost)
+    return replace(controller, controls=controls)
