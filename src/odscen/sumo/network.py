@@ -159,23 +159,22 @@ class RoadNet:
         Internal lanes come first, in order; ``None`` if ``lane`` has no link to that edge.
         """
         for link in self.links_from.get(lane, ()):
-            if self.lanes[link.target].edge != next_edge:
-                continue
-            passed: list[NetLane] = []
-            via = link.via
-            while via is not None:
-                passed.append(self.lanes[via])
-                onwards = self.links_from.get(via, ())
-                via = onwards[0].via if onwards else None
-            return (*passed, self.lanes[link.target])
+            if self.lanes[link.target].edge == next_edge:
+                via = link.via
+                return (self.lanes[via], *self.leaving(via)) if via else (self.lanes[link.target],)
         return None
 
-    def exit_of(self, internal: str) -> NetLane | None:
-        """Return the normal lane that an internal lane leads to."""
-        lane = self.lanes.get(internal)
-        for _ in range(8):  # internal junctions chain a few lanes at most
-            if lane is None or not lane.internal:
-                return lane
+    def leaving(self, internal: str) -> tuple[NetLane, ...]:
+        """Return the lanes after an internal lane, up to the normal lane that it leads to.
+
+        Empty for a lane that leads nowhere, and for a normal lane.
+        """
+        passed: list[NetLane] = []
+        lane = self.lanes[internal]
+        while lane.internal:
             onwards = self.links_from.get(lane.id, ())
-            lane = self.lanes.get(onwards[0].via or onwards[0].target) if onwards else None
-        return None
+            if not onwards or lane in passed:
+                return ()
+            lane = self.lanes[onwards[0].via or onwards[0].target]
+            passed.append(lane)
+        return tuple(passed)

@@ -127,11 +127,7 @@ class RoutePlanner:
                 edges.append(lane.edge)
         if edges:
             return edges
-        exit_lane = self._net.exit_of(self._places.lanes[int(rows[0])])
-        if exit_lane is None:
-            msg = "the way never leaves the junction it starts in"
-            raise NoRouteError(msg)
-        return [exit_lane.edge]
+        return [self._leaving(self._net.lanes[self._places.lanes[int(rows[0])]])[-1].edge]
 
     def _admits(self, lane: NetLane, vclass: str) -> bool:
         return any(other.allows(vclass) for other in self._net.edge_lanes[lane.edge])
@@ -161,7 +157,28 @@ class RoutePlanner:
             msg = "the SUMO network has no lane at the spawn"
             raise NoRouteError(msg)
         lane = self._net.lanes[place[0]]
-        return (edges if lane.edge == edges[0] else (lane.edge, *edges)), lane, place[1]
+        if lane.internal:
+            return self._from_inside(lane, edges, vclass), lane, place[1]
+        if lane.edge == edges[0]:
+            return edges, lane, place[1]
+        msg = f"the SUMO network has no way from lane {lane.id} for {vclass}"
+        raise NoRouteError(msg)
+
+    def _from_inside(self, lane: NetLane, edges: tuple[str, ...], vclass: str) -> tuple[str, ...]:
+        """Put the internal edges before ``edges`` that lead there from an internal lane."""
+        leaving = self._leaving(lane)
+        way = self._net.way(leaving[-1].edge, edges[0], vclass)
+        if way is None:
+            msg = f"the SUMO network has no way for {vclass} from {lane.id} to edge {edges[0]}"
+            raise NoRouteError(msg)
+        return (lane.edge, *(passed.edge for passed in leaving[:-1]), *way, *edges[1:])
+
+    def _leaving(self, lane: NetLane) -> tuple[NetLane, ...]:
+        leaving = self._net.leaving(lane.id)
+        if not leaving:
+            msg = f"lane {lane.id} of the SUMO network leads nowhere"
+            raise NoRouteError(msg)
+        return leaving
 
     def _front(
         self, edges: tuple[str, ...], start: NetLane, pos: float
@@ -169,15 +186,20 @@ class RoutePlanner:
         """Follow the route from ``start`` to ``pos``: the edges left, the lane, and where on it."""
         lane = start
         while pos > lane.length:
-            if len(edges) < 2:
-                return edges, lane, lane.length
-            passage = self._net.passage(lane.id, edges[1])
-            if passage is None:  # another lane of the edge goes there; it changes lanes at its end
+            passage = self._next(lane, edges)
+            if not passage:  # another lane of the edge goes there; it changes lanes at its end
                 return edges, lane, lane.length
             pos -= lane.length
             lane = passage[0]
-            edges = (lane.edge, *edges[1:]) if lane.internal else edges[1:]
+            inside = tuple(passed.edge for passed in passage[:-1])
+            edges = (*inside, *edges[edges.index(passage[-1].edge) :])
         return edges, lane, max(pos, 0.0)
+
+    def _next(self, lane: NetLane, edges: tuple[str, ...]) -> tuple[NetLane, ...]:
+        """Return the lanes from the next one on to the next normal one, on the route."""
+        if lane.internal:
+            return self._net.leaving(lane.id)
+        return (self._net.passage(lane.id, edges[1]) if len(edges) > 1 else None) or ()
 
     def _arrival(
         self, edges: tuple[str, ...], path: IntArray, vclass: str, length: float
@@ -194,10 +216,9 @@ class RoutePlanner:
         if lane.edge == edges[-1] and not lane.internal:
             index = lane.index if lane.allows(vclass) else None
             return edges, index, min(place[1] + length / 2.0, lane.length)
-        if lane.internal:
-            leaving = self._net.exit_of(lane.id)
-            if leaving is not None and leaving.edge in self._net.followers(edges[-1], vclass):
-                return (*edges, leaving.edge), None, min(1.0, leaving.length)
+        leaving = self._net.leaving(lane.id)[-1:]
+        if leaving and leaving[0].edge in self._net.followers(edges[-1], vclass):
+            return (*edges, leaving[0].edge), None, min(1.0, leaving[0].length)
         return edges, None, last[0].length
 
 

@@ -59,7 +59,7 @@ class Session:
     def __init__(self, sumo: Any) -> None:
         self._sumo = sumo
         self._simulation = sumo.simulation
-        self._errors = (sumo.TraCIException, RuntimeError)
+        self._errors = sumo_errors(sumo)
 
     @property
     def time(self) -> float:
@@ -152,7 +152,7 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
         msg = "a simulation is running in this process already; libsumo holds only one"
         raise SimulationError(msg)
     sumo = import_libsumo()
-    errors = (sumo.TraCIException, RuntimeError)
+    errors = sumo_errors(sumo)
     try:
         sumo.start(["sumo", *arguments])
     except errors as error:  # libsumo has closed by itself; closing again would crash
@@ -173,6 +173,11 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
             raise SimulationError(msg) from error
     finally:
         _open = False
+
+
+def sumo_errors(sumo: Any) -> tuple[type[Exception], ...]:
+    """Exceptions that libsumo raises; the two of its own have no common base."""
+    return sumo.TraCIException, sumo.FatalTraCIError, RuntimeError
 
 
 def import_libsumo() -> Any:
