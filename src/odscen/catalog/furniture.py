@@ -22,6 +22,9 @@ FloatArray = NDArray[np.float64]
 BAR, GAP = 0.5, 0.5
 """Metres painted and left out along the way across a crosswalk."""
 
+_MOST_BARS = 200
+"""Per crosswalk: one of hundreds of metres is a mistake in the map, not a reason to stall."""
+
 MPH = 0.44704
 
 
@@ -71,17 +74,16 @@ def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
     import shapely
 
     boxes, owners = [], []
-    for index, (_polygon, axis) in enumerate(walks):
-        start, along = axis[0], axis[1] - axis[0]
-        length = float(np.hypot(*along))
-        if length < BAR:
-            continue
-        along = along / length
+    for index, (polygon, axis) in enumerate(walks):
+        along = (axis[1] - axis[0]) / max(float(np.hypot(*(axis[1] - axis[0]))), 1e-9)
         side = np.array([-along[1], along[0]]) * 60.0
+        # The whole outline, not the axis: a slanted crosswalk reaches farther at one edge.
+        reach = (polygon - axis[0]) @ along
+        length = float(np.ptp(reach))
         n = int((length - BAR) // (BAR + GAP)) + 1
-        first = (length - (n * (BAR + GAP) - GAP)) / 2.0
-        for k in range(n):
-            low = start + along * (first + k * (BAR + GAP))
+        first = float(reach.min()) + (length - (n * (BAR + GAP) - GAP)) / 2.0
+        for k in range(min(n, _MOST_BARS)):
+            low = axis[0] + along * (first + k * (BAR + GAP))
             high = low + along * BAR
             boxes.append([low - side, high - side, high + side, low + side])
             owners.append(index)

@@ -16,7 +16,7 @@ from odscen.catalog.drawing import BRIDGE
 from odscen.catalog.markup import Markup, element, join, number, path_data
 
 if TYPE_CHECKING:
-    from odscen.catalog.drawing import Lines, MapDrawing, Symbol
+    from odscen.catalog.drawing import Bounds, Lines, MapDrawing, Symbol
     from odscen.lanegraph.model import MapGraph
 
 FloatArray = NDArray[np.float64]
@@ -282,25 +282,40 @@ def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
     return element("g", use, transform=f"{place} scale({scale})")
 
 
-def graph_layers(graph: MapGraph, *, node_size: float = 0.35) -> Markup:
+def graph_layers(
+    graph: MapGraph, *, node_size: float = 0.35, bounds: Bounds | None = None
+) -> Markup:
     """Lane graph and pedestrian graph in the colours of requirement R22.
 
     Parameters
     ----------
     node_size
         Radius of a node in metres.
+    bounds
+        Rectangle in metres; what does not touch it is left out.
     """
     lanes, walks = graph.lanes, graph.walks
     parts = []
     places = np.stack([lanes.x, lanes.y], axis=1)
+    shown = _inside(places, bounds)
+    edge_shown = shown[lanes.source] | shown[lanes.target]
     for relation, color in enumerate(RELATION_COLORS):
-        rows = np.flatnonzero(lanes.relation == relation)
+        rows = np.flatnonzero(edge_shown & (lanes.relation == relation))
         parts.append(_edges(places, lanes.source[rows], lanes.target[rows], color, node_size))
     walk_places = np.stack([walks.x, walks.y], axis=1)
-    parts.append(_edges(walk_places, walks.source, walks.target, "#b39700", node_size))
-    parts.append(_dots(places, VEHICLE_NODE_COLOR, node_size))
-    parts.append(_dots(walk_places, PEDESTRIAN_NODE_COLOR, node_size))
+    walk_shown = _inside(walk_places, bounds)
+    rows = np.flatnonzero(walk_shown[walks.source] | walk_shown[walks.target])
+    parts.append(_edges(walk_places, walks.source[rows], walks.target[rows], "#b39700", node_size))
+    parts.append(_dots(places[shown], VEHICLE_NODE_COLOR, node_size))
+    parts.append(_dots(walk_places[walk_shown], PEDESTRIAN_NODE_COLOR, node_size))
     return element("g", *parts, class_="m-graph", fill="none", stroke_linecap="round")
+
+
+def _inside(places: FloatArray, bounds: Bounds | None) -> NDArray[np.bool_]:
+    if bounds is None:
+        return np.ones(len(places), dtype=np.bool_)
+    inside: NDArray[np.bool_] = np.all((places >= bounds[:2]) & (places <= bounds[2:]), axis=1)
+    return inside
 
 
 def segment_layer(graph: MapGraph, *, width: float) -> Markup:

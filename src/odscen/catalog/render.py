@@ -188,7 +188,8 @@ def _inside(
     if graph is not None and options.segments:
         parts.append(segment_layer(graph, width=max(2.5, 5.0 / frame.scale)))
     if graph is not None and options.graph:
-        parts.append(graph_layers(graph, node_size=min(max(1.4 / frame.scale, 0.3), 0.7)))
+        size = min(max(1.4 / frame.scale, 0.3), 0.7)
+        parts.append(graph_layers(graph, node_size=size, bounds=frame.bounds))
     if options.symbols:
         only = replace(drawing, areas=(), marks=())
         parts.append(map_layers(only, replace(layer_options, symbols=True, ground=False)))

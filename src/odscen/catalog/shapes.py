@@ -34,7 +34,7 @@ _STEP_STRAIGHT, _STEP_CURVED, _STEP_JUNCTION = 2.0, 1.0, 0.5
 _SHORTEST = 0.05
 """Metres below which a plan-view geometry is an editor's leftover."""
 
-_CLEARANCE = 3.0
+_CLEARANCE = 2.5
 """Metres of height between two lanes in the same place that make one of them a bridge."""
 
 AREA_KINDS = {
