@@ -24,19 +24,13 @@ CROSSING = "crossing"
 WALKING_AREA = "walkingarea"
 
 
-class Permission(NamedTuple):
-    """``allow`` and ``disallow`` of a lane as sets of vClasses; ``None`` where it is not given."""
-
-    allow: frozenset[str] | None
-    disallow: frozenset[str] | None
-
-    def allows(self, vclass: str) -> bool:
-        """Whether ``vclass`` may use the lane; without both attributes everybody may."""
-        if self.allow is not None:
-            return vclass in self.allow or "all" in self.allow
-        if self.disallow is not None:
-            return vclass not in self.disallow and "all" not in self.disallow
-        return True
+VCLASSES = frozenset(
+    {"private", "emergency", "authority", "army", "vip", "pedestrian", "passenger", "hov", "taxi"}
+    | {"bus", "coach", "delivery", "truck", "trailer", "motorcycle", "moped", "bicycle", "evehicle"}
+    | {"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "ship", "container", "cable_car"}
+    | {"subway", "aircraft", "wheelchair", "scooter", "drone", "custom1", "custom2"}
+)
+"""SUMO's vehicle classes (sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +43,8 @@ class NetLane:
         0 is the outermost lane (the rightmost in right-hand traffic).
     length
         ``length`` of the file, metres: what SUMO's positions run to, whatever the shape measures.
+    allowed
+        Vehicle classes that may use the lane; ``None`` for all.
     shape
         Shape ``(K, 3)``, metres, OpenDRIVE frame (``netOffset`` taken away); z is 0 in flat nets.
     """
@@ -59,8 +55,12 @@ class NetLane:
     length: float
     speed: float
     width: float
-    permission: Permission
+    allowed: frozenset[str] | None
     shape: FloatArray
+
+    def allows(self, vclass: str) -> bool:
+        """Whether vehicles of a class may use the lane."""
+        return self.allowed is None or vclass in self.allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +183,15 @@ def _text(element: etree._Element, name: str) -> str:
     return value
 
 
-def _classes(text: str | None) -> frozenset[str] | None:
-    return None if text is None else frozenset(text.split())
+def _allowed(allow: str | None, disallow: str | None) -> frozenset[str] | None:
+    """Vehicle classes by the attributes ``allow`` and ``disallow``; without both everybody."""
+    if allow is not None:
+        classes = frozenset(allow.split())
+        return None if "all" in classes else classes
+    if disallow is not None:
+        classes = frozenset(disallow.split())
+        return frozenset() if "all" in classes else VCLASSES - classes
+    return None
 
 
 def _edges(
@@ -205,12 +212,12 @@ def _edges(
             tuple(SumoEdgeId(crossed) for crossed in element.get("crossingEdges", "").split()),
         )
     shapes = _shapes([_text(lane, "shape") for _, lane in elements], offset)
-    permissions: dict[tuple[str | None, str | None], Permission] = {}
+    permissions: dict[tuple[str | None, str | None], frozenset[str] | None] = {}
     lanes: dict[SumoLaneId, NetLane] = {}
     for (edge_id, lane), shape in zip(elements, shapes, strict=True):
         given = (lane.get("allow"), lane.get("disallow"))
         if given not in permissions:
-            permissions[given] = Permission(*(_classes(text) for text in given))
+            permissions[given] = _allowed(*given)
         lane_id = SumoLaneId(_text(lane, "id"))
         lanes[lane_id] = NetLane(
             lane_id,
@@ -227,6 +234,7 @@ def _edges(
 
 def _shapes(texts: list[str], offset: tuple[float, float]) -> list[FloatArray]:
     """Shapes from their texts, all numbers in one go: a town has some 100,000 of them."""
+    texts = [_even(text) for text in texts]
     counts = [text.count(" ") + 1 for text in texts]
     widths = [text.count(",") // count + 1 for text, count in zip(texts, counts, strict=True)]
     numbers = np.fromstring(" ".join(texts).replace(",", " "), sep=" ", dtype=np.float64)
@@ -239,6 +247,13 @@ def _shapes(texts: list[str], offset: tuple[float, float]) -> list[FloatArray]:
         shapes.append(shape)
         start += count * width
     return shapes
+
+
+def _even(text: str) -> str:
+    """Write out heights of zero, which SUMO leaves out even within a shape."""
+    if text.count(",") % (text.count(" ") + 1) == 0:
+        return text
+    return " ".join(f"{p},0" if p.count(",") == 1 else p for p in text.split(" "))
 
 
 def _connections(root: etree._Element, edges: dict[SumoEdgeId, NetEdge]) -> list[NetConnection]:

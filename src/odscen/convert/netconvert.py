@@ -14,10 +14,10 @@ import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.errors import MissingDependencyError, NetconvertError
+from odscen.errors import InputError, MissingDependencyError, NetconvertError, WorkspaceError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 _HEADER = re.compile(rb"<!-- generated on .*?-->\s*", re.DOTALL)
 """netconvert's comment with date and command line; the same input must give the same bytes."""
@@ -60,6 +60,37 @@ def sumo_home() -> Path | None:
     except ImportError:
         return None
     return Path(str(sumo.SUMO_HOME))
+
+
+def read_map(path: Path) -> bytes:
+    """Read an OpenDRIVE file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(error.strerror or str(error), file=str(path)) from error
+
+
+def stage(folder: Path, files: Mapping[str, bytes]) -> Path:
+    """Write netconvert's input files into an existing folder and return the folder.
+
+    Raises
+    ------
+    WorkspaceError
+        If that fails.
+    """
+    try:
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
+    except OSError as error:
+        msg = f"{folder}: {error.strerror or error}"
+        raise WorkspaceError(msg) from error
+    return folder
 
 
 def run_netconvert(

@@ -1,0 +1,148 @@
+"""Internal SUMO lanes found on OpenDRIVE lanes, by what they connect.
+
+netconvert draws its own curves through junctions, and lanes of different movements lie on top of
+each other at junction mouths, so geometry does not tell them apart. But the lanes before and after
+are known: the way between them through the OpenDRIVE lanes is what the internal lanes stand for.
+Both are divided in proportion to length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.convert.pieces import Piece
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from odscen.convert.net import Net
+    from odscen.convert.sampling import LaneSamples
+    from odscen.ids import SumoLaneId
+
+FloatArray = NDArray[np.float64]
+
+LONGEST = 400.0
+"""Metres: a way through a junction is not longer than this."""
+MOST_LANES = 60
+
+
+class Place(NamedTuple):
+    """A place on an OpenDRIVE lane; ``lane`` is a position in ``LaneSamples.rows``."""
+
+    lane: int
+    s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Internal lanes that one after the other connect two normal lanes."""
+
+    before: SumoLaneId
+    via: tuple[SumoLaneId, ...]
+    after: SumoLaneId
+
+
+def chains_of(net: Net) -> list[Chain]:
+    """Return one chain for each connection between normal lanes that has internal lanes."""
+    onwards: dict[SumoLaneId, SumoLaneId] = {}
+    starts = []
+    for connection in net.connections:
+        inside = net.edges[net.lanes[connection.from_lane].edge].function
+        if inside == "internal":
+            onwards[connection.from_lane] = connection.via
+        elif inside == "normal" and connection.via:
+            starts.append(connection)
+    found = []
+    for connection in starts:
+        via = [connection.via]
+        while onwards.get(via[-1]) and onwards[via[-1]] not in via:
+            via.append(onwards[via[-1]])
+        found.append(Chain(connection.from_lane, tuple(via), connection.to_lane))
+    return found
+
+
+class Stretch(NamedTuple):
+    """A part of an OpenDRIVE lane in driving direction; ``start`` and ``end`` in metres of arc."""
+
+    lane: int
+    start: float
+    end: float
+
+
+def shortest_way(
+    start: Place,
+    end: Place,
+    successors: Mapping[int, Sequence[int]],
+    lanes: LaneSamples,
+) -> tuple[Stretch, ...] | None:
+    """Return the shortest way between two places through successors, or ``None``.
+
+    Parameters
+    ----------
+    successors
+        Lanes after each lane, as positions in ``LaneSamples.rows``.
+    """
+    here, there = lanes.arc_at(start.lane, start.s), lanes.arc_at(end.lane, end.s)
+    if start.lane == end.lane and there > here:
+        return (Stretch(start.lane, here, there),)
+    best: tuple[float, tuple[int, ...]] | None = None
+    open_ways: list[tuple[float, tuple[int, ...]]] = [
+        (lanes.length(start.lane) - here, (start.lane,))
+    ]
+    tried = 0
+    while open_ways and tried < 10 * MOST_LANES:
+        tried += 1
+        length, way = open_ways.pop()
+        for lane in successors.get(way[-1], ()):
+            if lane == end.lane:
+                if best is None or (length + there, way) < best:
+                    best = (length + there, way)
+            elif lane not in way and len(way) < MOST_LANES:
+                further = length + lanes.length(lane)
+                if further <= LONGEST:
+                    open_ways.append((further, (*way, lane)))
+    if best is None:
+        return None
+    inner = tuple(Stretch(lane, 0.0, lanes.length(lane)) for lane in best[1][1:])
+    first = Stretch(start.lane, here, lanes.length(start.lane))
+    return (first, *inner, Stretch(end.lane, 0.0, there))
+
+
+class InternalLane(NamedTuple):
+    """An internal lane: its row, and its length by shape and by attribute, metres."""
+
+    row: int
+    drawn: float
+    length: float
+
+
+def chain_pieces(
+    way: Iterable[Stretch], via: Sequence[InternalLane], lanes: LaneSamples, *, step: float
+) -> list[Piece]:
+    """Divide a way among internal lanes in proportion; deviations are still to be measured.
+
+    Pieces end where an OpenDRIVE lane or an internal lane ends.
+    """
+    stretches = [part for part in way if part.end - part.start > 1e-6]
+    drawn = np.concatenate(([0.0], np.cumsum([lane.drawn for lane in via])))
+    walked = np.concatenate(([0.0], np.cumsum([part.end - part.start for part in stretches])))
+    if drawn[-1] <= 1e-6 or walked[-1] <= 1e-6:
+        return []
+    borders = drawn * (walked[-1] / drawn[-1])
+    pieces: list[Piece] = []
+    for index, part in enumerate(stretches):
+        for other, lane in enumerate(via):
+            low = max(walked[index], borders[other])
+            high = min(walked[index + 1], borders[other + 1])
+            if high - low < 1e-4:
+                continue
+            arc = np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))
+            share = (arc - borders[other]) / (borders[other + 1] - borders[other])
+            s = lanes.s_at(part.lane, arc - walked[index] + part.start)
+            row = int(lanes.rows[part.lane])
+            pieces.append(Piece(row, lane.row, share * lane.length, s, np.zeros(len(s))))
+    return pieces
