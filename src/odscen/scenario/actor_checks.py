@@ -11,7 +11,7 @@ from odscen.scenario.problems import Problem, error, warning
 from odscen.scenario.region import Place, Region, on_foot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from odscen.scenario.document import Actor, Flow, Scenario
 
@@ -35,6 +35,9 @@ SPEED_MIN = {
 
 class Assets(Protocol):
     """What checks ask of an asset catalogue."""
+
+    def weather(self, preset: str) -> Mapping[str, float] | None:
+        """Parameters of a weather preset, ``None`` if there is no such preset."""
 
     def category_of(self, model: str) -> Category | None:
         """Category of a model, ``None`` if there is no such model."""

@@ -47,6 +47,7 @@ def check(scenario: Scenario, graph: MapGraph, assets: Assets | None = None) -> 
     region = Region.of(graph, scenario.roi)
     found += roi_problems(scenario, graph)
     found += _document_problems(scenario)
+    found += _environment_problems(scenario, assets)
     for index in range(len(scenario.actors)):
         found += actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):
@@ -117,6 +118,21 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
         yield warning(
             "no_actors", "actors", "there are neither actors nor flows; nothing will move"
         )
+
+
+def _environment_problems(scenario: Scenario, assets: Assets | None) -> Iterator[Problem]:
+    if assets is None:
+        return
+    environment = scenario.environment
+    parameters = assets.weather(environment.preset)
+    if parameters is None:
+        message = f"there is no weather preset {environment.preset!r}; pick one of the catalogue"
+        yield error("unknown_preset", "environment.preset", message)
+        return
+    for name in environment.parameters:
+        if name not in parameters:
+            message = f"weather has no parameter {name!r}; there are {', '.join(parameters)}"
+            yield error("unknown_parameter", f"environment.parameters.{name}", message)
 
 
 def map_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:

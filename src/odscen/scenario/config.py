@@ -52,10 +52,21 @@ class RoiSize(Part):
     segments: Distribution = Uniform(low=4, high=16)
 
 
+def _default_presets() -> dict[str, float]:
+    return {
+        "ClearNoon": 4.0,
+        "CloudyNoon": 2.0,
+        "WetNoon": 1.0,
+        "SoftRainNoon": 1.0,
+        "ClearSunset": 1.0,
+        "ClearNight": 1.0,
+    }
+
+
 class EnvironmentShares(Part):
     """Presets by share, and single parameters that are drawn on top."""
 
-    presets: dict[Label, Share] = Field(default_factory=lambda: {"ClearNoon": 1.0}, min_length=1)
+    presets: dict[Label, Share] = Field(default_factory=_default_presets, min_length=1)
     parameters: dict[Label, Distribution] = Field(default_factory=dict)
 
     @field_validator("presets")

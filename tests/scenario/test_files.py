@@ -1,0 +1,139 @@
+import json
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from odscen.categories import Category
+from odscen.errors import ScenarioError
+from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario
+from odscen.scenario.files import dumps, loads, read_any, schema
+
+SCHEMA = Path(__file__).parents[2] / "docs" / "scenario.schema.json"
+MAP = MapReference(name="toy", sha256="0" * 64)
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+names = st.text(
+    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=20
+)
+labels = names.filter(lambda text: len(text) > 0 and "\ufffe" not in text and "\uffff" not in text)
+actors = st.builds(
+    Actor,
+    id=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True),
+    category=st.sampled_from(Category),
+    model=st.none() | labels,
+    spawn=labels,
+    goal=st.none() | labels,
+    speed=st.none() | st.floats(0, 100, exclude_min=True),
+    lateral_offset=st.floats(-10, 10),
+    depart=st.floats(0, 1e6),
+    style=st.sampled_from(["cautious", "normal", "sporty"]),
+    ego=st.booleans(),
+    crosses_anywhere=st.booleans(),
+    ignores_red=st.booleans(),
+)
+flows = st.builds(
+    Flow,
+    id=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True),
+    spawn=labels,
+    goal=st.none() | labels,
+    per_hour=st.floats(0, 20_000, exclude_min=True),
+    begin=st.floats(0, 1e6),
+    end=st.floats(0, 1e6),
+    mix=st.dictionaries(
+        st.sampled_from(Category), st.floats(0, 1e3, exclude_min=True), min_size=1, max_size=3
+    ),
+    speed=st.none() | st.floats(0, 100, exclude_min=True),
+)
+environments = st.builds(
+    Environment,
+    preset=labels,
+    parameters=st.dictionaries(labels, finite, max_size=3),
+    affects_driving=st.booleans(),
+)
+scenarios = st.builds(
+    Scenario,
+    name=labels,
+    description=names,
+    map=st.just(MAP),
+    seed=st.integers(0, 2**31 - 1),
+    roi=st.lists(labels, max_size=4).map(tuple),
+    environment=environments,
+    actors=st.lists(actors, max_size=4).map(tuple),
+    flows=st.lists(flows, max_size=3).map(tuple),
+)
+
+
+@given(scenarios)
+def test_a_document_reads_back_as_it_was_written(scenario: Scenario) -> None:
+    text = dumps(scenario)
+    assert loads(text) == scenario
+    assert dumps(loads(text)) == text
+    assert read_any(text.encode()) == scenario
+
+
+def test_each_actor_is_one_line_without_defaults() -> None:
+    actor = Actor(id="car-1", category=Category.CAR, spawn="1.0.-1.0", speed=12.5)
+    text = dumps(Scenario(name="one", map=MAP, roi=("r1",), actors=(actor,)))
+    line = '    {"id": "car-1", "category": "car", "spawn": "1.0.-1.0", "speed": 12.5}'
+    assert line in text.splitlines()
+
+
+def test_all_problems_are_reported_with_their_places() -> None:
+    document = {
+        "name": "x",
+        "map": {"name": "toy", "sha256": "0" * 64},
+        "roi": ["r1"],
+        "actors": [
+            {"id": "a", "category": "car", "spawn": "1.0.-1.0"},
+            {"id": "b", "category": "ship", "spawn": "1.0.-1.0", "speed": -1, "wings": 2},
+        ],
+    }
+    with pytest.raises(ScenarioError) as caught:
+        loads(json.dumps(document), file="x.json")
+    assert caught.value.file == "x.json"
+    places = [problem.split(":")[0] for problem in caught.value.problems]
+    assert places == ["actors[1].category", "actors[1].speed", "actors[1].wings"]
+    assert "-1" in caught.value.problems[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "EOF"),
+        ("{", "EOF"),
+        ("[]", "must be a JSON object"),
+        ('{"format": "something-else"}', "something-else"),
+        ('{"format": "odscen-scenario", "version": 99}', "newer odscen"),
+        ('{"name": "x", "map": 3, "roi": []}', "map"),
+        ("[" * 100_000, "recursion"),
+    ],
+)
+def test_what_is_not_a_scenario_says_so(text: str, reason: str) -> None:
+    with pytest.raises(ScenarioError, match=r"(?s).*") as caught:
+        read_any(text)
+    assert reason in str(caught.value)
+
+
+def test_bytes_that_are_not_text_are_refused() -> None:
+    with pytest.raises(ScenarioError, match="byte 1 is not UTF-8"):
+        read_any(b"{\xff")
+
+
+def test_numbers_in_quotes_are_not_numbers() -> None:
+    with pytest.raises(ScenarioError, match="seed"):
+        loads(
+            '{"name": "x", "map": {"name": "t", "sha256": "'
+            + "0" * 64
+            + '"}, "roi": [], "seed": "3"}'
+        )
+
+
+@pytest.mark.golden
+def test_the_published_schema_is_that_of_the_code() -> None:
+    text = json.dumps(schema(), indent=2) + "\n"
+    if os.environ.get("ODSCEN_GOLDEN") == "write":
+        SCHEMA.write_text(text, encoding="utf-8")
+    assert SCHEMA.read_text(encoding="utf-8") == text
