@@ -120,9 +120,9 @@ def render_drawing(
         A whole SVG document.
     """
     options = options or RenderOptions()
+    frame = _Frame.around(view or drawing.bounds, margins=options.margins)
     if view is not None:
-        drawing = drawing.clipped(view)
-    frame = _Frame.around(drawing.bounds, margins=options.margins)
+        drawing = drawing.clipped(frame.bounds)
     inside = _inside(drawing, graph, options, frame)
     parts = [element("rect", width=frame.width, height="100%", fill=_PAPER)]
     foot = 0.0

@@ -78,7 +78,10 @@ def run_map(
     layers = []
     if drawing is not None:
         options = LayerOptions(symbol_size=dot * 2.2, prefix="map-")
-        layers.append(element("g", map_layers(drawing.clipped(bounds), options), class_="map"))
+        # A wide window shows land beside the drawing's box: the roads there go on.
+        beside = 0.35 * (bounds[2] - bounds[0])
+        wider = (bounds[0] - beside, bounds[1], bounds[2] + beside, bounds[3])
+        layers.append(element("g", map_layers(drawing.clipped(wider), options), class_="map"))
     vehicles = traces.filter(traces["category"] != "pedestrian")
     layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
