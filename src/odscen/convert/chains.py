@@ -8,6 +8,7 @@ Both are divided in proportion to length.
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
     from odscen.ids import SumoLaneId
 
 FloatArray = NDArray[np.float64]
-
-LONGEST = 400.0
-"""Metres: a way through a junction is not longer than this."""
-MOST_LANES = 60
 
 
 class Place(NamedTuple):
@@ -78,37 +75,43 @@ def shortest_way(
     end: Place,
     successors: Mapping[int, Sequence[int]],
     lanes: LaneSamples,
+    *,
+    longest: float,
 ) -> tuple[Stretch, ...] | None:
     """Return the shortest way between two places through successors, or ``None``.
+
+    Dijkstra's algorithm over lengths of lanes; ties go to the smaller number.
 
     Parameters
     ----------
     successors
         Lanes after each lane, as positions in ``LaneSamples.rows``.
+    longest
+        Metres; longer ways do not count.
     """
     here, there = lanes.arc_at(start.lane, start.s), lanes.arc_at(end.lane, end.s)
     if start.lane == end.lane and there > here:
         return (Stretch(start.lane, here, there),)
-    best: tuple[float, tuple[int, ...]] | None = None
-    open_ways: list[tuple[float, tuple[int, ...]]] = [
-        (lanes.length(start.lane) - here, (start.lane,))
-    ]
-    tried = 0
-    while open_ways and tried < 10 * MOST_LANES:
-        tried += 1
-        length, way = open_ways.pop()
-        for lane in successors.get(way[-1], ()):
-            if lane == end.lane:
-                if best is None or (length + there, way) < best:
-                    best = (length + there, way)
-            elif lane not in way and len(way) < MOST_LANES:
-                further = length + lanes.length(lane)
-                if further <= LONGEST:
-                    open_ways.append((further, (*way, lane)))
-    if best is None:
+    queue: list[tuple[float, int, int]] = [(lanes.length(start.lane) - here, start.lane, -1)]
+    before: dict[int, int] = {}
+    while queue:
+        length, lane, previous = heapq.heappop(queue)
+        if lane in before:
+            continue
+        before[lane] = previous
+        if lane == end.lane:
+            break
+        for other in successors.get(lane, ()):
+            further = length + (there if other == end.lane else lanes.length(other))
+            if other not in before and further <= longest:
+                heapq.heappush(queue, (further, other, lane))
+    if end.lane not in before or end.lane == start.lane:
         return None
-    inner = tuple(Stretch(lane, 0.0, lanes.length(lane)) for lane in best[1][1:])
+    way = [end.lane]
+    while before[way[-1]] >= 0:
+        way.append(before[way[-1]])
     first = Stretch(start.lane, here, lanes.length(start.lane))
+    inner = (Stretch(lane, 0.0, lanes.length(lane)) for lane in way[-2:0:-1])
     return (first, *inner, Stretch(end.lane, 0.0, there))
 
 

@@ -126,8 +126,8 @@ def _furniture(odr: OpenDrive, lanes: LaneTable) -> tuple[list[Entry], dict[str,
     dynamic = [signal for _, signal in signals if signal.dynamic]
     if dynamic:
         reason = (
-            f"{len(dynamic)} dynamic signals became {lanes.counts['tl_logics']} traffic lights with "
-            "programs of netconvert's own: OpenDRIVE has no timing"
+            f"{len(dynamic)} dynamic signals became {lanes.counts['tl_logics']} traffic lights "
+            "with programs of netconvert's own: OpenDRIVE has no timing"
         )
         entries.append(Entry(Fate.GUESSED, "map", reason))
     static = len(signals) - len(dynamic)

@@ -42,6 +42,10 @@ _DRIVE, _WALK, _BICYCLE = range(3)
 _INSIDE_PENALTY = 0.5
 """Metres: lanes of connecting roads must lie this much nearer to be taken for a normal lane's."""
 
+LONGEST_FACTOR = 1.5
+LONGEST_EXTRA = 20.0
+"""Metres: internal lanes stand for a way at most this much longer than they are drawn."""
+
 _MOTOR = ("passenger", "bus", "taxi")
 
 
@@ -247,7 +251,9 @@ class _Builder:
         if before is None or after is None or self.kinds[before.lane] != _DRIVE:
             return []
         start, end = Place(before.lane, float(before.s[-1])), Place(after.lane, float(after.s[0]))
-        way = shortest_way(start, end, self.successors, self.samples)
+        drawn = sum(float(self.drawn.length[self.row[lane]]) for lane in chain.via)
+        longest = LONGEST_FACTOR * drawn + LONGEST_EXTRA
+        way = shortest_way(start, end, self.successors, self.samples, longest=longest)
         if way is None:
             self.invented.add((before.lane, after.lane))
             return []
