@@ -31,6 +31,12 @@ TOLERANCE = 0.03
 _STEP_STRAIGHT, _STEP_CURVED, _STEP_JUNCTION = 2.0, 1.0, 0.5
 """Metres between stations before thinning; junctions have the tightest turns."""
 
+_MOST_POINTS = 2_000_000
+"""Points on all borders before thinning; maps of whole countries are drawn more coarsely."""
+
+_MOST_PAIRS = 20_000_000
+"""Pairs of near places to look for bridges among; a map folded onto itself has more."""
+
 _SHORTEST = 0.05
 """Metres below which a plan-view geometry is an editor's leftover."""
 
@@ -172,7 +178,9 @@ def _step(road: Road) -> float:
 
 def _stations(sections: _Sections, table: RoadTable) -> _Stations:
     length = sections.s1 - sections.s0
-    n = np.maximum(np.ceil(length / sections.step), 1.0).astype(np.int64) + 1
+    points = float(np.sum(length / sections.step * (np.diff(sections.rows) + 1)))
+    step = sections.step * max(1.0, points / _MOST_POINTS)
+    n = np.maximum(np.ceil(length / step), 1.0).astype(np.int64) + 1
     section = np.repeat(np.arange(len(n)), n)
     k = ranges(np.zeros(len(n), dtype=np.int64), n)
     share = k / (n - 1)[section]
@@ -308,7 +316,10 @@ def _levels(borders: _Borders, table: RoadTable) -> IntArray:
     xy = (borders.lines.xy[outside] + borders.lines.xy[inside]) / 2.0
     section = borders.section[lane]
     z = stations.z[stations.start[section] + within]
-    pairs = cKDTree(xy).query_pairs(3.0, output_type="ndarray")
+    tree = cKDTree(xy)
+    if tree.count_neighbors(tree, 3.0) > 2 * _MOST_PAIRS:
+        return levels
+    pairs = tree.query_pairs(3.0, output_type="ndarray")
     drop = z[pairs[:, 1]] - z[pairs[:, 0]]
     apart = np.abs(drop) > _CLEARANCE
     pairs, drop = section[pairs[apart]], drop[apart]

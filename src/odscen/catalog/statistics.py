@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from odscen.opendrive.model import OpenDrive
 
 
+_MOST_POINTS = 1_000_000
+"""Points that lanes are measured at; every metre, but for maps of whole countries."""
+
+
 @dataclass(frozen=True, slots=True)
 class MapStatistics:
     """Figures of a map; metres and m/s.
@@ -109,11 +113,12 @@ def map_statistics(
 
 
 def _lanes(table: RoadTable, rows: NDArray[np.int64]) -> tuple[float, Bounds]:
-    """Length of the centre lines and bounds of the borders, sampled every metre."""
+    """Length of the centre lines and bounds of the borders, sampled about every metre."""
     if len(rows) == 0:
         return 0.0, (0.0, 0.0, 0.0, 0.0)
     s0, s1 = table.lane_s0[rows], table.lane_s1[rows]
-    n = np.maximum(np.ceil(s1 - s0), 1.0).astype(np.int64) + 1
+    step = max(1.0, float(np.sum(s1 - s0)) / _MOST_POINTS)
+    n = np.maximum(np.ceil((s1 - s0) / step), 1.0).astype(np.int64) + 1
     lane = np.repeat(np.arange(len(rows)), n)
     share = ranges(np.zeros(len(n), dtype=np.int64), n) / (n - 1)[lane]
     s = np.minimum(s0[lane] * (1.0 - share) + s1[lane] * share, s1[lane] - 1e-6)
