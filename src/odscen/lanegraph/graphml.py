@@ -18,7 +18,7 @@ larger. Numbers are written so that the same number is read back.
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -30,7 +30,7 @@ from odscen.lanegraph.model import MapGraph, Relation, Segments, WalkKind
 from odscen.lanegraph.query import node_ids, walk_node_ids
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 __all__ = ["from_graphml", "to_graphml"]
 
@@ -61,6 +61,8 @@ NODE_KEYS = {
 }
 
 
+_KEYS = {"graph": GRAPH_KEYS, "node": NODE_KEYS, "edge": EDGE_KEYS}
+
 _ENTITIES = {'"': "&quot;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 _SPECIAL = ("&", "<", ">", *_ENTITIES)
 
@@ -88,20 +90,21 @@ def to_graphml(graph: MapGraph) -> bytes:
         *_walk_nodes(graph, walks),
         *_lane_edges(graph, lanes),
         *_walk_edges(graph, walks),
-        *(
-            f'<edge source="{segments[i]}" target="{segments[j]}">'
-            f'<data key="e_relation">adjacent</data></edge>\n'
-            for i, j in graph.segments.adjacency.tolist()
-        ),
+        *_segment_edges(graph, segments),
         "</graph>\n</graphml>\n",
     ]
     return "".join(parts).encode()
 
 
+def _key(kind: str, name: str) -> str:
+    """Id of a data key: short, because it is written a million times."""
+    return f"{kind[0]}{list(_KEYS[kind]).index(name)}"
+
+
 def _head(graph: MapGraph) -> str:
     keys = [
-        f'<key id="{kind[0]}_{name}" for="{kind}" attr.name="{name}" attr.type="{type_}"/>\n'
-        for kind, names in (("graph", GRAPH_KEYS), ("node", NODE_KEYS), ("edge", EDGE_KEYS))
+        f'<key id="{_key(kind, name)}" for="{kind}" attr.name="{name}" attr.type="{type_}"/>\n'
+        for kind, names in _KEYS.items()
         for name, type_ in names.items()
     ]
     values = (
@@ -113,7 +116,7 @@ def _head(graph: MapGraph) -> str:
         _number(graph.walks.spacing),
     )
     data = [
-        f'<data key="g_{name}">{value}</data>\n'
+        f'<data key="{_key("graph", name)}">{value}</data>\n'
         for name, value in zip(GRAPH_KEYS, values, strict=True)
     ]
     return (
@@ -124,85 +127,97 @@ def _head(graph: MapGraph) -> str:
 
 
 def _segment_nodes(segments: Segments, names: Sequence[str]) -> Iterable[str]:
-    template = _node_template("segment", ["segment_kind", "length", "parts"])
-    for name, kind, length, parts in zip(
-        names, segments.kinds, segments.lengths.tolist(), segments.parts, strict=True
-    ):
-        text = json.dumps([list(part) for part in _plain(parts)])
-        yield template % (name, kind, _number(length), escape(text))
-
-
-def _plain(parts: Iterable[Any]) -> list[tuple[str, float, float]]:
-    return [(part.road, part.s_from, part.s_to) for part in parts]
+    parts = [[(part.road, part.s_from, part.s_to) for part in of] for of in segments.parts]
+    columns = {
+        "segment_kind": segments.kinds,
+        "length": _numbers(segments.lengths),
+        "parts": [escape(json.dumps(of)) for of in parts],
+    }
+    return _nodes("segment", names, columns)
 
 
 def _lane_nodes(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     lanes, table = graph.lanes, graph.lanes.lanes
     lane_names = [*_escaped(list(map(str, table.keys))), ""]  # -1 is no lane
-    attributes = [*NODE_COLUMNS, "lane_type", "junction", "lane_length", "forward"]
-    template = _node_template("vehicle", [*attributes, "left_lane", "right_lane", "segment"])
     of_lane = lanes.lane.tolist()
-    columns = [
-        names,
-        *(_numbers(getattr(lanes, name)) for name in NODE_COLUMNS),
-        _pick(_escaped(table.types), of_lane),
-        _pick(_escaped([name or "" for name in table.junctions]), of_lane),
-        _pick(_numbers(table.lengths), of_lane),
-        _pick(["true" if forward else "false" for forward in table.forward], of_lane),
-        _pick(lane_names, lanes.left_lane.tolist()),
-        _pick(lane_names, lanes.right_lane.tolist()),
-        _pick(_escaped(graph.segments.ids), lanes.segment.tolist()),
-    ]
-    return map(template.__mod__, zip(*columns, strict=True))
+    columns = {
+        **{name: _numbers(getattr(lanes, name)) for name in NODE_COLUMNS},
+        "lane_type": _pick(_escaped(table.types), of_lane),
+        "junction": _pick(_escaped([name or "" for name in table.junctions]), of_lane),
+        "lane_length": _pick(_numbers(table.lengths), of_lane),
+        "forward": _pick(_booleans(table.forward), of_lane),
+        "left_lane": _pick(lane_names, lanes.left_lane.tolist()),
+        "right_lane": _pick(lane_names, lanes.right_lane.tolist()),
+        "segment": _pick(_escaped(graph.segments.ids), lanes.segment.tolist()),
+    }
+    return _nodes("vehicle", names, columns)
 
 
 def _walk_nodes(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     walks = graph.walks
-    template = _node_template("pedestrian", [*WALK_NODE_COLUMNS, "roadside", "segment"])
-    columns = [
-        names,
-        *(_numbers(getattr(walks, name)) for name in WALK_NODE_COLUMNS),
-        _pick(["true" if beside else "false" for beside in walks.roadside], walks.lane.tolist()),
-        _pick(_escaped(graph.segments.ids), walks.segment.tolist()),
-    ]
-    return map(template.__mod__, zip(*columns, strict=True))
+    columns = {
+        **{name: _numbers(getattr(walks, name)) for name in WALK_NODE_COLUMNS},
+        "roadside": _pick(_booleans(walks.roadside), walks.lane.tolist()),
+        "segment": _pick(_escaped(graph.segments.ids), walks.segment.tolist()),
+    }
+    return _nodes("pedestrian", names, columns)
 
 
 def _lane_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     lanes = graph.lanes
     words = [relation.name.lower() for relation in Relation]
-    template = _edge_template(["relation", "length"])
-    columns = [
-        _pick(names, lanes.source.tolist()),
-        _pick(names, lanes.target.tolist()),
-        _pick(words, lanes.relation.tolist()),
-        _numbers(lanes.length),
-    ]
-    return map(template.__mod__, zip(*columns, strict=True))
+    columns = {
+        "relation": _pick(words, lanes.relation.tolist()),
+        "length": _numbers(lanes.length),
+    }
+    sources, targets = lanes.source.tolist(), lanes.target.tolist()
+    return _edges(_pick(names, sources), _pick(names, targets), columns)
 
 
 def _walk_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
     walks = graph.walks
     words = [kind.name.lower() for kind in WalkKind]
-    template = _edge_template(["relation", "length", "crosswalk"])
-    columns = [
-        _pick(names, walks.source.tolist()),
-        _pick(names, walks.target.tolist()),
-        _pick(words, walks.kind.tolist()),
-        _numbers(walks.length),
-        _escaped(walks.crosswalk),
+    columns = {
+        "relation": _pick(words, walks.kind.tolist()),
+        "length": _numbers(walks.length),
+        "crosswalk": _escaped(walks.crosswalk),
+    }
+    sources, targets = walks.source.tolist(), walks.target.tolist()
+    return _edges(_pick(names, sources), _pick(names, targets), columns)
+
+
+def _segment_edges(graph: MapGraph, names: Sequence[str]) -> Iterable[str]:
+    pairs = graph.segments.adjacency
+    columns = {"relation": ["adjacent"] * len(pairs)}
+    sources, targets = pairs[:, 0].tolist(), pairs[:, 1].tolist()
+    return _edges(_pick(names, sources), _pick(names, targets), columns)
+
+
+def _nodes(kind: str, names: Sequence[str], columns: Mapping[str, Sequence[str]]) -> Iterable[str]:
+    about = f'"><data key="{_key("node", "kind")}">{kind}</data>'
+    return _elements([[f'<node id="{name}{about}' for name in names]], "node", columns)
+
+
+def _edges(
+    sources: Sequence[str], targets: Sequence[str], columns: Mapping[str, Sequence[str]]
+) -> Iterable[str]:
+    ends = [
+        f'<edge source="{source}" target="{target}">'
+        for source, target in zip(sources, targets, strict=True)
     ]
-    return map(template.__mod__, zip(*columns, strict=True))
+    return _elements([ends], "edge", columns)
 
 
-def _node_template(kind: str, attributes: Sequence[str]) -> str:
-    data = "".join(f'<data key="n_{name}">%s</data>' for name in attributes)
-    return f'<node id="%s"><data key="n_kind">{kind}</data>{data}</node>\n'
-
-
-def _edge_template(attributes: Sequence[str]) -> str:
-    data = "".join(f'<data key="e_{name}">%s</data>' for name in attributes)
-    return f'<edge source="%s" target="%s">{data}</edge>\n'
+def _elements(
+    heads: list[list[str]], kind: str, columns: Mapping[str, Sequence[str]]
+) -> Iterable[str]:
+    """Finish nodes or edges; an empty text is left out, readers take it for granted."""
+    parts: list[list[str]] = heads
+    for name, values in columns.items():
+        start = f'<data key="{_key(kind, name)}">'
+        parts.append([f"{start}{value}</data>" if value else "" for value in values])
+    parts.append([f"</{kind}>\n"] * len(heads[0]))
+    return map("".join, zip(*parts, strict=True))
 
 
 def _pick(values: Sequence[str], rows: Sequence[int]) -> list[str]:
@@ -214,6 +229,10 @@ def _escaped(values: Sequence[str]) -> list[str]:
     if any(character in text for character in _SPECIAL):
         return [escape(value, _ENTITIES) for value in values]
     return list(values)
+
+
+def _booleans(values: Array) -> list[str]:
+    return ["true" if value else "false" for value in values.tolist()]
 
 
 def _number(value: float) -> str:

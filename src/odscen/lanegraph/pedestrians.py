@@ -46,7 +46,7 @@ ROADSIDE_WIDTH = 1.0
 JOINT_DISTANCE = 3.0
 """Metres; ends of walks that are this near to each other are joined."""
 
-CROSSWALK_REACH = 4.0
+CROSSWALK_REACH = 7.0
 """Metres; an end of a crosswalk is joined to the nearest walk node within this distance."""
 
 LEVEL_HEIGHT = 2.5
@@ -55,13 +55,11 @@ LEVEL_HEIGHT = 2.5
 PAVED_TYPES = DRIVABLE_TYPES | {
     "bidirectional",
     "biking",
-    "border",
-    "curb",
     "parking",
     "shoulder",
     "stop",
 }
-"""Lane types that a roadside walk runs outside of."""
+"""Lane types that a roadside walk runs outside of; borders and verges may be 50 m wide."""
 
 
 class _Walks(NamedTuple):
@@ -323,9 +321,10 @@ def _crossings(nodes: _Nodes, crosswalks: Sequence[Crosswalk]) -> list[_Edge]:
     tree = cKDTree(nodes.place[:, :2])
     for crosswalk in crosswalks:
         found = [_nearest(tree, nodes, axis_end, crosswalk.z) for axis_end in crosswalk.axis]
-        if None in found or found[0] == found[1]:
-            continue
-        source, target = sorted(node for node in found if node is not None)
+        ends = sorted(node for node in found if node is not None)
+        if len(ends) < 2 or nodes.lane[ends[0]] == nodes.lane[ends[1]]:
+            continue  # a walk is missing, or both ends found the one on the same side
+        source, target = ends
         gap = float(np.linalg.norm(nodes.place[source] - nodes.place[target]))
         name = f"{crosswalk.road}:{crosswalk.object_id}"
         edges.append(_Edge(source, target, WalkKind.CROSSWALK, gap, name))
