@@ -141,6 +141,17 @@ def test_a_crosswalk_has_bars_across_the_walkers_way():
     assert (drawing.bars.xy[:, 0].min(), drawing.bars.xy[:, 0].max()) == (48.0, 52.0)
 
 
+def test_repeated_parking_spaces_are_drawn_one_by_one():
+    space = """<objects><object id="1" type="parkingSpace" name="" s="10" t="-5" zOffset="0" hdg="0"
+        orientation="none" length="5" width="2"><repeat s="10" length="30" distance="10" tStart="-5"
+        tEnd="-8" widthStart="2" widthEnd="2" heightStart="0" heightEnd="0" zOffsetStart="0"
+        zOffsetEnd="0"/></object></objects>"""
+    spaces = draw(maps.document(maps.road(more=space))).parking_spaces
+    assert ring_areas(spaces) == pytest.approx([10.0] * 3)
+    centres = spaces.xy.reshape(3, 4, 2).mean(axis=1)
+    assert centres.tolist() == [[10.0, -5.0], [20.0, -6.0], [30.0, -7.0]]
+
+
 def test_signs_and_lights_stand_where_the_map_puts_them():
     symbols = draw(maps.STREET).symbols
     assert [(symbol.kind, symbol.x, symbol.y, symbol.text) for symbol in symbols] == [

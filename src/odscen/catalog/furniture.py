@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.model import OpenDrive, Signal
+    from odscen.opendrive.model import OpenDrive, RoadObject, Signal
 
 FloatArray = NDArray[np.float64]
 
@@ -24,6 +24,9 @@ BAR, GAP = 0.5, 0.5
 
 _MOST_BARS = 200
 """Per crosswalk: one of hundreds of metres is a mistake in the map, not a reason to stall."""
+
+_MOST_COPIES = 500
+"""Repetitions drawn of one object."""
 
 MPH = 0.44704
 
@@ -103,9 +106,22 @@ def _outlines(odr: OpenDrive, table: RoadTable, kind: str) -> Lines:
             for name, road in odr.roads.items()
             for item in road.objects
             if item.type == kind
-            for outline in object_outline(table, name, item)
+            for copy in _copies(item)
+            for outline in object_outline(table, name, copy)
         ]
     )
+
+
+def _copies(item: RoadObject) -> list[RoadObject]:
+    """Give the object itself, or its repetitions along the road (section 13.3.1)."""
+    copies = []
+    for repeat in item.repeats:
+        n = int(np.ceil(repeat.length / repeat.distance)) if repeat.distance > 0.0 else 1
+        for k in range(min(max(n, 1), _MOST_COPIES)):
+            share = k * repeat.distance / repeat.length if repeat.length > 0.0 else 0.0
+            t = repeat.t_start + share * (repeat.t_end - repeat.t_start)
+            copies.append(replace(item, s=repeat.s + k * repeat.distance, t=t))
+    return copies or [item]
 
 
 def symbols(odr: OpenDrive, table: RoadTable) -> tuple[Symbol, ...]:
