@@ -4,66 +4,15 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from odscen.categories import Category
 from odscen.errors import ScenarioError
-from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario
+from odscen.scenario.document import Actor, MapReference, Scenario
 from odscen.scenario.files import dumps, loads, read_any, schema
+from tests.scenario.strategies import scenarios
 
 SCHEMA = Path(__file__).parents[2] / "docs" / "scenario.schema.json"
 MAP = MapReference(name="toy", sha256="0" * 64)
-
-finite = st.floats(allow_nan=False, allow_infinity=False)
-names = st.text(
-    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=20
-)
-labels = names.filter(lambda text: len(text) > 0 and "\ufffe" not in text and "\uffff" not in text)
-actors = st.builds(
-    Actor,
-    id=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True),
-    category=st.sampled_from(Category),
-    model=st.none() | labels,
-    spawn=labels,
-    goal=st.none() | labels,
-    speed=st.none() | st.floats(0, 100, exclude_min=True),
-    lateral_offset=st.floats(-10, 10),
-    depart=st.floats(0, 1e6),
-    style=st.sampled_from(["cautious", "normal", "sporty"]),
-    ego=st.booleans(),
-    crosses_anywhere=st.booleans(),
-    ignores_red=st.booleans(),
-)
-flows = st.builds(
-    Flow,
-    id=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True),
-    spawn=labels,
-    goal=st.none() | labels,
-    per_hour=st.floats(0, 20_000, exclude_min=True),
-    begin=st.floats(0, 1e6),
-    end=st.floats(0, 1e6),
-    mix=st.dictionaries(
-        st.sampled_from(Category), st.floats(0, 1e3, exclude_min=True), min_size=1, max_size=3
-    ),
-    speed=st.none() | st.floats(0, 100, exclude_min=True),
-)
-environments = st.builds(
-    Environment,
-    preset=labels,
-    parameters=st.dictionaries(labels, finite, max_size=3),
-    affects_driving=st.booleans(),
-)
-scenarios = st.builds(
-    Scenario,
-    name=labels,
-    description=names,
-    map=st.just(MAP),
-    seed=st.integers(0, 2**31 - 1),
-    roi=st.lists(labels, max_size=4).map(tuple),
-    environment=environments,
-    actors=st.lists(actors, max_size=4).map(tuple),
-    flows=st.lists(flows, max_size=3).map(tuple),
-)
 
 
 @given(scenarios)
