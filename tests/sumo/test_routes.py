@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,7 @@ from hypothesis import strategies as st
 from odscen.lanegraph.paths import Router, WalkRouter
 from odscen.lanegraph.query import node_index, walk_node_index
 from odscen.sumo.network import Link, NetLane, RoadNet
-from odscen.sumo.routes import NoRouteError, Places, Route, RoutePlanner, connected
+from odscen.sumo.routes import NoRouteError, Route, RoutePlanner, connected
 from odscen.sumo.walks import Walk, WalkPlanner
 from tests.sumo.toys import STARTS, lane_places, street, street_net, walk_places
 
@@ -102,11 +104,11 @@ def test_a_class_that_may_not_drive_there_has_no_route() -> None:
 def test_nodes_without_a_place_are_passed_over() -> None:
     places = lane_places(GRAPH.lanes)
     holes = np.where(np.arange(len(places.lane)) % 3 == 1, -1, places.lane).astype(np.int32)
-    planner = RoutePlanner(GRAPH.lanes, NET, Places(places.lanes, holes, places.pos))
     spawn = int(np.flatnonzero(holes[:50] >= 0)[5])
     path = ROUTER.path(spawn, node_index(GRAPH, "3.0.-2.9"))
+    planner = RoutePlanner(GRAPH.lanes, NET, replace(places, lane=holes))
     assert planner.plan(path, length=4.5, vclass="passenger").edges == ("in", "out")
-    nothing = Places(places.lanes, np.full_like(holes, -1), places.pos)
+    nothing = replace(places, lane=np.full_like(holes, -1))
     with pytest.raises(NoRouteError, match="no lane anywhere"):
         RoutePlanner(GRAPH.lanes, NET, nothing).plan(path, length=4.5, vclass="passenger")
 
@@ -174,7 +176,7 @@ def test_a_walk_along_one_edge_knows_its_direction_too() -> None:
 
 def test_a_walk_where_nothing_is_to_walk_on_is_refused() -> None:
     places = walk_places(GRAPH.walks)
-    nothing = Places(places.lanes, np.full_like(places.lane, -1), places.pos)
+    nothing = replace(places, lane=np.full_like(places.lane, -1))
     path = WALKS.path(0, 5)
     with pytest.raises(NoRouteError, match="nothing to walk on at the spawn"):
         WalkPlanner(GRAPH.walks, NET, nothing).plan(path, length=0.4, lateral_offset=0.0)

@@ -68,12 +68,13 @@ def lane_places(graph: LaneGraph) -> Places:
     edge = np.where(graph.x < 98.0, 0, np.where(graph.x < 122.0, 1, 2))
     starts = np.array([0.0, 98.0, 122.0])[edge]
     row = 2 * edge + (graph.y > -3.5)
-    return Places(names, row.astype(np.int32), graph.x - starts)
+    return Places(names, row.astype(np.int32), graph.x - starts, np.zeros(len(row)), np.ones(6))
 
 
 def walk_places(graph: PedestrianGraph) -> Places:
     beyond = graph.x > 100.0
-    return Places(("in_0", "out_0"), beyond.astype(np.int32), graph.x - 122.0 * beyond)
+    pos = graph.x - 122.0 * beyond
+    return Places(("in_0", "out_0"), beyond.astype(np.int32), pos, np.zeros(len(pos)), np.ones(2))
 
 
 def sumo_map() -> SumoMap:

@@ -27,6 +27,7 @@ class NetLane:
     length: float
     internal: bool = False
     speed: float = 13.89
+    width: float = 3.2
     allowed: frozenset[str] | None = None
 
     def allows(self, vclass: str) -> bool:
@@ -55,11 +56,14 @@ class RoadNet:
         From normal to normal lanes with their first internal lane, and from internal lanes onwards.
     walk_links
         Pairs of edges between which one can walk, either way.
+    lefthand
+        Whether traffic keeps left; lane 0 is then the leftmost.
     """
 
     lanes: dict[str, NetLane]
     links: tuple[Link, ...]
     walk_links: frozenset[tuple[str, str]] = frozenset()
+    lefthand: bool = False
     _ways: dict[tuple[str, str, str], tuple[str, ...] | None] = field(default_factory=dict)
 
     @cached_property
@@ -111,6 +115,19 @@ class RoadNet:
             found.setdefault(one, set()).add(other)
             found.setdefault(other, set()).add(one)
         return {edge: tuple(sorted(others)) for edge, others in found.items()}
+
+    def walked_lane(self, edge: str) -> NetLane | None:
+        """Return the one lane of an edge on which SUMO's pedestrians walk: the outermost."""
+        lanes = self.edge_lanes.get(edge, ())
+        return next((lane for lane in lanes if lane.allows(PEDESTRIAN)), None)
+
+    def left_of(self, lane: NetLane, other: NetLane) -> float:
+        """Metres that the centre of ``lane`` lies left of that of ``other``, on the same edge."""
+        low, high = sorted((lane.index, other.index))
+        lanes = self.edge_lanes[lane.edge][low : high + 1]
+        apart = sum(one.width for one in lanes) - (lanes[0].width + lanes[-1].width) / 2.0
+        inwards = 1.0 if lane.index >= other.index else -1.0
+        return -inwards * apart if self.lefthand else inwards * apart
 
     def edge_length(self, edge: str) -> float:
         """Length of an edge's lanes, metres."""

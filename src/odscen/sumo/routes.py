@@ -10,6 +10,7 @@ because several internal lanes overlap where they begin and geometry alone canno
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,7 @@ class NoRouteError(Exception):
     """Somebody cannot get from spawn to goal on the SUMO network; the message says why."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Where the nodes of a graph are on the SUMO network.
 
@@ -41,16 +42,27 @@ class Places:
         Shape ``(N,)``: row of ``lanes`` for each node, -1 where the network has nothing there.
     pos
         Shape ``(N,)``: metres along that lane.
+    deviation
+        Shape ``(N,)``: metres between the centres of the two lanes there; NaN without a lane.
+    scale
+        Shape of ``lanes``: metres of position per metre on the ground.
     """
 
     lanes: tuple[str, ...]
     lane: IntArray
     pos: FloatArray
+    deviation: FloatArray
+    scale: FloatArray
 
     def of(self, node: int) -> tuple[str, float] | None:
         """SUMO lane and position of a node."""
         row = int(self.lane[node])
         return None if row < 0 else (self.lanes[row], float(self.pos[node]))
+
+    @cached_property
+    def scales(self) -> dict[str, float]:
+        """Scale by the id of the lane."""
+        return dict(zip(self.lanes, self.scale.tolist(), strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +114,8 @@ class RoutePlanner:
         """
         edges, repairs = connected(self._net, self._edges(path, vclass), vclass)
         edges, start, pos = self._anchor(path, edges, vclass)
-        edges, lane, front = self._front(edges, start, pos + length / 2.0)
+        ahead = length / 2.0 * self._places.scales[start.id]
+        edges, lane, front = self._front(edges, start, pos + ahead)
         if not lane.allows(vclass):
             msg = f"lane {lane.id} of the SUMO network does not admit {vclass}"
             raise NoRouteError(msg)
@@ -148,6 +161,7 @@ class RoutePlanner:
             if place is None or (lane := self._net.lanes[place[0]]).internal:
                 continue
             behind = float(self._graph.offset[spawn] - self._graph.offset[node])
+            behind *= self._places.scales[lane.id]
             if lane.edge == edges[0]:
                 return edges, lane, place[1] + behind
             if edges[0] in self._net.followers(lane.edge, vclass):
@@ -189,8 +203,9 @@ class RoutePlanner:
             passage = self._next(lane, edges)
             if not passage:  # another lane of the edge goes there; it changes lanes at its end
                 return edges, lane, lane.length
-            pos -= lane.length
+            ground = (pos - lane.length) / self._places.scales[lane.id]
             lane = passage[0]
+            pos = ground * self._places.scales[lane.id]
             inside = tuple(passed.edge for passed in passage[:-1])
             edges = (*inside, *edges[edges.index(passage[-1].edge) :])
         return edges, lane, max(pos, 0.0)
@@ -215,7 +230,8 @@ class RoutePlanner:
         lane = self._net.lanes[place[0]]
         if lane.edge == edges[-1] and not lane.internal:
             index = lane.index if lane.allows(vclass) else None
-            return edges, index, min(place[1] + length / 2.0, lane.length)
+            ahead = length / 2.0 * self._places.scales[lane.id]
+            return edges, index, min(place[1] + ahead, lane.length)
         leaving = self._net.leaving(lane.id)[-1:]
         if leaving and leaving[0].edge in self._net.followers(edges[-1], vclass):
             return (*edges, leaving[0].edge), None, min(1.0, leaving[0].length)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.sumo.network import Link, NetLane, RoadNet
 from odscen.sumo.routes import Places
 
@@ -47,16 +49,47 @@ class SumoMap:
         return cls(
             graph=graph,
             net=_road_net(table),
-            lane_places=_places(table, lanes.lanes.keys, lanes.lane, lanes.s),
-            walk_places=_places(table, walks.lane_keys, walks.lane, walks.s),
+            lane_places=_places(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y),
+            walk_places=_places(table, walks.lane_keys, walks.lane, walks.s, walks.x, walks.y),
             net_offset=table.net_offset,
             elevation=table.elevation,
         )
 
 
-def _places(table: LaneTable, keys: Sequence[LaneKey], lane: IntArray, s: FloatArray) -> Places:
+def _places(
+    table: LaneTable,
+    keys: Sequence[LaneKey],
+    lane: IntArray,
+    s: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+) -> Places:
     places = table.sumo_places(keys, lane, s)
-    return Places(tuple(table.lanes), places.lane, places.pos)
+    scale = pos_per_metre(places.lane, places.pos, x, y, lanes=len(table.lanes))
+    return Places(tuple(table.lanes), places.lane, places.pos, places.deviation, scale)
+
+
+def pos_per_metre(
+    lane: IntArray, pos: FloatArray, x: FloatArray, y: FloatArray, *, lanes: int
+) -> FloatArray:
+    """How many metres of position one metre of ground is, per SUMO lane; shape ``(lanes,)``.
+
+    All lanes of a SUMO edge have one length, that of their middle; in a curve the outer ones are
+    longer on the ground, the inner ones shorter. Measured between neighbouring nodes on the same
+    SUMO lane; 1 where there are none.
+
+    Parameters
+    ----------
+    lane, pos, x, y
+        Shape ``(N,)``: nodes in the order of the graph, those of one lane together.
+    """
+    same = (lane[1:] == lane[:-1]) & (lane[1:] >= 0)
+    row = lane[1:][same]
+    ground = np.hypot(np.diff(x), np.diff(y))[same]
+    moved = np.abs(np.diff(pos))[same]
+    totals = np.bincount(row, weights=ground, minlength=lanes)
+    moves = np.bincount(row, weights=moved, minlength=lanes)
+    return np.where(totals > 0, moves / np.where(totals > 0, totals, 1.0), 1.0)
 
 
 def _road_net(table: LaneTable) -> RoadNet:
@@ -68,12 +101,13 @@ def _road_net(table: LaneTable) -> RoadNet:
             lane.length,
             internal=table.edges[lane.edge].function == INTERNAL,
             speed=lane.speed,
+            width=lane.width,
             allowed=lane.allowed,
         )
         for lane in table.lane_list
     }
     links = tuple(Link(link.from_lane, link.to_lane, link.via or None) for link in table.links)
-    return RoadNet(lanes, links, _walk_links(table))
+    return RoadNet(lanes, links, _walk_links(table), lefthand=table.lefthand)
 
 
 def _walk_links(table: LaneTable) -> frozenset[tuple[str, str]]:

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A SUMO walk; ``depart_pos`` is where the front of the body is."""
+    """A SUMO walk; ``depart_pos`` is where the front of the body is.
+
+    ``depart_pos_lat`` counts from the lane that SUMO's pedestrians use, which may be another one of
+    the edge than that of the spawn.
+    """
 
     edges: tuple[str, ...]
     depart_pos: float
@@ -56,11 +60,13 @@ class WalkPlanner:
         end = self._place(int(path[-1]), "goal")
         edges, repairs = connected(self._net, self._edges(path), PEDESTRIAN)
         onwards = self._onwards(path, start, end, edges)
-        front = start[1] + length / 2.0 * onwards
+        front = start[1] + length / 2.0 * onwards * self._places.scales[start[0].id]
+        walked = self._net.walked_lane(start[0].edge) or start[0]
+        aside = self._net.left_of(start[0], walked)
         return Walk(
             edges=edges,
             depart_pos=min(max(front, 0.0), start[0].length),
-            depart_pos_lat=lateral_offset * self._along(int(path[0]), start),
+            depart_pos_lat=aside + lateral_offset * self._along(int(path[0]), start),
             arrival_pos=min(max(end[1], 0.0), end[0].length),
             repairs=repairs,
         )

@@ -1,0 +1,81 @@
+"""What SUMO can use of a map, so that sampled actors can be run as they are placed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.scenario.supply import Usable
+from odscen.sumo.network import PEDESTRIAN
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.model import BoolArray, IntArray
+    from odscen.sumo.network import NetLane
+    from odscen.sumo.routes import Places
+    from odscen.sumo.sumo_map import SumoMap
+
+DEVIATION = 0.05
+"""Metres between OpenDRIVE and SUMO lane centre, at most, where a body is placed."""
+
+REACH = 6.0
+"""Metres before and behind a spawn where that holds too: half a bus."""
+
+SHORT = 5.0
+"""Lanes up to this length (m) may be missing in SUMO: routes lead over them all the same."""
+
+
+def usable_places(sumo_map: SumoMap) -> Usable:
+    """Nodes that sampling may use for a run in SUMO.
+
+    - *spawnable*: the SUMO lane exists and its centre is within :data:`DEVIATION` of the OpenDRIVE
+      lane's, :data:`REACH` before and behind; motor vehicles may use it;
+    - *drivable*: the lane exists in SUMO, somewhere along it at least;
+    - *walkable*: the place is on the lane of its edge that pedestrians use, outside junctions,
+      within :data:`DEVIATION`.
+    """
+    graph = sumo_map.graph
+    lanes, walks = graph.lanes, graph.walks
+    admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
+    exact = admitted & _near(sumo_map.lane_places)
+    reach = int(np.ceil(REACH / lanes.spacing))
+    known = np.zeros(len(lanes.lanes.keys), dtype=np.bool_)
+    known[lanes.lane[sumo_map.lane_places.lane >= 0]] = True
+    known |= lanes.lanes.lengths <= SHORT
+    walked = np.array(
+        [
+            not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
+            for lane in _lanes(sumo_map, sumo_map.walk_places)
+        ]
+    )
+    on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
+    on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
+    return Usable(
+        spawnable=_all_around(exact, lanes.lane, reach),
+        drivable=known[lanes.lane],
+        walkable=on_foot & ~walks.roadside[walks.lane],
+    )
+
+
+def _lanes(sumo_map: SumoMap, places: Places) -> list[NetLane]:
+    return [sumo_map.net.lanes[name] for name in places.lanes]
+
+
+def _admitted(sumo_map: SumoMap, places: Places, vclass: str) -> BoolArray:
+    """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
+    allowed = np.array([lane.allows(vclass) for lane in _lanes(sumo_map, places)], dtype=np.bool_)
+    return (places.lane >= 0) & allowed[places.lane]
+
+
+def _near(places: Places) -> BoolArray:
+    return np.less_equal(places.deviation, DEVIATION)  # false for NaN
+
+
+def _all_around(good: BoolArray, lane: IntArray, reach: int) -> BoolArray:
+    """Nodes that are good and whose ``reach`` neighbours of the same lane, either way, are too."""
+    result = good.copy()
+    for step in range(1, reach + 1):
+        same = lane[step:] == lane[:-step]
+        result[:-step] &= good[step:] | ~same
+        result[step:] &= good[:-step] | ~same
+    return result
