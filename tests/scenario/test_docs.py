@@ -1,0 +1,37 @@
+import re
+from pathlib import Path
+
+from odscen.scenario.config import SamplingConfig, loads_config
+from odscen.scenario.files import loads
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+
+def block(page: str, language: str) -> str:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = re.search(rf"```{language}\n(.*?)```", text, re.DOTALL)
+    assert found
+    return found[1]
+
+
+def test_the_example_in_the_guide_is_a_scenario() -> None:
+    text = block("scenario-format.md", "json")
+    text = text.replace("ab1f...64 hexadecimal digits", "a" * 64)
+    assert [actor.id for actor in loads(text).actors] == ["car-1", "bus-1", "anna"]
+
+
+def test_the_example_configuration_can_be_read_and_states_the_defaults() -> None:
+    example, default = loads_config(block("sampling.md", "toml")), SamplingConfig()
+    assert example.behaviour == default.behaviour
+    assert example.places == default.places
+    assert example.roi == default.roi
+
+
+def test_every_code_of_the_checks_is_listed_in_the_guide() -> None:
+    sources = [ROOT / "src/odscen/scenario" / name for name in ("checks.py", "actor_checks.py")]
+    code = re.compile(r"(?:error|warning)\(\s*\"([a-z_]+)\"")
+    used = {name for path in sources for name in code.findall(path.read_text(encoding="utf-8"))}
+    guide = (DOCS / "scenario-format.md").read_text(encoding="utf-8")
+    assert len(used) > 20
+    assert sorted(name for name in used if f"`{name}`" not in guide) == []
