@@ -133,6 +133,10 @@ class RoadNet:
         """Length of an edge's lanes, metres."""
         return self.edge_lanes[edge][0].length
 
+    def way_length(self, edges: Iterable[str]) -> float:
+        """Sum of the lengths of edges, metres."""
+        return sum(self.edge_length(edge) for edge in edges)
+
     def next_edges(self, edge: str, vclass: str) -> tuple[str, ...]:
         """Edges after ``edge``: for driving, or for walking if the class is pedestrian."""
         if vclass == PEDESTRIAN:

@@ -26,6 +26,10 @@ DETOUR = 60.0
 """Metres of road that a repair of a route may put between two of its edges."""
 
 
+CLAMP = 0.05
+"""Metres that a front may be set back so that it stays on its lane."""
+
+
 class NoRouteError(Exception):
     """Somebody cannot get from spawn to goal on the SUMO network; the message says why."""
 
@@ -115,6 +119,9 @@ class RoutePlanner:
         edges, repairs = connected(self._net, self._edges(path, vclass), vclass)
         edges, start, pos = self._anchor(path, edges, vclass)
         ahead = length / 2.0 * self._places.scales[start.id]
+        if pos + ahead > start.length + CLAMP and not self._next(start, edges):
+            edges, told = self._along(start, edges, vclass)
+            repairs += told
         edges, lane, front = self._front(edges, start, pos + ahead)
         if not lane.allows(vclass):
             msg = f"lane {lane.id} of the SUMO network does not admit {vclass}"
@@ -210,6 +217,23 @@ class RoutePlanner:
             edges = (*inside, *edges[edges.index(passage[-1].edge) :])
         return edges, lane, max(pos, 0.0)
 
+    def _along(
+        self, lane: NetLane, edges: tuple[str, ...], vclass: str
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Leave by a link of the lane that the body stands on, as its front is beyond the end.
+
+        The path would have it change lanes first, for which it is too late.
+        """
+        ways = [
+            way
+            for link in self._net.links_from.get(lane.id, ())
+            if (way := self._net.way(self._net.lanes[link.target].edge, edges[-1], vclass))
+        ]
+        if len(edges) < 2 or not ways:
+            return edges, ()
+        best = min(ways, key=lambda way: (self._net.way_length(way), way))
+        return (edges[0], *best), (f"leaves lane {lane.id} by {best[0]}, not {edges[1]}",)
+
     def _next(self, lane: NetLane, edges: tuple[str, ...]) -> tuple[NetLane, ...]:
         """Return the lanes from the next one on to the next normal one, on the route."""
         if lane.internal:
@@ -262,7 +286,7 @@ def connected(
             continue
         way = net.way(route[-1], edge, vclass)
         last = position == len(edges) - 1
-        if way is None or (not last and _between(net, way) > DETOUR):
+        if way is None or (not last and net.way_length(way[1:-1]) > DETOUR):
             if last:
                 msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {edge}"
                 raise NoRouteError(msg)
@@ -271,7 +295,3 @@ def connected(
         route.extend(way[1:])
         repairs.append(f"{' '.join(way[1:-1]) or edge} put in between {way[0]} and {edge}")
     return tuple(route), tuple(repairs)
-
-
-def _between(net: RoadNet, way: tuple[str, ...]) -> float:
-    return sum(net.edge_length(edge) for edge in way[1:-1])

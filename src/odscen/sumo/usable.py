@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.lanegraph.model import Relation
 from odscen.scenario.supply import Usable
 from odscen.sumo.network import PEDESTRIAN
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.model import BoolArray, IntArray
+    from odscen.lanegraph.model import BoolArray, LaneGraph
     from odscen.sumo.network import NetLane
     from odscen.sumo.routes import Places
     from odscen.sumo.sumo_map import SumoMap
@@ -28,8 +29,9 @@ SHORT = 5.0
 def usable_places(sumo_map: SumoMap) -> Usable:
     """Nodes that sampling may use for a run in SUMO.
 
-    - *spawnable*: the SUMO lane exists and its centre is within :data:`DEVIATION` of the OpenDRIVE
-      lane's, :data:`REACH` before and behind; motor vehicles may use it;
+    - *spawnable*: the SUMO lane exists, motor vehicles may use it, and its centre is within
+      :data:`DEVIATION` of the OpenDRIVE lane's, there and :data:`REACH` ahead and behind along
+      every way on or off (SUMO lays the rear of a body on a lane of its own choice);
     - *drivable*: the lane exists in SUMO, somewhere along it at least;
     - *walkable*: the place is on the lane of its edge that pedestrians use, outside junctions,
       within :data:`DEVIATION`.
@@ -51,7 +53,7 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
     return Usable(
-        spawnable=_all_around(exact, lanes.lane, reach),
+        spawnable=_all_around(exact, lanes, reach),
         drivable=known[lanes.lane],
         walkable=on_foot & ~walks.roadside[walks.lane],
     )
@@ -71,11 +73,12 @@ def _near(places: Places) -> BoolArray:
     return np.less_equal(places.deviation, DEVIATION)  # false for NaN
 
 
-def _all_around(good: BoolArray, lane: IntArray, reach: int) -> BoolArray:
-    """Nodes that are good and whose ``reach`` neighbours of the same lane, either way, are too."""
-    result = good.copy()
-    for step in range(1, reach + 1):
-        same = lane[step:] == lane[:-step]
-        result[:-step] &= good[step:] | ~same
-        result[step:] &= good[:-step] | ~same
-    return result
+def _all_around(good: BoolArray, lanes: LaneGraph, steps: int) -> BoolArray:
+    """Nodes that are good, with everything up to ``steps`` successors or predecessors away."""
+    follows = lanes.relation == Relation.SUCCESSOR
+    source, target = lanes.source[follows], lanes.target[follows]
+    ahead, behind = good.copy(), good.copy()
+    for _ in range(steps):
+        ahead[source[~ahead[target]]] = False
+        behind[target[~behind[source]]] = False
+    return ahead & behind
