@@ -20,7 +20,7 @@ def lane(
     before: int | None = None,
     after: int | None = None,
 ) -> str:
-    """A lane whose width is ``width + slope * ds``; ``change`` rules the mark on its outer border."""
+    """A lane of width ``width + slope * ds``; ``change`` rules the mark on its outer border."""
     links = "".join(
         f'<{word} id="{other}"/>'
         for word, other in (("predecessor", before), ("successor", after))
@@ -97,7 +97,7 @@ def network(*parts: str) -> OpenDrive:
 
 
 def junction(name: str, *connections: tuple[str, str, str], kind: str = "default") -> str:
-    """A junction; each connection is (incoming road, connecting road, contact point), lane -1 to -1."""
+    """A junction of (incoming road, connecting road, contact point), lane -1 to lane -1 each."""
     other = "linkedRoad" if kind == "direct" else "connectingRoad"
     return (
         f'<junction id="{name}" name="" type="{kind}">'

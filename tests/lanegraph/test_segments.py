@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from odscen.ids import RoadId
+from odscen.lanegraph.model import SegmentPart
 from odscen.lanegraph.query import is_connected
 from odscen.lanegraph.segments import TARGET_LENGTH, build_segments
 from tests.lanegraph.roads import junction, lane, network, road, section
@@ -71,7 +73,7 @@ def test_roads_that_meet_end_to_end_are_walked_against_s() -> None:
     )
     found = build_segments(odr)
     assert found.segments.ids == ("r1-0", "r1-1")
-    assert found.segments.parts[1][0][1:] == (0.0, 100.0)
+    assert found.segments.parts[1] == (SegmentPart(RoadId("2"), 0.0, 100.0),)
     np.testing.assert_array_equal(
         found.at(np.array([0, 1, 1]), np.array([99.0, 99.0, 1.0])), [0, 1, 1]
     )

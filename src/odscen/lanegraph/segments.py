@@ -250,7 +250,7 @@ def _parts(chain: _Chain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
         for piece in range(first, last + 1):
             low = max(0.0, piece * chain.piece_length - done)
             high = min(length, (piece + 1) * chain.piece_length - done)
-            if high - low < MIN_PART and pieces[piece]:
+            if high - low < min(MIN_PART, length / 2):
                 continue
             s_from, s_to = (low, high) if step.forward else (length - high, length - low)
             pieces[piece].append(SegmentPart(step.road, s_from, s_to))
