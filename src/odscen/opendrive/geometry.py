@@ -7,15 +7,17 @@ parameter by quadrature and inverted by Newton's method.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import fresnel
 
 from odscen.opendrive.model import Geometry, GeometryKind
 from odscen.opendrive.profiles import FloatArray, IntArray, locate, offsets
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _BEND, _SPIRAL, _CUBIC = 0, 1, 2
 _KINDS = {
@@ -188,9 +190,9 @@ class CubicCurves:
     @classmethod
     def of(cls, geometries: Sequence[Geometry]) -> CubicCurves:
         """Table of poly3 and paramPoly3 geometries."""
-        is_param = np.array([len(g.params) == 8 for g in geometries], dtype=bool)  # noqa: PLR2004
+        is_param = np.array([len(g.params) == 8 for g in geometries], dtype=bool)
         # poly3: v(u) = a + b u + c u^2 + d u^3, that is u = p.
-        rows = [g.params if len(g.params) == 8 else (0, 1, 0, 0, *g.params) for g in geometries]  # noqa: PLR2004
+        rows = [g.params if len(g.params) == 8 else (0, 1, 0, 0, *g.params) for g in geometries]
         coefficients = np.array(rows, dtype=np.float64).reshape(-1, 2, 4)
         # A poly3 with v(u) bent covers less than its length in u, never more.
         p_end = np.array([g.length for g in geometries], dtype=np.float64)
@@ -213,7 +215,7 @@ class CubicCurves:
         return np.where(row >= 0, hdg + slope, hdg)
 
     def parameter(self, row: IntArray, ds: FloatArray) -> FloatArray:
-        """p at ``ds`` metres of s: the inverse of the arc length by p."""
+        """Give p at ``ds`` metres of s: the inverse of the arc length by p."""
         wanted = ds * self.stretch[row]
         table = self.lengths[row]
         piece = np.clip((table <= wanted[:, None]).sum(axis=1) - 1, 0, _PIECES - 1)
@@ -222,7 +224,7 @@ class CubicCurves:
         before = np.take_along_axis(table, piece[:, None], axis=1)[:, 0]
         after = np.take_along_axis(table, piece[:, None] + 1, axis=1)[:, 0]
         span = np.where(after > before, after - before, 1.0)
-        p = start + (wanted - before) / span * width
+        p: FloatArray = start + (wanted - before) / span * width
         coefficients = self.coefficients[row].transpose(1, 2, 0)
         for _ in range(4):  # Newton: the derivative of arc length by p is the speed
             half = 0.5 * (p - start)
@@ -230,7 +232,7 @@ class CubicCurves:
             speed = np.hypot(*_derivatives(coefficients[..., None], nodes)[1])
             length = before + half * (speed @ _PIECE_WEIGHTS)
             here = np.hypot(*_derivatives(coefficients, p)[1])
-            p = p + (wanted - length) / np.maximum(here, 1e-9)
+            p += (wanted - length) / np.maximum(here, 1e-9)
         return p
 
     def at(
@@ -255,8 +257,9 @@ Pair = tuple[FloatArray, FloatArray]
 
 
 def _derivatives(coefficients: FloatArray, p: FloatArray) -> tuple[Pair, Pair, Pair, Pair]:
-    """(u, v) and their first three derivatives by p; the first two axes of ``coefficients`` are
-    (u or v, power), the others broadcast with ``p``.
+    """(u, v) and their first three derivatives by p.
+
+    The first two axes of ``coefficients`` are (u or v, power), the others broadcast with ``p``.
     """
     parts = []
     for a, b, c, d in (coefficients[0], coefficients[1]):

@@ -2,23 +2,18 @@
 
 A :class:`RoadTable` holds all roads of a map as flat arrays; every method takes arrays of roads or
 lanes with an s each and answers all of them at once.
-
-The surface (section 8): with the reference line's heading :math:`\\psi`, slope :math:`\\theta` and
-superelevation :math:`\\rho`, road coordinates (s, t, h) are at ``R(s) + t e_t + h e_h``, where
-``e_t`` is the level left-hand normal turned by :math:`\\rho` about the line's direction ``e_s``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from odscen.ids import LaneKey, RoadId
-from odscen.opendrive.geometry import PlanPoints, PlanView
-from odscen.opendrive.model import Lane, LaneSection, OpenDrive, Road
+from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.profiles import (
     CubicTable,
     FloatArray,
@@ -27,6 +22,16 @@ from odscen.opendrive.profiles import (
     locate,
     offsets,
 )
+from odscen.opendrive.surface import (
+    LineOffset,
+    ReferencePoints,
+    line_curvature,
+    line_direction,
+    on_surface,
+)
+
+if TYPE_CHECKING:
+    from odscen.opendrive.model import Lane, LaneSection, OpenDrive, Road
 
 BoolArray = NDArray[np.bool_]
 
@@ -44,27 +49,11 @@ _LANE_CHANGE_CODES = {
 }
 
 
-class ReferencePoints(NamedTuple):
-    """Points of reference lines, shape ``(N,)`` each; metres and radians.
-
-    ``pitch`` is the angle of the slope, positive uphill; ``roll`` the superelevation, positive when
-    the left side is higher.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    z: FloatArray
-    hdg: FloatArray
-    curvature: FloatArray
-    pitch: FloatArray
-    roll: FloatArray
-
-
 class LanePoints(NamedTuple):
     """Points of lane lines, shape ``(N,)`` each; metres, radians, 1/m.
 
-    ``hdg`` and ``pitch`` are those of the line itself, along growing s; ``curvature`` is positive to
-    the left; ``width`` is that of the lane.
+    ``hdg`` and ``pitch`` are those of the line itself, along growing s; ``curvature`` is positive
+    to the left; ``width`` is that of the lane.
     """
 
     x: FloatArray
@@ -74,14 +63,6 @@ class LanePoints(NamedTuple):
     pitch: FloatArray
     curvature: FloatArray
     width: FloatArray
-
-
-class _Offset(NamedTuple):
-    """t of a line with its first and second derivative by s."""
-
-    t: FloatArray
-    slope: FloatArray
-    bend: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,15 +184,15 @@ class RoadTable:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Inertial x, y, z of road coordinates (s, t, h); ``z`` is h, metres above the surface."""
         line = self.reference(road, s)
-        return _on_surface(line, np.asarray(t, dtype=np.float64), np.asarray(z, dtype=np.float64))
+        return on_surface(line, np.asarray(t, dtype=np.float64), np.asarray(z, dtype=np.float64))
 
     def lane_offset(self, road: IntArray, s: FloatArray) -> FloatArray:
-        """t of the centre line of each road at s."""
+        """Give t of the centre line of each road at s."""
         return self.offset.at(np.asarray(road), np.asarray(s, dtype=np.float64))[0]
 
     # ------------------------------------------------------------------------- lanes
     def lane_borders(self, lane: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """t of the inner and the outer border of each lane (row) at s."""
+        """Give t of the inner and the outer border of each lane (row) at s."""
         lane = np.asarray(lane)
         inner, outer = self._borders(lane, self._within(lane, s))
         return inner.t, outer.t
@@ -240,7 +221,7 @@ class RoadTable:
         s = self._within(lane, s)
         road = self.lane_road[lane]
         inner, outer = self._borders(lane, s)
-        line = _Offset(*(a + at * (b - a) for a, b in zip(inner, outer, strict=True)))
+        line = LineOffset(*(a + at * (b - a) for a, b in zip(inner, outer, strict=True)))
         plan = self.plan.at(road, s)
         elevation = self.elevation.at(road, s)
         roll = self.superelevation.at(road, s)
@@ -249,20 +230,20 @@ class RoadTable:
         reference = ReferencePoints(
             plan.x, plan.y, elevation[0], plan.hdg, plan.curvature, np.arctan(elevation[1]), roll[0]
         )
-        x, y, z = _on_surface(reference, line.t, low + at * (high - low))
-        turn, pitch = _direction(plan, elevation, roll, line)
+        x, y, z = on_surface(reference, line.t, low + at * (high - low))
+        turn, pitch = line_direction(plan, elevation, roll, line)
         return LanePoints(
             x=x,
             y=y,
             z=z,
             hdg=plan.hdg + turn,
             pitch=pitch,
-            curvature=_curvature(plan, line),
+            curvature=line_curvature(plan, line),
             width=np.abs(outer.t - inner.t),
         )
 
     def _within(self, lane: IntArray, s: FloatArray) -> FloatArray:
-        """s held within the lane's section.
+        """Hold s within the lane's section.
 
         The end belongs to the next section, whose lane offset may differ: the last number before
         it is used instead, so that a lane is continuous up to its end.
@@ -270,7 +251,7 @@ class RoadTable:
         last = np.nextafter(self.lane_s1[lane], -np.inf)
         return np.maximum(np.minimum(s, last), self.lane_s0[lane])
 
-    def _borders(self, lane: IntArray, s: FloatArray) -> tuple[_Offset, _Offset]:
+    def _borders(self, lane: IntArray, s: FloatArray) -> tuple[LineOffset, LineOffset]:
         """Inner and outer border: widths are summed from the centre line outwards.
 
         A ``border`` record is the t of the lane's outer border, counted like widths from the centre
@@ -280,11 +261,11 @@ class RoadTable:
         inner = [part.copy() for part in centre]
         outer = [part.copy() for part in centre]
         rank = self.lane_rank[lane]
-        side = np.where(self.lane_id[lane] > 0, 1, -1)
+        side = np.sign(self.lane_id[lane])
         has_borders = self.borders.starts.size > 0
         for k in range(1, int(np.max(rank, initial=0)) + 1):
             at = np.flatnonzero(rank >= k)
-            row = lane[at] - side[at] * (rank[at] - k)
+            row = lane[at] - side[at] * (rank[at] - np.int64(k))
             for part, done in zip(outer, inner, strict=True):
                 done[at] = part[at]
             width = _not_negative(self.widths.at(row, s[at]))
@@ -292,7 +273,7 @@ class RoadTable:
                 part[at] += side[at] * value
             if has_borders:
                 self._use_borders(outer, centre, at, row, s)
-        return _Offset(*inner), _Offset(*outer)
+        return LineOffset(*inner), LineOffset(*outer)
 
     def _use_borders(
         self,
@@ -386,64 +367,3 @@ def _not_negative(
         return width
     value, slope, bend = (np.where(negative, 0.0, part) for part in width)
     return value, slope, bend
-
-
-def _on_surface(
-    line: ReferencePoints, t: FloatArray, h: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """R + t e_t + h e_h in inertial coordinates."""
-    sin_p, cos_p = np.sin(line.pitch), np.cos(line.pitch)
-    sin_r, cos_r = np.sin(line.roll), np.cos(line.roll)
-    # In the frame (level direction, level left normal, up) of the reference line:
-    # e_t = (-sin_r sin_p, cos_r, sin_r cos_p), e_h = (-cos_r sin_p, -sin_r, cos_r cos_p).
-    ahead = -(t * sin_r + h * cos_r) * sin_p
-    left = t * cos_r - h * sin_r
-    up = (t * sin_r + h * cos_r) * cos_p
-    sin, cos = np.sin(line.hdg), np.cos(line.hdg)
-    return (
-        line.x + ahead * cos - left * sin,
-        line.y + ahead * sin + left * cos,
-        line.z + up,
-    )
-
-
-def _direction(
-    plan: PlanPoints,
-    elevation: tuple[FloatArray, FloatArray, FloatArray],
-    superelevation: tuple[FloatArray, FloatArray, FloatArray],
-    line: _Offset,
-) -> tuple[FloatArray, FloatArray]:
-    """Heading relative to the reference line, and pitch, of the line ``R(s) + t(s) e_t(s)``.
-
-    The derivative by s, in the frame (level direction, level left normal, up) of the reference
-    line: ``(1, 0, z') + t' e_t + t e_t'`` with :math:`e_t = (-sin\\rho sin\\theta, cos\\rho,
-    sin\\rho cos\\theta)`; the frame itself turns with the curvature.
-    """
-    _, slope, bend = elevation
-    roll, twist, _ = superelevation
-    pitch = np.arctan(slope)
-    pitch_rate = bend / (1.0 + slope * slope)
-    sin_p, cos_p = np.sin(pitch), np.cos(pitch)
-    sin_r, cos_r = np.sin(roll), np.cos(roll)
-    k, t, t1 = plan.curvature, line.t, line.slope
-    ahead_rate = -twist * cos_r * sin_p - sin_r * cos_p * pitch_rate - k * cos_r
-    left_rate = -twist * sin_r - k * sin_r * sin_p
-    up_rate = twist * cos_r * cos_p - sin_r * sin_p * pitch_rate
-    ahead = 1.0 - t1 * sin_r * sin_p + t * ahead_rate
-    left = t1 * cos_r + t * left_rate
-    up = slope + t1 * sin_r * cos_p + t * up_rate
-    return np.arctan2(left, ahead), np.arctan2(up, np.hypot(ahead, left))
-
-
-def _curvature(plan: PlanPoints, line: _Offset) -> FloatArray:
-    """Curvature in the plane of the line at offset t(s), positive to the left as s grows.
-
-    With :math:`q = 1 - \\kappa t` the line's direction is (q, t') in the reference line's frame, so
-    that :math:`\\kappa_t = (\\kappa + (t'' q + t' (\\kappa' t + \\kappa t')) / v^2) / v`,
-    :math:`v^2 = q^2 + t'^2`. Superelevation is left out: it changes this by its square.
-    """
-    k, k1 = plan.curvature, plan.change
-    q = 1.0 - k * line.t
-    v2 = np.maximum(q * q + line.slope * line.slope, 1e-12)
-    turn = (line.bend * q + line.slope * (k1 * line.t + k * line.slope)) / v2
-    return (k + turn) / np.sqrt(v2)

@@ -1,17 +1,18 @@
 """The road model: OpenDRIVE's elements as frozen values, with the standard's own names.
 
-Lengths in metres, angles in radians, speeds in m/s (converted at parsing), ids as strings. One class
-per element of the standard; section numbers refer to ASAM OpenDRIVE 1.8.0. Nothing here evaluates
-geometry: see :mod:`odscen.opendrive.lanes`.
+Lengths in metres, angles in radians, speeds in m/s (converted at parsing), ids as strings. One
+class per element of the standard; section numbers refer to ASAM OpenDRIVE 1.8.0. Nothing here
+evaluates geometry: see :mod:`odscen.opendrive.lanes`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from odscen.ids import JunctionId, RoadId
+if TYPE_CHECKING:
+    from odscen.ids import JunctionId, RoadId
 
 ContactPoint = Literal["start", "end"]
 TrafficRule = Literal["RHT", "LHT"]
@@ -71,7 +72,7 @@ class RoadMark(NamedTuple):
 
 
 class LaneSpeed(NamedTuple):
-    """``<speed>`` of a lane; ``max`` in m/s, infinite for "no limit". ``s`` is a road coordinate."""
+    """``<speed>`` of a lane; ``max`` in m/s, infinite for "no limit". ``s`` is that of the road."""
 
     s: float
     max: float
@@ -113,7 +114,7 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class LaneSection:
-    """One ``<laneSection>`` from ``s`` to ``s_end``; ``lanes`` from the leftmost id to the rightmost.
+    """One ``<laneSection>`` from ``s`` to ``s_end``; ``lanes`` from leftmost id to rightmost.
 
     The centre lane (id 0, no width) is among them, for its road marks.
     """
@@ -125,7 +126,7 @@ class LaneSection:
 
 
 class RoadLink(NamedTuple):
-    """Predecessor or successor of a road; ``element_s`` and ``element_dir`` for virtual junctions."""
+    """Predecessor or successor of a road; ``element_s``, ``element_dir`` for virtual junctions."""
 
     element_type: Literal["road", "junction"]
     element_id: str
@@ -135,7 +136,7 @@ class RoadLink(NamedTuple):
 
 
 class RoadType(NamedTuple):
-    """``<type>`` of a road from ``s`` on; ``speed`` in m/s, infinite for "no limit", or ``None``."""
+    """``<type>`` of a road from ``s`` on; ``speed`` in m/s (infinite: "no limit") or ``None``."""
 
     s: float
     type: str
@@ -204,7 +205,7 @@ class RoadObject:
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One ``<signal>`` (section 14); ``value`` in m/s if ``unit`` is a speed, else as in the file."""
+    """One ``<signal>`` (section 14); ``value`` in m/s if ``unit`` is a speed, else as written."""
 
     id: str
     name: str
@@ -264,7 +265,7 @@ class Road:
 
 
 class Connection(NamedTuple):
-    """``<connection>`` of a junction; in a direct junction ``connecting_road`` is the linked road."""
+    """``<connection>`` of a junction; a direct junction's linked road is ``connecting_road``."""
 
     id: str
     incoming_road: RoadId
@@ -282,7 +283,7 @@ class JunctionPriority(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Junction:
-    """One ``<junction>``; ``type`` is ``default`` (common), ``direct``, ``virtual`` or ``crossing``."""
+    """One ``<junction>``; ``type`` ``default`` (common), ``direct``, ``virtual``, ``crossing``."""
 
     id: JunctionId
     name: str
@@ -305,7 +306,7 @@ class Controller:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """``<header>``; ``geo_reference`` is the text as given, ``crs`` its WKT if pyproj understands it."""
+    """``<header>``; ``geo_reference`` as given, ``crs`` its WKT if pyproj understands it."""
 
     rev_major: int
     rev_minor: int

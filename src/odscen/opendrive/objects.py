@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from odscen.ids import RoadId
-from odscen.opendrive.lanes import RoadTable
-from odscen.opendrive.model import OpenDrive, Outline, RoadObject, Signal, Validity
-from odscen.opendrive.profiles import FloatArray
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from odscen.ids import RoadId
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.model import OpenDrive, Outline, RoadObject, Signal, Validity
+    from odscen.opendrive.profiles import FloatArray
 
 SignalKind = Literal["traffic_light", "pedestrian_light", "stop", "yield", "speed_limit", "other"]
 
@@ -82,7 +84,7 @@ def object_outline(table: RoadTable, road: RoadId, obj: RoadObject) -> tuple[Flo
     without any size has none. ``pitch`` and ``roll`` of the object are not applied.
     """
     row = table.road_index[road]
-    outlines = [outline for outline in obj.outlines if len(outline.corners) >= 2]  # noqa: PLR2004
+    outlines = [outline for outline in obj.outlines if len(outline.corners) >= 2]
     if outlines:
         return tuple(_corners(table, row, obj, outline) for outline in outlines)
     if obj.length and obj.width:
@@ -104,8 +106,8 @@ def _corners(table: RoadTable, road: int, obj: RoadObject, outline: Outline) -> 
     s, t, z = values[~is_local].T
     points[~is_local] = np.stack(table.points(np.full(s.shape, road), s, t, z), axis=1)
     # Files of the 1.4 age repeat the first corner at the end.
-    closed = len(points) > 2 and np.allclose(points[0], points[-1], rtol=0.0, atol=1e-6)  # noqa: PLR2004
-    return points[:-1] if closed else points
+    closed = len(points) > 2 and np.allclose(points[0], points[-1], rtol=0.0, atol=1e-6)
+    return points[:-1].copy() if closed else points
 
 
 def _from_local(table: RoadTable, road: int, obj: RoadObject, local: FloatArray) -> FloatArray:
@@ -144,7 +146,7 @@ def _crosswalk(
 ) -> Crosswalk | None:
     polygon = outline[:, :2]
     area = _signed_area(polygon)
-    if len(polygon) < 3 or abs(area) < 0.01:  # noqa: PLR2004
+    if len(polygon) < 3 or abs(area) < 0.01:
         return None
     if area < 0.0:
         polygon = polygon[::-1]
@@ -181,7 +183,7 @@ def _crossing_direction(polygon: FloatArray, normal: FloatArray) -> FloatArray:
     along, across = np.ptp(polygon @ directions.T, axis=0), np.ptp(polygon @ sideways.T, axis=0)
     best = int(np.argmin(np.round(along * across, 9)))
     sides = ((directions[best], along[best]), (sideways[best], across[best]))
-    side = max(sides, key=lambda item: abs(float(item[0] @ normal)) * item[1])[0]
+    side: FloatArray = max(sides, key=lambda item: abs(float(item[0] @ normal)) * item[1])[0]
     return side if float(side @ normal) >= 0.0 else -side
 
 
@@ -190,13 +192,14 @@ def _chord(polygon: FloatArray, along: FloatArray) -> FloatArray:
     across = np.array([-along[1], along[0]])
     u, v = polygon @ along, polygon @ across
     middle = 0.5 * (v.min() + v.max())
-    if np.ptp(v) < 1e-6:  # a line drawn there and back  # noqa: PLR2004
-        return np.stack([u.min() * along, u.max() * along]) + middle * across
-    u1, v1 = np.roll(u, -1), np.roll(v, -1)
-    crossing = (np.minimum(v, v1) <= middle) & (np.maximum(v, v1) >= middle) & (v != v1)
-    share = (middle - v[crossing]) / (v1 - v)[crossing]
-    at = u[crossing] + share * (u1 - u)[crossing]
-    return np.stack([at.min() * along, at.max() * along]) + middle * across
+    at = u
+    if np.ptp(v) > 1e-6:  # else it is a line drawn there and back
+        u1, v1 = np.roll(u, -1), np.roll(v, -1)
+        crossing = (np.minimum(v, v1) <= middle) & (np.maximum(v, v1) >= middle) & (v != v1)
+        share = (middle - v[crossing]) / (v1 - v)[crossing]
+        at = u[crossing] + share * (u1 - u)[crossing]
+    ends: FloatArray = np.outer([at.min(), at.max()], along) + middle * across
+    return ends
 
 
 def stop_lines(odr: OpenDrive, table: RoadTable) -> tuple[StopLine, ...]:
@@ -216,7 +219,7 @@ def _stop_line(table: RoadTable, road: RoadId, obj: RoadObject) -> StopLine | No
         points = _from_local(table, table.road_index[road], obj, local)
     else:
         return None
-    if len(points) > 2:  # noqa: PLR2004 - the middle line of the painted rectangle
+    if len(points) > 2:
         ends = _chord(points[:, :2], _long_side(points[:, :2]))
     else:
         ends = points[:, :2].copy()

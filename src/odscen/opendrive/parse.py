@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import re
 from contextlib import nullcontext
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.errors import in_file
-from odscen.ids import JunctionId, RoadId
 from odscen.opendrive.model import Controller, Header, Junction, OpenDrive, Road
 from odscen.opendrive.parse_checks import check_numbers
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
@@ -30,6 +29,9 @@ from odscen.opendrive.parse_xml import (
     refusal,
     shown,
 )
+
+if TYPE_CHECKING:
+    from odscen.ids import JunctionId, RoadId
 
 READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
@@ -104,7 +106,7 @@ def _header(root: Element, element: Element | None, notes: Notes) -> Header:
     major, minor = integer(element, "revMajor"), integer(element, "revMinor")
     if major != 1 or minor < 0:
         raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")
-    if not 4 <= minor <= 8:  # noqa: PLR2004
+    if not 4 <= minor <= 8:
         detail = f"OpenDRIVE {major}.{minor} is read by the rules of 1.4 to 1.8"
         notes.add(Rule.VERSION, element, detail)
     groups = children(element)

@@ -1,4 +1,4 @@
-"""Checks of numbers across elements: does the geometry fit together, is every value sensible?
+"""Checks of numbers across elements: geometry fits together, values are sensible.
 
 All roads are checked at once on flattened arrays; only what is noted or refused is looked at one by
 one.
@@ -7,16 +7,21 @@ one.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from odscen.errors import OpenDriveError
-from odscen.ids import RoadId
 from odscen.opendrive import parse_rules as rules
 from odscen.opendrive.geometry import PlanView
-from odscen.opendrive.model import Road
 from odscen.opendrive.parse_rules import Notes, Rule
 from odscen.opendrive.profiles import CubicTable, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from odscen.ids import RoadId
+    from odscen.opendrive.model import Road
 
 Name = Callable[[int], str]
 """Path of the element of a row."""
@@ -50,13 +55,14 @@ def _namer(roads: list[Road], groups: list[int], tag: str) -> Name:
     return name
 
 
-def _refuse_any(
-    bad: np.typing.NDArray[np.bool_], name: Name, problem: Callable[[int], str]
-) -> None:
-    rows = np.flatnonzero(bad)
-    if rows.size:
-        row = int(rows[0])
+def _refuse_any(bad: NDArray[np.bool_], name: Name, problem: Callable[[int], str]) -> None:
+    for row in _rows(bad):
         raise OpenDriveError(problem(row), element=name(row))
+
+
+def _rows(mask: NDArray[np.bool_]) -> list[int]:
+    """Rows at which ``mask`` holds."""
+    return [int(row) for row in np.flatnonzero(mask)]
 
 
 # ----------------------------------------------------------------------------- plan view
@@ -78,7 +84,7 @@ def _check_plan_view(roads: list[Road], notes: Notes) -> None:
         name,
         lambda i: f"ends at s={plan.s[i] + plan.length[i]:.6g}, but {says[i]} is {end_s[i]:.6g}",
     )
-    for i in np.flatnonzero(np.abs(missing) > rules.S_TOLERANCE):
+    for i in _rows(np.abs(missing) > rules.S_TOLERANCE):
         detail = f"its end and {says[i]} differ by {abs(missing[i]):.3g} m"
         notes.add(Rule.PLAN_VIEW_S, name(i), detail)
 
@@ -110,7 +116,7 @@ def _note_joints(
     turn = plan.curves.start_heading(plan.cubic, plan.hdg)[inner + 1] - end_hdg[inner]
     kink[inner] = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
     noted = (gap > rules.GAP_TOLERANCE) | (kink > rules.KINK_TOLERANCE)
-    for i in np.flatnonzero(noted):
+    for i in _rows(noted):
         detail = f"ends {gap[i]:.3g} m and {kink[i]:.3g} rad off the start of the next"
         notes.add(Rule.PLAN_VIEW_GAP, name(i), detail)
 
@@ -128,7 +134,7 @@ def _check_curves(plan: PlanView, name: Name, notes: Notes) -> None:
             f"but length={plan.length[i]:.6g}"
         ),
     )
-    for i in np.flatnonzero(np.abs(stretch - 1.0) > rules.CURVE_TOLERANCE):
+    for i in _rows(np.abs(stretch - 1.0) > rules.CURVE_TOLERANCE):
         detail = f"the curve is {stretch[i] * plan.length[i]:.6g} m long, not {plan.length[i]:.6g}"
         notes.add(Rule.CURVE_LENGTH, name(i), detail)
 
@@ -172,7 +178,7 @@ def _check_lane_widths(roads: list[Road], notes: Notes) -> None:
     low, high, at = _extremes(table, ends)
 
     def name(row: int) -> str:
-        return lanes[group[row]][0]
+        return lanes[int(group[row])][0]
 
     _refuse_any(
         ~(low >= -rules.MAX_NEGATIVE_WIDTH),
@@ -184,7 +190,7 @@ def _check_lane_widths(roads: list[Road], notes: Notes) -> None:
         name,
         lambda i: f"width reaches {high[i]:.6g} m; the limit is {rules.MAX_WIDTH:g} m",
     )
-    for i in np.flatnonzero(low < -rules.WIDTH_TOLERANCE):
+    for i in _rows(low < -rules.WIDTH_TOLERANCE):
         detail = f"width at s={at[i]:.6g} is {low[i]:.3g} m and counts as 0"
         notes.add(Rule.NEGATIVE_WIDTH, name(i), detail)
     _note_jumps(table, ends, name, notes)
@@ -196,7 +202,8 @@ def _record_ends(table: CubicTable, ends: FloatArray) -> FloatArray:
     following = np.append(table.starts[1:], 0.0)
     filled = np.flatnonzero(sizes)
     following[table.first[filled + 1] - 1] = ends[filled]
-    return np.maximum(following, table.starts)
+    ends_at: FloatArray = np.maximum(following, table.starts)
+    return ends_at
 
 
 def _extremes(table: CubicTable, ends: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -208,10 +215,9 @@ def _extremes(table: CubicTable, ends: FloatArray) -> tuple[FloatArray, FloatArr
     # Extremes lie at the ends, or where b + 2 c ds + 3 d ds^2 = 0; the form without
     # cancellation of the roots also covers d = 0.
     q = -(c + np.copysign(np.sqrt(np.maximum(c * c - 3.0 * b * d, 0.0)), c))
-    places = [np.zeros_like(a), length]
-    for root in (q / (3.0 * d), b / q):
-        places.append(np.where((root > 0.0) & (root < length), root, 0.0))
-    ds = np.stack(places)
+    roots = (q / (3.0 * d), b / q)
+    inside = [np.where((root > 0.0) & (root < length), root, 0.0) for root in roots]
+    ds = np.stack([np.zeros_like(a), length, *inside])
     values = a + ds * (b + ds * (c + ds * d))
     lowest = np.argmin(values, axis=0)
     columns = np.arange(a.size)
@@ -229,7 +235,7 @@ def _note_jumps(table: CubicTable, ends: FloatArray, name: Name, notes: Notes) -
     jump[1:] = a[1:] - end_value[:-1]
     jump[table.first[:-1][np.diff(table.first) > 0]] = 0.0
     jump[1:][ds[:-1] <= 0.0] = 0.0  # a record of no length has no value to jump from
-    for i in np.flatnonzero(np.abs(jump) > rules.JUMP_TOLERANCE):
+    for i in _rows(np.abs(jump) > rules.JUMP_TOLERANCE):
         notes.add(Rule.JUMP, name(i), f"jumps by {jump[i]:.3g} m at s={table.starts[i]:.6g}")
 
 

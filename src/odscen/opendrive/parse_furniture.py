@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from odscen.opendrive.model import (
     Corner,
@@ -26,6 +25,9 @@ from odscen.opendrive.parse_xml import (
     required,
     shown,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 IGNORED: Final = frozenset({"bridge", "tunnel", "objectReference"})
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
-from collections.abc import Sequence
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.opendrive.model import (
     Lane,
@@ -38,6 +38,9 @@ from odscen.opendrive.parse_xml import (
     unread,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
 READ: Final = frozenset(
     {"link", "width", "border", "height", "roadMark", "speed", "access", "userData"}
 )
@@ -59,7 +62,7 @@ def parse_sections(
     """All lane sections of a road of ``length`` metres."""
     elements = groups.get("laneSection", [])
     if not elements:
-        raise refusal(lanes.getparent() or lanes, "there is no laneSection")
+        raise refusal(lanes, "there is no laneSection")
     starts: list[float] = []
     for element in elements:
         s = number(element, "s", limit=MAX_ROAD_LENGTH)
@@ -108,7 +111,7 @@ def _section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSect
 def _check_ids(element: Element, ids: list[int], notes: Notes) -> None:
     """Check lane ids, given in descending order."""
     if len(set(ids)) != len(ids):
-        twice = next(a for a, b in zip(ids, ids[1:], strict=False) if a == b)
+        twice = next(a for a, b in itertools.pairwise(ids) if a == b)
         raise refusal(element, f"there are two lanes with the id {twice}")
     if ids[0] - ids[-1] + 1 != len(ids):
         shown = ", ".join(map(str, ids[:20]))
@@ -208,9 +211,7 @@ def _road_marks(elements: Sequence[Element], s0: float) -> tuple[RoadMark, ...]:
     marks: list[RoadMark] = []
     for element in elements:
         get = element.get
-        lane_change = _LANE_CHANGES.get(get("laneChange"))
-        if lane_change is None:
-            lane_change = choice(element, "laneChange", _LANE_CHANGES)
+        lane_change = choice(element, "laneChange", _LANE_CHANGES)
         marks.append(
             RoadMark(
                 _s(element, s0),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from odscen.ids import JunctionId, RoadId
 from odscen.opendrive.model import (
@@ -16,6 +16,9 @@ from odscen.opendrive.model import (
     SignalReference,
 )
 from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
 Roads = dict[RoadId, Road]
 Junctions = dict[JunctionId, Junction]

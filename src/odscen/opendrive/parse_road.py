@@ -150,7 +150,7 @@ def _plan_view(
     elements = [] if plan_view is None else children(plan_view).get("geometry", [])
     if not elements:
         raise refusal(road, "there is no planView geometry")
-    geometry = []
+    geometry: list[Geometry] = []
     for element in elements:
         s = number(element, "s", limit=MAX_ROAD_LENGTH)
         if number(element, "length", limit=MAX_ROAD_LENGTH) == 0.0:

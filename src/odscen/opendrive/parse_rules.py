@@ -1,4 +1,4 @@
-"""What the parser tolerates and where it stops: every rule has a name, every use of one is noted."""
+"""What the parser tolerates and where it stops: rules have names, every use of one is noted."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Rule(StrEnum):
     PLAN_VIEW_GAP = "plan-view-gap"
     """Successive geometries may miss each other by up to 10 m; positions stay as written."""
     CURVE_LENGTH = "curve-length"
-    """A paramPoly3 may be up to twice or half as long as its ``length``; it is run through evenly."""
+    """A paramPoly3 may be up to twice or half as long as its ``length``; the run is evened."""
     ZERO_LENGTH = "zero-length"
     """Geometries and lane sections too short to hold a point have no effect."""
     LATE_START = "late-start"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 from odscen.opendrive.model import Cubic, Validity
 from odscen.opendrive.parse_rules import MAX_LANE_ID, MAX_NUMBER, Notes, Rule
 from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _SPEED_UNITS: Final[dict[str | None, float]] = {
     None: 1.0,
@@ -59,7 +61,7 @@ def _check_same(element: Element, s_name: str, s: float, last: float, notes: Not
 
 
 def speed(element: Element, notes: Notes) -> float | None:
-    """Speed in m/s of a ``max`` attribute, infinite for "no limit", ``None`` where none is given."""
+    """Speed in m/s of a ``max`` attribute, infinite for "no limit", ``None`` if none is given."""
     text = element.get("max", "").strip()
     if text == "no limit":
         return math.inf

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Container, Mapping
-from typing import TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
 
 from odscen.errors import OpenDriveError
 
+if TYPE_CHECKING:
+    from collections.abc import Container, Mapping
+
 Element = etree._Element
 T = TypeVar("T")
+
+_BOOLEANS: Final[dict[str | None, bool]] = {
+    "true": True,
+    "1": True,
+    "yes": True,
+    "false": False,
+    "0": False,
+    "no": False,
+}
 
 _CONTAINERS = frozenset(
     {"OpenDRIVE", "planView", "elevationProfile", "lateralProfile", "lanes", "left", "center"}
@@ -20,7 +31,12 @@ _CONTAINERS = frozenset(
 )
 _NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection", "controller"})
 _SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
-_UNDERSCORED_NUMBER = re.compile(rb"[\"'][ \t\r\n]*[-+]?[0-9.]+_[0-9.]*[\"']")
+_UNDERSCORED = re.compile(rb"[\"'][ \t\r\n]*[-+]?[0-9.]+_[0-9._]*[ \t\r\n]*[\"']")
+_TEXTS = frozenset(
+    {"id", "name", "text", "elementId", "junction", "incomingRoad", "connectingRoad", "date"}
+    | {"linkedRoad", "signalId", "type", "subtype", "high", "low", "mainRoad", "version"}
+)
+"""Attributes that may look like such a number and mean a text."""
 
 
 def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
@@ -60,13 +76,10 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
         msg = "not well-formed XML: no element"
         raise OpenDriveError(msg)
     dtd = root.getroottree().docinfo.internalDTD
-    if dtd is not None and any(True for _ in dtd.iterentities()):
+    if dtd is not None and any(dtd.iterentities()):  # type: ignore[union-attr]  # not in the stubs
         msg = "the file declares XML entities; these are refused"
         raise OpenDriveError(msg)
-    found = _UNDERSCORED_NUMBER.search(data)
-    if found is not None and re.search(rb"[0-9]_[0-9]", found[0]):
-        # Python's float() would read "1_000" as a number; XML has no such numbers. Text attributes
-        # that look like this exist only as ids, and are told apart by the caller never seeing them.
+    if _UNDERSCORED.search(data):
         _refuse_underscored_numbers(root)
     if b"xmlns" in data:
         _drop_namespaces(root)
@@ -74,17 +87,17 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
 
 
 def _refuse_underscored_numbers(root: Element) -> None:
-    texts = {"id", "name", "text", "elementId", "junction", "incomingRoad", "connectingRoad"}
-    texts |= {"linkedRoad", "signalId", "type", "subtype", "high", "low", "mainRoad", "date"}
+    """Refuse ``1_000``: Python's float() would take it for a number, XML has no such numbers."""
     for element in root.iter(etree.Element):
         for name, value in element.items():
-            if name not in texts and re.fullmatch(r"\s*[-+]?[0-9.]+_[0-9._]*\s*", str(value)):
-                raise refusal(element, f"{name}={shown(str(value))} is not a number")
+            text = cast("str", value)
+            if name not in _TEXTS and _UNDERSCORED.search(f'"{text}"'.encode()):
+                raise refusal(element, f"{name}={shown(text)} is not a number")
 
 
 def _drop_namespaces(root: Element) -> None:
     for element in root.iter(etree.Element):
-        if "{" in element.tag:
+        if "{" in str(element.tag):
             element.tag = etree.QName(element).localname
 
 
@@ -182,12 +195,7 @@ def choice(element: Element, name: str, options: Mapping[str | None, T]) -> T:
 
 def boolean(element: Element, name: str, *, default: bool = False) -> bool:
     """An XML Schema boolean (also ``yes`` and ``no``, which the standard uses)."""
-    return choice(
-        element,
-        name,
-        {"true": True, "1": True, "yes": True, "false": False, "0": False, "no": False}
-        | {None: default, "": default},
-    )
+    return choice(element, name, {**_BOOLEANS, None: default, "": default})
 
 
 def children(element: Element) -> dict[str, list[Element]]:

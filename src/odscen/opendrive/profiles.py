@@ -7,20 +7,23 @@ each and are answered all at once; there is no Python loop over roads or lanes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.opendrive.model import Cubic
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from odscen.opendrive.model import Cubic
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
 def offsets(sizes: Iterable[int]) -> IntArray:
-    """Start of each group in a flattened array, and the end of the last; shape ``(groups + 1,)``."""
+    """Start of each group in a flattened array, and the end of the last: ``(groups + 1,)``."""
     return np.concatenate([[0], np.cumsum(np.fromiter(sizes, np.int64))])
 
 
@@ -57,7 +60,7 @@ def locate(starts: FloatArray, first: IntArray, group: IntArray, s: FloatArray) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CubicTable:
-    """Flattened cubics; ``first`` has shape ``(groups + 1,)``, ``coefficients`` ``(records, 4)``."""
+    """Flattened cubics; ``first`` has shape ``(groups + 1,)``, ``coefficients`` ``(n, 4)``."""
 
     first: IntArray
     starts: FloatArray

@@ -8,20 +8,23 @@ with the driving direction of both lanes are given.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from odscen.ids import LaneKey
+from odscen.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
-from odscen.opendrive.model import (
-    Connection,
-    ContactPoint,
-    Junction,
-    Lane,
-    OpenDrive,
-    Road,
-    RoadLink,
-)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from odscen.opendrive.model import (
+        Connection,
+        ContactPoint,
+        Junction,
+        Lane,
+        OpenDrive,
+        Road,
+        RoadLink,
+    )
 
 End = Literal["start", "end"]
 
@@ -58,7 +61,6 @@ def lane_successors(odr: OpenDrive) -> dict[LaneKey, tuple[LaneKey, ...]]:
 
 def _within_and_beyond(road: Road, odr: OpenDrive) -> Iterator[tuple[LaneKey, LaneKey]]:
     """Relations that the links of the road's own lanes state."""
-    last = len(road.sections) - 1
     for number, section in enumerate(road.sections):
         for lane in section.lanes.values():
             if not lane.id:
@@ -67,27 +69,32 @@ def _within_and_beyond(road: Road, odr: OpenDrive) -> Iterator[tuple[LaneKey, La
             ids = lane.successors if forward else lane.predecessors
             if not ids:
                 continue
-            if forward and number < last:
-                places = (road, number + 1, "start")
-            elif not forward and number > 0:
-                places = (road, number - 1, "end")
-            else:
-                link = road.successor if forward else road.predecessor
-                places = _linked(link, odr)
-            if places is None:
+            place = _following_place(road, number, odr, forward=forward)
+            if place is None:
                 continue
-            target, target_section, contact = places
+            target, target_section, contact = place
             here = LaneKey(road.id, number, lane.id)
             for lane_id in ids:
                 if _enters(target, target_section, lane_id, contact):
                     yield here, LaneKey(target.id, target_section, lane_id)
 
 
+def _following_place(
+    road: Road, number: int, odr: OpenDrive, *, forward: bool
+) -> tuple[Road, int, End] | None:
+    """Road, section and end of it that follow a section, without junctions."""
+    if forward and number < len(road.sections) - 1:
+        return road, number + 1, "start"
+    if not forward and number > 0:
+        return road, number - 1, "end"
+    return _linked(road.successor if forward else road.predecessor, odr)
+
+
 def _linked(link: RoadLink | None, odr: OpenDrive) -> tuple[Road, int, End] | None:
     """Road, section and end of it that a plain road link leads to."""
     if link is None or link.element_type != "road" or link.contact_point is None:
         return None
-    road = odr.roads.get(link.element_id)  # type: ignore[call-overload]
+    road = odr.roads.get(RoadId(link.element_id))
     if road is None:
         return None
     return road, end_section(road, link.contact_point), link.contact_point
