@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.lanegraph.model import BoolArray, FloatArray, LaneGraph, PedestrianGraph, Relation
+from odscen.lanegraph.paths import MIN_EDGE_LENGTH
 from odscen.scenario.bodies import SIDE_GAP, Crowd, box_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
     from odscen.categories import Body, Category
 
@@ -106,32 +108,49 @@ def crowd_for(bodies: Mapping[Category, Body], *, minimum_gap: float) -> Crowd:
     return Crowd(float(largest))
 
 
-def distance_to_end(
-    ends: NDArray[np.integer], graph: LaneGraph | PedestrianGraph, mask: BoolArray
-) -> FloatArray:
-    """Metres from each node to the nearest of ``ends``, inside ``mask``; infinite without.
+def distance_to_end(ends: NDArray[np.integer], graph: LaneGraph, mask: BoolArray) -> FloatArray:
+    """Metres from each node along the lanes to the nearest of ``ends``, inside ``mask``.
 
-    For the lane graph the way follows the edges' direction.
+    Infinite where no end can be reached.
     """
-    from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    count = len(graph.x)
     if not len(ends):
-        return np.full(count, np.inf)
+        return np.full(len(graph.x), np.inf)
+    matrix = _shortest_edges(graph, mask).T.tocsr()
+    return np.asarray(dijkstra(matrix, indices=ends, min_only=True), dtype=np.float64)
+
+
+class Reach:
+    """What can be reached on the lane graph inside ``mask``; quick, for many spawns."""
+
+    def __init__(self, graph: LaneGraph, mask: BoolArray) -> None:
+        self._edges = _shortest_edges(graph, mask)
+        self._mask = mask
+
+    def of(self, node: int) -> BoolArray:
+        """Nodes that can be reached from ``node``, itself included; shape ``(N,)``."""
+        from scipy.sparse.csgraph import breadth_first_order
+
+        reached = np.zeros(len(self._mask), dtype=np.bool_)
+        if self._mask[node]:
+            reached[breadth_first_order(self._edges, node, return_predecessors=False)] = True
+        return reached
+
+
+def _shortest_edges(graph: LaneGraph, mask: BoolArray) -> csr_array:
+    """Edges with both ends in ``mask``, the shortest of parallel ones, with their lengths."""
+    from scipy.sparse import csr_array
+
+    count = len(graph.x)
     inside = mask[graph.source] & mask[graph.target]
-    backward = (graph.target[inside], graph.source[inside])
-    weights = np.maximum(graph.length[inside], 1e-6)
-    order = np.lexsort((weights, *backward))
-    keys = np.stack(backward, axis=1)[order]
-    first = np.ones(len(keys), dtype=bool)
-    first[1:] = np.any(keys[1:] != keys[:-1], axis=1)
-    matrix = csr_array(
-        (weights[order][first], (keys[first, 0], keys[first, 1])), shape=(count, count)
-    )
-    directed = isinstance(graph, LaneGraph)
-    found = dijkstra(matrix, directed=directed, indices=ends, min_only=True)
-    return np.asarray(found, dtype=np.float64)
+    source, target = graph.source[inside], graph.target[inside]
+    length = np.maximum(graph.length[inside], MIN_EDGE_LENGTH)
+    order = np.lexsort((length, target, source))
+    source, target, length = source[order], target[order], length[order]
+    first = np.ones(len(source), dtype=np.bool_)
+    first[1:] = (source[1:] != source[:-1]) | (target[1:] != target[:-1])
+    return csr_array((length[first], (source[first], target[first])), shape=(count, count))
 
 
 def _step(good: BoolArray, source: np.ndarray, target: np.ndarray) -> BoolArray:

@@ -16,13 +16,13 @@ import numpy as np
 
 from odscen.categories import Category
 from odscen.errors import ScenarioError
-from odscen.lanegraph.paths import Router, WalkRouter
 from odscen.scenario.behaviour import draw_behaviour
 from odscen.scenario.bodies import Box, Crowd, box_at
 from odscen.scenario.distributions import draw_key, draw_place
 from odscen.scenario.document import Actor, Environment, MapReference, Scenario, Simulation
 from odscen.scenario.files import validated
 from odscen.scenario.goals import stream
+from odscen.scenario.places import Reach
 from odscen.scenario.placing import place_at_random
 from odscen.scenario.region import Place, Region, name_of
 from odscen.scenario.supply import Usable, vehicle_supply, walker_supply
@@ -273,16 +273,16 @@ def _drafts(
     """Give each spot a goal and a behaviour; a spot without a goal that can be used is dropped."""
     walk = bool(spots) and spots[0].category is Category.PEDESTRIAN
     rng = stream(seed, "walkers" if walk else "vehicles")
-    usable_ways: Router | WalkRouter | None = None
-    if walk and usable.walkable is not None:
-        usable_ways = WalkRouter(region.graph, region.walks & usable.walkable)
-    elif not walk and usable.drivable is not None:
-        usable_ways = Router(region.graph, region.lanes & usable.drivable)
+    reach = None
+    if usable.drivable is not None and not walk:
+        reach = Reach(region.graph.lanes, region.lanes & usable.drivable)
     drafts = []
     for spot in spots:
         goals: IntArray = region.candidates(Place(walk, spot.node))
-        if usable_ways is not None:
-            goals = goals[usable_ways.reachable(spot.node)[goals]]
+        if reach is not None:
+            goals = goals[reach.of(spot.node)[goals]]
+        elif walk and usable.walkable is not None:
+            goals = goals[usable.walkable[goals]]
         if len(goals):
             goal = int(goals[int(rng.integers(len(goals)))])
             body = supply.bodies[spot.category]

@@ -30,7 +30,7 @@ class Usable:
     drivable
         Shape ``(N,)``: lane-graph nodes that a way can lead over.
     walkable
-        Shape ``(P,)``: pedestrian nodes on which a walker can be placed and walk.
+        Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
     bodies
         Size of each category.
     """
@@ -91,11 +91,11 @@ def walker_supply(region: Region, usable: Usable) -> Supply:
     """Places for pedestrians: on walks from which another place can be reached."""
     walks = region.graph.walks
     allowed = region.walks & _or_all(usable.walkable, len(walks.x))
-    inside = allowed[walks.source] & allowed[walks.target]
+    inside = region.walks[walks.source] & region.walks[walks.target]
     connected = np.zeros(len(walks.x), dtype=np.bool_)
     connected[walks.source[inside]] = True
     connected[walks.target[inside]] = True
-    masks = {Category.PEDESTRIAN: connected}
+    masks = {Category.PEDESTRIAN: allowed & connected}
     shares = {Category.PEDESTRIAN: 1.0}
     fit = max_fit(walks, usable.bodies, masks, shares=shares, minimum_gap=WALKER_GAP)
     return Supply(walks, usable.bodies, masks, shares, WALKER_GAP, fit)
