@@ -100,6 +100,10 @@ def test_the_report_is_well_formed_and_says_what_happened():
     assert "Crossing" in text
     assert "Completed, 2 of 2 expectations not met" in text
     assert "3 actors planned" in text
+    assert (
+        "1 of 3 actors reached their goal; 1 was still on the way at the end; "
+        "1 never entered the road; 1 had to be teleported; 2 collided."
+    ) in text
     assert "2 entered the road 66.7 % of the planned" in text
     assert "1 reached their goal" in text
     assert "2.0 cm largest start error" in text

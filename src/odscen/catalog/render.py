@@ -8,23 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from odscen.catalog.layers import (
-    AREA_COLORS,
-    AREA_NAMES,
-    CROSSWALK_COLOR,
-    FONT,
-    PEDESTRIAN_NODE_COLOR,
-    RELATION_COLORS,
-    SEGMENT_COLORS,
-    SYMBOL_NAMES,
-    VEHICLE_NODE_COLOR,
-    LayerOptions,
-    graph_layers,
-    map_layers,
-    segment_layer,
-    symbol_shapes,
-    symbol_text,
-)
+from odscen.catalog.layers import FONT, LayerOptions, graph_layers, map_layers, segment_layer
+from odscen.catalog.legend import INK, legend, legend_entries
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.errors import MissingDependencyError
 
@@ -35,14 +20,11 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive
 
-_PAPER, _LAND, _INK, _SOFT = "#ffffff", "#f3f1ea", "#22282e", "#5d6870"
+_PAPER, _LAND, _SOFT = "#ffffff", "#f3f1ea", "#5d6870"
 _SHEET = 1200.0
 """Width of the sheet; all sizes below are in these units."""
-_MARGIN, _HEAD, _ROW = 36.0, 74.0, 24.0
-_TALLEST = 1350.0
+_MARGIN, _HEAD = 36.0, 74.0
 _SYMBOL = 18.0
-_CHAR = 0.56
-"""Width of a letter over its font size, on average."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +110,10 @@ def render_drawing(
     foot = 0.0
     if options.margins:
         parts.append(_head(drawing, statistics, frame))
-        legend, foot = _legend(_entries(drawing, graph, options), frame)
-        parts.append(legend)
+        entries = legend_entries(drawing, graph, options)
+        low = frame.top + frame.height
+        listed, foot = legend(entries, left=frame.left, top=low, width=frame.inner)
+        parts.append(listed)
     parts.append(_map(frame, inside))
     height = frame.top + frame.height + frame.margin + foot
     svg = element(
@@ -213,7 +197,7 @@ def _map(frame: _Frame, inside: Markup) -> Markup:
 
 
 def _text(
-    x: float, y: float, text: str, *, size: float, fill: str = _INK, **attributes: str
+    x: float, y: float, text: str, *, size: float, fill: str = INK, **attributes: str
 ) -> Markup:
     return element(
         "text", text, x=float(x), y=float(y), font_size=float(size), fill=fill, **attributes
@@ -273,8 +257,8 @@ def _scale_bar(frame: _Frame) -> Markup:
     right = frame.width - frame.margin - 60
     wide = length * frame.scale
     y = frame.margin + 20
-    halves = element("rect", x=right - wide, y=y, width=wide, height=7.0, fill=_PAPER, stroke=_INK)
-    halves += element("rect", x=right - wide, y=y, width=wide / 2, height=7.0, fill=_INK)
+    halves = element("rect", x=right - wide, y=y, width=wide, height=7.0, fill=_PAPER, stroke=INK)
+    halves += element("rect", x=right - wide, y=y, width=wide / 2, height=7.0, fill=INK)
     parts = [halves]
     for share in (0.0, 0.5, 1.0):
         text = number(length * share, 3) if share < 1.0 else length_text(length)
@@ -291,93 +275,8 @@ def _north(x: float, y: float) -> Markup:
     left = element("path", d=f"M{centre} {tip}L{number(x - 11)} {low}L{centre} {notch}z")
     data = f"M{centre} {tip}L{number(x + 11)} {low}L{centre} {notch}z"
     right = element("path", d=data, fill=_PAPER)
-    arrow = element("g", left, right, fill=_INK, stroke=_INK, stroke_linejoin="round")
+    arrow = element("g", left, right, fill=INK, stroke=INK, stroke_linejoin="round")
     return arrow + _text(x, y + 34, "N", size=13, font_weight="700", text_anchor="middle")
-
-
-def _entries(
-    drawing: MapDrawing, graph: MapGraph | None, options: RenderOptions
-) -> list[tuple[Markup, str]]:
-    """Swatches and names of what occurs, and only that."""
-    present = {area.kind for area in drawing.areas}
-    entries = [
-        (_box(AREA_COLORS[kind]), AREA_NAMES[kind]) for kind in AREA_NAMES if kind in present
-    ]
-    if drawing.crosswalks.total:
-        entries.append((_zebra(), "Crosswalk"))
-    if options.symbols:
-        kinds = {symbol.kind for symbol in drawing.symbols}
-        kinds -= set() if options.speed_limits else {"speed_limit"}
-        entries += [(_sign(kind), text) for kind, text in SYMBOL_NAMES.items() if kind in kinds]
-    if graph is not None and options.segments:
-        entries.append((_bands(), "Segments"))
-    if graph is not None and options.graph:
-        entries += _graph_entries(graph)
-    return entries
-
-
-def _graph_entries(graph: MapGraph) -> list[tuple[Markup, str]]:
-    names = ("Successor", "Lane change left", "Lane change right")
-    relations = set(graph.lanes.relation.tolist())
-    entries = [(_dot(VEHICLE_NODE_COLOR), "Vehicle node")]
-    entries += [
-        (_stroke(RELATION_COLORS[k]), name) for k, name in enumerate(names) if k in relations
-    ]
-    if len(graph.walks.x):
-        entries.append((_dot(PEDESTRIAN_NODE_COLOR), "Pedestrian node"))
-    return entries
-
-
-def _box(color: str) -> Markup:
-    return element("rect", y=-7, width=18, height=14, rx=3, fill=color)
-
-
-def _zebra() -> Markup:
-    bars = [
-        element("rect", x=x, y=-5, width=2.5, height=10, fill="#fff") for x in (2.5, 7.75, 13.0)
-    ]
-    ground = element("rect", y=-8, width=18, height=16, rx=3, fill=CROSSWALK_COLOR)
-    return join([ground, element("rect", x=1.5, y=-5, width=15, height=10, fill="#7b828b"), *bars])
-
-
-def _sign(kind: str) -> Markup:
-    parts = [element("use", href=f"#k-s-{kind}")]
-    if kind == "speed_limit":
-        parts.append(symbol_text("50", size=40, fill="#1d2126"))
-    return element("g", *parts, transform="translate(9 0) scale(.19)")
-
-
-def _dot(color: str) -> Markup:
-    return element("circle", cx=9, r=5.5, fill=color, stroke=_INK, stroke_width=0.5)
-
-
-def _bands() -> Markup:
-    bands = [
-        element("rect", x=6 * k, y=-7, width=6, height=14, fill=color, opacity=0.6)
-        for k, color in enumerate(SEGMENT_COLORS[:3])
-    ]
-    return join(bands)
-
-
-def _stroke(color: str) -> Markup:
-    return element("path", d="M0 0h18", stroke=color, stroke_width=3)
-
-
-def _legend(entries: list[tuple[Markup, str]], frame: _Frame) -> tuple[Markup, float]:
-    """Legend below the map in as many rows as it takes, and its height."""
-    if not entries:
-        return Markup(""), 0.0
-    x, y = frame.left, frame.top + frame.height + 30.0
-    parts = [symbol_shapes("k-")]
-    for swatch, text in entries:
-        wide = 27.0 + len(text) * 14.5 * _CHAR + 24.0
-        if x + wide > frame.left + frame.inner + 24.0:
-            x, y = frame.left, y + _ROW
-        place = f"translate({number(x)} {number(y)})"
-        label = _text(27, 5, text, size=14.5)
-        parts.append(element("g", swatch, label, transform=place))
-        x += wide
-    return join(parts), y - (frame.top + frame.height) + 2.0
 
 
 def svg_to_png(svg: str, *, width: int = 2400) -> bytes:

@@ -75,7 +75,7 @@ def render_report(
     end = _end(summary, traces)
     title = plan.scenario or "Run"
     body = [
-        _head(title, plan, summary),
+        _head(title, plan, summary, _in_a_sentence(actors)),
         _key_figures(summary, actors, traces),
         _map_section(traces, plan, actors, events, drawing),
         _speed_section(traces, end),
@@ -144,7 +144,27 @@ def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
     return ("good" if status == "completed" else "fair"), words
 
 
-def _head(title: str, plan: Plan, summary: Mapping[str, Any]) -> Markup:
+def _in_a_sentence(actors: Sequence[ActorOutcome]) -> str:
+    """What became of the actors, in one sentence for people."""
+    counts = actor_counts(actors)
+    if not counts["planned"]:
+        return ""
+    parts = [f"{counts['arrived']:,} of {counts['planned']:,} actors reached their goal"]
+    if counts["running"]:
+        verb = "was" if counts["running"] == 1 else "were"
+        parts.append(f"{counts['running']:,} {verb} still on the way at the end")
+    if counts["waiting"]:
+        parts.append(f"{counts['waiting']:,} never entered the road")
+    trouble = [
+        f"{counts[key]:,} {word}"
+        for key, word in (("teleported", "had to be teleported"), ("collided", "collided"))
+        if counts[key]
+    ]
+    parts += trouble or ["nobody was teleported or collided"]
+    return "; ".join(parts) + "."
+
+
+def _head(title: str, plan: Plan, summary: Mapping[str, Any], sentence: str) -> Markup:
     style, words = _verdict(summary)
     facts = [
         ("Map", summary.get("map")),
@@ -164,6 +184,7 @@ def _head(title: str, plan: Plan, summary: Mapping[str, Any]) -> Markup:
         element("p", "Run report", class_="kind"),
         element("h1", title),
         element("p", words, class_=f"verdict {style}"),
+        element("p", sentence) if sentence else None,
         element("pre", str(reason), class_="reason") if reason else None,
         element("p", *shown, class_="facts"),
     )
