@@ -10,9 +10,12 @@ Peer: ``carla.Map(name, text)``, ``generate_waypoints(2.0)``, and for each waypo
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bench.common import paired, shared_maps
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 TOWNS = ("carla-2019/Town04", "carla-2020/Town04")
 AIM = 3.0
@@ -37,7 +40,8 @@ def _compare(carla: object, path: Path, town: str) -> None:
     data = text.encode()
     ours, full, ratio = paired(lambda: _lane_graph(data), lambda: _map(carla, text, relations=True))
     print(
-        f"{town}: lane graph {ours:.3f} s, carla.Map with waypoints, next, left, right {full:.3f} s, "
+        f"{town}: lane graph {ours:.3f} s, "
+        f"carla.Map with waypoints, next, left, right {full:.3f} s, "
         f"ratio {ratio:.2f} (aim {AIM:g})"
     )
     ours, bare, ratio = paired(
