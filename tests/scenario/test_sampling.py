@@ -13,7 +13,7 @@ from odscen.lanegraph.model import MapGraph
 from odscen.lanegraph.query import is_connected, node_index
 from odscen.opendrive.parse import parse
 from odscen.scenario.checks import check
-from odscen.scenario.config import MapFilter, SamplingConfig, loads_config
+from odscen.scenario.config import MapFilter, SamplingConfig, loads_config, overridden
 from odscen.scenario.distributions import Choice, Constant, Normal, Uniform
 from odscen.scenario.files import dumps
 from odscen.scenario.goals import stream
@@ -137,7 +137,12 @@ def test_excluded_segments_stay_outside() -> None:
 
 
 STATISTICS = {
-    "small": {"junctions": 1.0, "road_length": 500.0, "speed_limit_max": None},
+    "small": {
+        "bounds": [0, 0, 1, 1],
+        "junctions": 1.0,
+        "road_length": 500.0,
+        "speed_limit_max": None,
+    },
     "town": {"junctions": 30.0, "road_length": 9500.0, "speed_limit_max": 14.0},
     "motorway": {"junctions": 0.0, "road_length": 4000.0, "speed_limit_max": 36.0},
 }
@@ -177,6 +182,16 @@ def test_every_problem_of_a_configuration_is_named() -> None:
         loads_config('{"vehicles": {"pedestrian": 1}}')
     with pytest.raises(ScenarioError, match="low 3 is above high 1"):
         loads_config('fill = {kind = "uniform", low = 3, high = 1}')
+
+
+def test_fill_and_region_size_can_be_fixed_from_outside() -> None:
+    fixed = overridden(SamplingConfig(), fill=0.5, roi_segments=3)
+    assert (fixed.fill, fixed.roi.segments) == (Constant(value=0.5), Constant(value=3))
+    assert overridden(SamplingConfig()) == SamplingConfig()
+    with pytest.raises(ScenarioError, match="between 0 and 1"):
+        overridden(SamplingConfig(), fill=1.5)
+    with pytest.raises(ScenarioError, match="at least 1"):
+        overridden(SamplingConfig(), roi_segments=0)
 
 
 @pytest.mark.parametrize(

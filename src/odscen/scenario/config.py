@@ -15,7 +15,7 @@ from odscen.categories import Category
 from odscen.errors import ScenarioError
 from odscen.scenario.distributions import Constant, Distribution, Normal, Uniform
 from odscen.scenario.document import DrivingStyle, Label, Part
-from odscen.scenario.files import validation_problems
+from odscen.scenario.files import validated, validation_problems
 
 Share = Annotated[float, Field(ge=0)]
 Probability = Annotated[float, Field(ge=0, le=1)]
@@ -171,6 +171,28 @@ class SamplingConfig(Part):
             msg = "a fill share lies between 0 and 1"
             raise ValueError(msg)
         return fill
+
+
+def overridden(
+    config: SamplingConfig, *, fill: float | None = None, roi_segments: int | None = None
+) -> SamplingConfig:
+    """Return the configuration with a fixed fill share or number of segments, where given.
+
+    Raises
+    ------
+    ScenarioError
+        If the value is not possible.
+    """
+    changes: dict[str, Any] = {}
+    if fill is not None:
+        changes["fill"] = fill
+    if roi_segments is not None:
+        if roi_segments < 1:
+            msg = f"a region has at least 1 segment, not {roi_segments}"
+            raise ScenarioError(msg, element="roi.segments")
+        changes["roi"] = {"segments": roi_segments}
+    fields = {name: getattr(config, name) for name in SamplingConfig.model_fields}
+    return validated(SamplingConfig, fields | changes)
 
 
 def loads_config(text: str, *, file: str | None = None) -> SamplingConfig:

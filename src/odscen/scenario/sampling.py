@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -40,15 +40,13 @@ ATTEMPTS = 20
 """Regions that are tried before a map counts as having no place for an actor."""
 
 
-def choose_map(
-    maps: MapFilter, statistics: Mapping[str, Mapping[str, float | None]], *, seed: int
-) -> str:
+def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, seed: int) -> str:
     """Draw a map by its statistics (R19).
 
     Parameters
     ----------
     statistics
-        For each map of the catalogue, its numeric statistics by name.
+        For each map of the catalogue, its statistics by name; those that are numbers count.
 
     Raises
     ------
@@ -56,14 +54,15 @@ def choose_map(
         If a statistic is unknown or no map passes the filter.
     """
     used = {*maps.where, *([maps.weight_by] if maps.weight_by else [])}
-    known = {name for of_map in statistics.values() for name in of_map}
+    numbers = {name: _numbers(of_map) for name, of_map in statistics.items()}
+    known = {name for of_map in numbers.values() for name in of_map}
     if statistics and (unknown := sorted(used - known)):
         msg = f"no statistic {unknown[0]!r}; there are {', '.join(sorted(known))}"
         raise ScenarioError(msg, element="maps")
     weights = {
         name: weight
-        for name in sorted(statistics)
-        if (weight := _map_weight(maps, name, statistics[name])) > 0
+        for name in sorted(numbers)
+        if (weight := _map_weight(maps, name, numbers[name])) > 0
     }
     if not weights:
         msg = f"none of the {len(statistics)} maps passes the filter; widen it or add maps"
@@ -176,7 +175,15 @@ def numbers_to_place(
     return cars, people
 
 
-def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float | None]) -> float:
+def _numbers(statistics: Mapping[str, Any]) -> dict[str, float]:
+    return {
+        name: float(value)
+        for name, value in statistics.items()
+        if isinstance(value, (int, float)) and not isinstance(value, bool)
+    }
+
+
+def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float]) -> float:
     """Chance of a map, 0 if it does not pass the filter; a missing number passes no bounds."""
     if not any(fnmatchcase(name, pattern) for pattern in maps.names):
         return 0.0
@@ -186,7 +193,7 @@ def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float | Non
         value = statistics.get(statistic)
         if value is None or not bounds.holds(value):
             return 0.0
-    return 1.0 if maps.weight_by is None else float(statistics.get(maps.weight_by) or 0.0)
+    return 1.0 if maps.weight_by is None else max(statistics.get(maps.weight_by, 0.0), 0.0)
 
 
 def _neighbour_table(graph: MapGraph) -> dict[SegmentId, tuple[SegmentId, ...]]:
