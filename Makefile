@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: demo test check format bench golden maps clean
+.PHONY: demo test check format bench golden maps large-town check-maps clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -34,6 +34,16 @@ golden: $(READY)
 # Writes maps/*.xodr again.
 maps: $(READY)
 	$(BIN)/python -m tools.make_maps
+
+# A town with 140 junctions, for trials of scale.
+large-town: $(READY)
+	$(BIN)/python -m tools.make_maps --only large_town -o build
+
+# ASAM's own checks on the shipped maps; they need NumPy 1, hence an environment of their own.
+check-maps: $(READY)
+	$(PYTHON) -m venv build/qc
+	build/qc/bin/pip install --quiet --disable-pip-version-check 'asam-qc-opendrive>=1.0'
+	build/qc/bin/python tools/check_maps.py maps/*.xodr
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "odscen needs Python 3.11 or newer; this is " + sys.version.split()[0])'

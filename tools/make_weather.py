@@ -94,7 +94,7 @@ def _ours() -> list[dict[str, Any]]:
             "kind": kind,
             "time_of_day": time,
             "source": "odscen",
-            "parameters": {key: 0.0 for key in PARAMETERS} | AIR | SUN[time] | values,
+            "parameters": dict.fromkeys(PARAMETERS, 0.0) | AIR | SUN[time] | values,
         }
         for kind, values in OURS.items()
         for ending, time in TIMES.items()

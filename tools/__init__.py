@@ -1,0 +1,1 @@
+"""Maintainers' scripts; odscen itself never imports them."""

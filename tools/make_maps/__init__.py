@@ -1,0 +1,1 @@
+"""Maintainers' tool: writes the OpenDRIVE maps that ship in ``maps/``."""

@@ -1,0 +1,48 @@
+"""``python -m tools.make_maps [--only NAME] [-o DIR]``: write the maps that ship.
+
+``large_town`` is written only when it is named: it is too large to keep in the repository.
+"""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+from scenariogeneration import xodr
+
+from tools.make_maps.document import document, mirrored, text
+from tools.make_maps.maps import MAPS, ON_DEMAND
+
+SHIPPED = Path(__file__).parents[2] / "maps"
+
+
+def main() -> None:
+    """Write the maps asked for."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--only", choices=[*MAPS, *ON_DEMAND])
+    parser.add_argument("-o", "--out", type=Path, default=SHIPPED)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name in [arguments.only] if arguments.only else MAPS:
+        target = arguments.out / f"{name}.xodr"
+        target.write_text(map_text(name), encoding="utf-8")
+        print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")
+
+
+def map_text(name: str) -> str:
+    """Text of one map."""
+    # The library remembers ids over all maps of a process; ours start afresh with each.
+    for kind in (xodr.Object, xodr.Signal, xodr.SignalReference):
+        kind._usedIDs.clear()
+        kind._IDCounter.clear()
+    # It also prints a warning for each signalReference, whose id is that of its signal on purpose.
+    with redirect_stdout(StringIO()):
+        builder = (MAPS | ON_DEMAND)[name](name)
+    root = document(builder)
+    return text(mirrored(root) if name.startswith("left_hand") else root)
+
+
+if __name__ == "__main__":
+    main()
