@@ -15,16 +15,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from odscen.convert.net import INTERNAL, NORMAL
 from odscen.convert.pieces import Piece
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
     from odscen.convert.net import Net
     from odscen.convert.sampling import LaneSamples
     from odscen.ids import SumoLaneId
 
 FloatArray = NDArray[np.float64]
+
+
+MOST_LINKS = 12
+"""Lanes in a chain; two for a junction, three for each stub between junctions."""
 
 
 class Place(NamedTuple):
@@ -36,29 +41,43 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Internal lanes that one after the other connect two normal lanes."""
+    """Lanes that one after the other connect two normal lanes: internal ones and stubs."""
 
     before: SumoLaneId
     via: tuple[SumoLaneId, ...]
     after: SumoLaneId
 
 
-def chains_of(net: Net) -> list[Chain]:
-    """Return one chain for each connection between normal lanes that has internal lanes."""
-    onwards: dict[SumoLaneId, SumoLaneId] = {}
-    starts = []
+def chains_of(net: Net, stubs: Container[SumoLaneId]) -> list[Chain]:
+    """Return the chains of a network, in the order of its connections.
+
+    Parameters
+    ----------
+    stubs
+        Normal lanes that count as inner links of a chain: what netconvert leaves, a few decimetres
+        long, of a road whose ends it has trimmed away.
+    """
+    after: dict[SumoLaneId, list[SumoLaneId]] = {}
+    starts: list[SumoLaneId] = []
     for connection in net.connections:
-        inside = net.edges[net.lanes[connection.from_lane].edge].function
-        if inside == "internal":
-            onwards[connection.from_lane] = connection.via
-        elif inside == "normal" and connection.via:
-            starts.append(connection)
-    found = []
-    for connection in starts:
-        via = [connection.via]
-        while onwards.get(via[-1]) and onwards[via[-1]] not in via:
-            via.append(onwards[via[-1]])
-        found.append(Chain(connection.from_lane, tuple(via), connection.to_lane))
+        function = net.edges[net.lanes[connection.from_lane].edge].function
+        target = net.edges[net.lanes[connection.to_lane].edge].function
+        if function not in (NORMAL, INTERNAL) or target != NORMAL:
+            continue
+        after.setdefault(connection.from_lane, []).append(connection.via or connection.to_lane)
+        if function == NORMAL and connection.from_lane not in stubs:
+            starts.append(connection.from_lane)
+    found: list[Chain] = []
+    for start in dict.fromkeys(starts):
+        open_ways: list[tuple[SumoLaneId, ...]] = [(lane,) for lane in reversed(after[start])]
+        while open_ways:
+            way = open_ways.pop()
+            last = way[-1]
+            if last not in stubs and net.edges[net.lanes[last].edge].function == NORMAL:
+                found.append(Chain(start, way[:-1], last))
+            elif len(way) < MOST_LINKS:
+                further = [lane for lane in after.get(last, ()) if lane not in way]
+                open_ways += [(*way, lane) for lane in reversed(further)]
     return found
 
 

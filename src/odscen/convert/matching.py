@@ -30,6 +30,8 @@ FLATTEN = 0.5
 """Share of heights that counts: decks are told apart, superelevation (SUMO has none) is not."""
 NEIGHBOURS = 10
 
+_TIP = 0.1
+"""Metres: shorter pieces are left out, unless the lane has no other."""
 _STRAY = 3
 """Samples: a shorter run on another lane, between two runs on the same lane, is a stray."""
 
@@ -157,7 +159,7 @@ def pieces_of(
             _Run(lane, pos[a:b], found.s[part][a:b], found.deviation[part][a:b])
             for lane, a, b in runs
         ]
-        own = _meeting(own, lanes, table)
+        own = _without_tips(_meeting(own, lanes, table))
         for run in own:
             piece = Piece(int(lanes.rows[run.lane]), int(row), run.pos, run.s, run.deviation)
             kept = monotone(piece, growing=_growing(run, lanes, table))
@@ -223,6 +225,12 @@ def _meeting(runs: list[_Run], lanes: LaneSamples, table: RoadTable) -> list[_Ru
             np.insert(two.deviation, 0, two.deviation[0]),
         )
     return made
+
+
+def _without_tips(runs: list[_Run]) -> list[_Run]:
+    """Drop what a SUMO lane touches of the lanes before and after its own at its very ends."""
+    long = [run for run in runs if run.pos[-1] - run.pos[0] > _TIP]
+    return long or runs
 
 
 def _growing(run: _Run, lanes: LaneSamples, table: RoadTable) -> bool:

@@ -13,6 +13,7 @@ from lxml import etree
 
 from odscen.convert.report import Entry, Fate
 from odscen.errors import OpenDriveError
+from odscen.opendrive.model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _STRAIGHT = 1e-9
 """1/m: netconvert divides by the curvature of arcs; below this one they are lines."""
 
+_SAME_S = 1e-6
 _JOINT = 0.01
 """Length in metres of the connecting roads that stand for the links of direct junctions."""
 
@@ -38,7 +40,7 @@ def prepare_for_netconvert(xodr: bytes) -> tuple[bytes, tuple[Entry, ...]]:
     except etree.XMLSyntaxError as error:
         msg = f"not XML: {error}"
         raise OpenDriveError(msg) from error
-    notes = [*_signals(root), *_straight_curves(root), *_direct_junctions(root)]
+    notes = [*_speeds(root), *_signals(root), *_straight_curves(root), *_direct_junctions(root)]
     if not notes:
         return xodr, ()
     return etree.tostring(root, encoding="utf-8", xml_declaration=True), tuple(notes)
@@ -47,6 +49,10 @@ def prepare_for_netconvert(xodr: bytes) -> tuple[bytes, tuple[Entry, ...]]:
 def _all(parent: etree._Element, name: str) -> list[etree._Element]:
     """Descendants by local name; OpenDRIVE files come with and without a namespace."""
     return list(parent.iter(f"{{*}}{name}"))
+
+
+def _children(parent: etree._Element, name: str) -> list[etree._Element]:
+    return list(parent.iterchildren(f"{{*}}{name}"))
 
 
 def _child(parent: etree._Element, name: str) -> etree._Element | None:
@@ -89,6 +95,43 @@ def _number(element: etree._Element, name: str) -> float:
         return float(element.get(name, ""))
     except ValueError:
         return math.nan
+
+
+def _speeds(root: etree._Element) -> Iterator[Entry]:
+    """Write the limits of road types into drivable lanes: netconvert reads only those of lanes."""
+    count = 0
+    for road in _all(root, "road"):
+        types = [(_number(kind, "s"), _child(kind, "speed")) for kind in _children(road, "type")]
+        limits = [(s, speed) for s, speed in types if speed is not None and _is_limit(speed)]
+        if not limits:
+            continue
+        count += 1
+        sections = _all(road, "laneSection")
+        starts = [_number(section, "s") for section in sections]
+        for section, start in zip(sections, starts, strict=True):
+            here = [speed for s, speed in limits if s <= start + _SAME_S] or [limits[0][1]]
+            for lane in _all(section, "lane"):
+                if lane.get("type") in DRIVABLE_TYPES and _child(lane, "speed") is None:
+                    _insert_speed(lane, here[-1])
+        for s, _ in limits:
+            if s > _SAME_S and not any(abs(s - start) <= _SAME_S for start in starts):
+                element = f"road {road.get('id', '?')} > type s={s:g}"
+                yield Entry(Fate.LOST, element, "SUMO changes limits only where a section begins")
+    if count:
+        reason = f"limits of the types of {count} roads given to netconvert as those of the lanes"
+        yield Entry(Fate.REPAIRED, "map", reason)
+
+
+def _is_limit(speed: etree._Element) -> bool:
+    return _number(speed, "max") > 0.0
+
+
+def _insert_speed(lane: etree._Element, limit: etree._Element) -> None:
+    speed = etree.Element(
+        etree.QName(etree.QName(lane).namespace, "speed"),
+        {"sOffset": "0", "max": limit.get("max", ""), "unit": limit.get("unit", "m/s")},
+    )
+    lane.append(speed)
 
 
 class _End(NamedTuple):

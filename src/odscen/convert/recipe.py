@@ -67,7 +67,12 @@ def ladder(*, lefthand: bool) -> tuple[Rung, ...]:
         *(("--lefthand",) if lefthand else ()),
     )
     lanes = ("--opendrive.import-all-lanes", f"--type-files={TYPEMAP_FILE}")
-    walks = ("--crossings.guess", "--junctions.endpoint-shape")
+    walks = (
+        "--crossings.guess",
+        "--crossings.guess.speed-threshold=100",
+        "--default.crossing-width=2",
+        "--junctions.endpoint-shape",
+    )
     fine, coarse = "--opendrive.curve-resolution=0.5", "--opendrive.curve-resolution=2.0"
     return (
         Rung("", (*common, *lanes, *walks, fine)),

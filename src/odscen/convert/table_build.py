@@ -19,7 +19,7 @@ from odscen.convert.chains import (
 from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLink
 from odscen.convert.matching import match, pieces_of
 from odscen.convert.net import CROSSING, NORMAL, WALKING_AREA
-from odscen.convert.pieces import Piece, monotone, simplified
+from odscen.convert.pieces import LEAST_STEP, Piece, monotone, simplified
 from odscen.convert.sampling import STEP, LaneSamples, Polylines, sample_shapes
 from odscen.convert.table_json import rounded
 from odscen.opendrive.model import DRIVABLE_TYPES, WALKABLE_TYPES
@@ -41,6 +41,9 @@ _DRIVE, _WALK, _BICYCLE = range(3)
 
 _INSIDE_PENALTY = 0.5
 """Metres: lanes of connecting roads must lie this much nearer to be taken for a normal lane's."""
+
+STUB = 0.5
+"""Metres: shorter SUMO lanes are matched by what they connect, not by where they are."""
 
 LONGEST_FACTOR = 1.5
 LONGEST_EXTRA = 20.0
@@ -108,13 +111,16 @@ class _Builder:
         self.net = net
         self.roads = table
         kinds = np.array([kind_of_type(name) for name in table.lane_type], dtype=np.intp)
-        long_enough = table.lane_s1 - table.lane_s0 > 1e-6
-        rows = np.flatnonzero((kinds >= 0) & long_enough)
+        rows = np.flatnonzero(kinds >= 0)
         self.kinds = kinds[rows]
+        # Sections of no length are there in real maps: they connect, but nothing lies on them.
+        self.long = (table.lane_s1 - table.lane_s0)[rows] > LEAST_STEP
         self.keys = tuple(table.lane_keys[row] for row in rows)
         self.samples = LaneSamples.of(table, rows)
         self.position = {int(row): i for i, row in enumerate(rows)}
-        self.inside = np.array([odr.roads[key.road].junction is not None for key in self.keys])
+        self.inside = np.array(
+            [odr.roads[key.road].junction is not None for key in self.keys], dtype=np.bool_
+        )
         position = {key: i for i, key in enumerate(self.keys)}
         self.successors = {
             position[key]: tuple(position[other] for other in others if other in position)
@@ -124,6 +130,11 @@ class _Builder:
         self.lanes = list(net.lanes.values())
         self.row = {lane.id: i for i, lane in enumerate(self.lanes)}
         self.drawn = Polylines.of([lane.shape for lane in self.lanes])
+        self.stubs = {
+            lane.id
+            for lane, length in zip(self.lanes, self.drawn.length, strict=True)
+            if length < STUB and net.edges[lane.edge].function == NORMAL
+        }
         self.served: set[tuple[int, int]] = set()
         self.invented: set[tuple[int, int]] = set()
 
@@ -205,14 +216,15 @@ class _Builder:
         functions = [self.net.edges[lane.edge].function for lane in self.lanes]
         kinds = np.array(
             [
-                _kind_of_lane(lane) if function == NORMAL else -1
+                _kind_of_lane(lane) if function == NORMAL and lane.id not in self.stubs else -1
                 for lane, function in zip(self.lanes, functions, strict=True)
             ]
         )
         pieces: list[Piece] = []
         for kind in range(len(KINDS)):
             rows = np.flatnonzero(kinds == kind)
-            chosen = self.samples.chosen(np.flatnonzero(self.kinds == kind))
+            eligible = np.flatnonzero((self.kinds == kind) & self.long)
+            chosen = self.samples.chosen(eligible)
             if not len(rows) or not len(chosen.rows):
                 continue
             places = sample_shapes([self.lanes[row].shape for row in rows])
@@ -220,7 +232,7 @@ class _Builder:
                 places,
                 chosen,
                 self.roads,
-                penalty=np.where(self.inside[self.kinds == kind], _INSIDE_PENALTY, 0.0),
+                penalty=np.where(self.inside[eligible], _INSIDE_PENALTY, 0.0),
                 either_way=kind != _DRIVE,
             )
             lengths = np.array([self.lanes[row].length for row in rows])
@@ -236,7 +248,7 @@ class _Builder:
             firsts.setdefault(piece.sumo, piece)
             lasts[piece.sumo] = piece
         pieces: dict[tuple[int, int, float, float], Piece] = {}
-        for chain in chains_of(self.net):
+        for chain in chains_of(self.net, self.stubs):
             for made in self._chain(chain, firsts, lasts):
                 piece = made._replace(lane=self.position[made.lane])
                 key = piece.lane, piece.sumo, float(piece.s[0]), float(piece.s[-1])
