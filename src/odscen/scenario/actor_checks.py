@@ -196,7 +196,7 @@ def goal_problems(subject: Subject, spawn: Place) -> Iterator[Problem]:
             "interest; pick another goal or add the segment"
         )
         yield error("goal_outside_roi", where, message, nodes=nodes, segments=[segment])
-    elif spawn.walk != goal.walk or not region.reaches(spawn, goal) or spawn == goal:
+    elif not region.leads(spawn, goal):
         message = (
             f"{subject.name} cannot get from {one.spawn!r} to {one.goal!r} inside the region of "
             f"interest; pick one of its {len(candidates)} goals"

@@ -47,17 +47,18 @@ def resolve_goals(
     for index, actor in enumerate(scenario.actors):
         subject = Subject.actor(scenario, region, index)
         place, found = spawn_problems(subject)
-        if place is not None:
-            found = tuple(goal_problems(subject, place))
         problems += found
-        if place is None or any(problem.severity == "error" for problem in found):
+        if place is None:
             continue
         given = None if actor.goal is None else region.place(actor.goal)
-        if given is None:
+        if given is not None and region.leads(place, given):
+            goals[actor.id] = given.node
+            continue
+        found = tuple(goal_problems(subject, place))
+        problems += found
+        if not found:
             candidates = region.candidates(place)
             goals[actor.id] = int(stream(scenario.seed, "goal", actor.id).choice(candidates))
-        else:
-            goals[actor.id] = given.node
     refuse_errors(problems)
     return goals
 

@@ -87,9 +87,9 @@ class Region:
             return self.walk_router.goal_candidates(spawn.node)
         return self.router.goal_candidates(spawn.node)
 
-    def reaches(self, spawn: Place, goal: Place) -> bool:
-        """Whether a way inside the region leads from ``spawn`` to ``goal``."""
-        if spawn.walk != goal.walk:
+    def leads(self, spawn: Place, goal: Place) -> bool:
+        """Whether a way inside the region leads from ``spawn`` on to ``goal``."""
+        if spawn.walk != goal.walk or spawn == goal or not self.holds(goal):
             return False
         router = self.walk_router if spawn.walk else self.router
         return bool(router.reachable(spawn.node)[goal.node])
