@@ -171,6 +171,15 @@ def test_nodes_lie_on_the_lane_centres(town: Comparison) -> None:
     assert max(distances) < 0.02
 
 
+def test_changes_lead_about_one_spacing_forward(town: Comparison) -> None:
+    nodes = town.nodes
+    aside = nodes.relation != Relation.SUCCESSOR
+    source, target = nodes.source[aside], nodes.target[aside]
+    dx, dy = nodes.x[target] - nodes.x[source], nodes.y[target] - nodes.y[source]
+    forward = dx * np.cos(nodes.hdg[source]) + dy * np.sin(nodes.hdg[source])
+    assert np.all((forward > 0.9) & (forward < 3.2))
+
+
 def test_driving_lanes_are_as_long(town: Comparison) -> None:
     ours = float(town.nodes.lanes.lengths.sum())
     assert ours == pytest.approx(town.peer_length(), rel=0.002)

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from odscen.opendrive.profiles import IntArray
 
 
+MAX_PASSED = 16
+"""Lanes that an edge to the side may pass on its way one spacing ahead."""
+
+
 class Edges(NamedTuple):
     """Edges, each array of shape ``(E,)``, sorted by (source, relation, target)."""
 
@@ -115,34 +119,47 @@ def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) 
     """From each node to the adjacent lane's node about one spacing ahead, where that is permitted.
 
     Near the end of the lane section that node may lie in the one lane that follows the adjacent
-    one; if several lanes follow it, or none, there is no edge.
+    one; if several lanes follow it, or none, there is no edge. Nor is there one that would lead
+    back, as it happens where a lane swings out to many times its width.
     """
     bit, beside = (
         (CHANGE_LEFT, nodes.left) if relation is Relation.LEFT else (CHANGE_RIGHT, nodes.right)
     )
     source = np.flatnonzero(nodes.lane_change & bit)
-    lane = beside[source]
-    lines = nodes.lines
-    planned = np.diff(nodes.planned)
-    gap = np.maximum(lines.lengths / planned, 1e-6)
-    ahead = lines.offset_at(lane, nodes.s[source]) + gap[lane]
-    beyond = ahead - lines.lengths[lane]
-    k = np.rint(ahead / gap[lane] - 0.5).astype(np.int64)
-    over = k >= planned[lane]
-    only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int64)
-    goal = np.where(over, only[lane], lane)
-    reached = goal >= 0
-    source, goal = source[reached], goal[reached]
-    k_over = np.rint(np.maximum(beyond[reached], 0.0) / gap[goal] - 0.5).astype(np.int64)
-    k = np.clip(np.where(over[reached], k_over, k[reached]), 0, planned[goal] - 1)
+    goal, k = _ahead(nodes, follow, beside[source], nodes.s[source])
+    source, goal, k = source[goal >= 0], goal[goal >= 0], k[goal >= 0]
     target = nodes.kept[nodes.planned[goal] + k]
     source, target = source[target >= 0], target[target >= 0]
-    gone = (
-        nodes.x[target] - nodes.x[source],
-        nodes.y[target] - nodes.y[source],
-        nodes.z[target] - nodes.z[source],
-    )
-    return _edges(source, target, relation, np.sqrt(sum(part**2 for part in gone)))
+    dx = nodes.x[target] - nodes.x[source]
+    dy = nodes.y[target] - nodes.y[source]
+    dz = nodes.z[target] - nodes.z[source]
+    onward = dx * np.cos(nodes.hdg[source]) + dy * np.sin(nodes.hdg[source]) > 0
+    length = np.sqrt(dx * dx + dy * dy + dz * dz)
+    return _edges(source[onward], target[onward], relation, length[onward])
+
+
+def _ahead(
+    nodes: NodeTable, follow: list[list[int]], lane: IntArray, s: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Planned node nearest to one spacing ahead of s on each lane, as lane (or -1) and k on it.
+
+    Behind the end of a lane the only one that follows it goes on; short lanes are passed.
+    """
+    lengths, planned = nodes.lines.lengths, np.diff(nodes.planned)
+    gap = np.maximum(lengths / planned, 1e-6)
+    only = np.array([after[0] if len(after) == 1 else -1 for after in follow], dtype=np.int64)
+    place = nodes.lines.offset_at(lane, s) + nodes.spacing
+    goal = lane.copy()
+    k = np.rint(place / gap[goal] - 0.5).astype(np.int64)
+    over = np.arange(len(lane))
+    for _ in range(MAX_PASSED):
+        over = over[k[over] >= planned[goal[over]]]
+        place[over] -= lengths[goal[over]]
+        goal[over] = only[goal[over]]
+        over = over[goal[over] >= 0]
+        k[over] = np.maximum(np.rint(place[over] / gap[goal[over]] - 0.5), 0)
+    goal[over[k[over] >= planned[goal[over]]]] = -1
+    return goal, k
 
 
 def _edges(source: IntArray, target: IntArray, relation: Relation, length: FloatArray) -> Edges:
