@@ -176,6 +176,26 @@ def test_a_very_short_road_is_drawn():
     assert area.rings.total == 1
 
 
+def test_small_gaps_in_a_junction_are_carriageway_and_islands_are_not():
+    def square(side):
+        ways = ((-4, 0, 0), (side, -4, 90), (side + 4, side, 180), (0, side + 4, 270))
+        parts = [
+            maps.road(str(k), x=x, y=y, hdg=np.radians(turn), length=side + 8).replace(
+                'junction="-1"', 'junction="9"'
+            )
+            for k, (x, y, turn) in enumerate(ways)
+        ]
+        incoming = maps.road("in", x=-54.0, length=50.0)
+        links = '<connection id="0" incomingRoad="in" connectingRoad="0" contactPoint="start"/>'
+        junction = f'<junction id="9" name="">{links}</junction>'
+        text = maps.document(incoming, *parts).replace("</OpenDRIVE>", f"{junction}</OpenDRIVE>")
+        return sorted(ring_areas(by_kind(draw(text))["road"]))
+
+    assert min(square(3.0)) == pytest.approx(9.0)
+    assert len(square(3.0)) == 6
+    assert len(square(20.0)) == 5
+
+
 def test_real_towns_are_drawn_small_and_the_same_every_time(shared_maps):
     text = (shared_maps / "carla-2019" / "Town05.xodr").read_bytes()
     first = draw(text).to_json()

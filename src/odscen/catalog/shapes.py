@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from odscen.catalog.borders import evaluate_borders, inner_rows, thinned
 from odscen.catalog.drawing import BRIDGE, Area, Bounds, Lines, MapDrawing, Mark, offsets, ranges
-from odscen.catalog.furniture import add_furniture
+from odscen.catalog.furniture import add_furniture, rings_of
 from odscen.catalog.marks import road_marks
 from odscen.opendrive.model import DRIVABLE_TYPES
 
@@ -34,6 +34,9 @@ _MOST_PAIRS = 20_000_000
 
 _CLEARANCE = 2.5
 """Metres of height between two lanes in the same place that make one of them a bridge."""
+
+_SMALL_GAP = 15.0
+"""Square metres that lanes of a junction may leave between them without its being an island."""
 
 AREA_KINDS = {
     **dict.fromkeys(DRIVABLE_TYPES, "road"),
@@ -68,7 +71,7 @@ def map_drawing(
     borders = evaluate_borders(odr, table)
     thin = thinned(borders.lines, tolerance)
     levels = _levels(borders, table)
-    areas = _areas(thin, borders, table, levels)
+    areas = _areas(thin, borders, table, levels, _junctions(odr, table))
     sides = _bridge_sides(thin, borders, table, levels)
     drawing = MapDrawing(
         name=name,
@@ -85,7 +88,9 @@ def _bounds(parts: list[Lines]) -> Bounds:
     return (low[0], low[1], high[0], high[1])
 
 
-def _areas(thin: Lines, borders: Borders, table: RoadTable, levels: IntArray) -> tuple[Area, ...]:
+def _areas(
+    thin: Lines, borders: Borders, table: RoadTable, levels: IntArray, junction: IntArray
+) -> tuple[Area, ...]:
     lanes = len(table.lane_keys)
     if lanes == 0:
         return ()
@@ -105,9 +110,62 @@ def _areas(thin: Lines, borders: Borders, table: RoadTable, levels: IntArray) ->
     drawn = solid & (np.array(table.lane_type) != "none")
     level = levels[borders.section[:lanes]]
     groups = sorted({(int(a), str(b)) for a, b in zip(level[drawn], kinds[drawn], strict=True)})
-    return tuple(
+    areas = [
         Area(at, kind, rings.take(drawn & (level == at) & (kinds == kind))) for at, kind in groups
+    ]
+    gaps = _gaps(rings, np.where(drawn & (level == 0) & (kinds == "road"), junction, -1))
+    return tuple(
+        area._replace(rings=_joined(area.rings, gaps)) if area[:2] == (0, "road") else area
+        for area in areas
     )
+
+
+def _joined(a: Lines, b: Lines) -> Lines:
+    return Lines(np.concatenate([a.xy, b.xy]), np.concatenate([a.start, a.start[-1] + b.start[1:]]))
+
+
+def _junctions(odr: OpenDrive, table: RoadTable) -> IntArray:
+    """Number of the junction that each lane lies in, or -1."""
+    numbers = {name: k for k, name in enumerate(odr.junctions)}
+    of_road = [
+        -1 if road.junction is None else numbers.get(road.junction, -1)
+        for road in odr.roads.values()
+    ]
+    return np.array(of_road, dtype=np.int64)[np.asarray(table.lane_road)]
+
+
+def _gaps(rings: Lines, group: IntArray) -> Lines:
+    """Small holes that the rings of each group leave between them.
+
+    OpenDRIVE says nothing of the surface between the lanes of a junction; where so little of it is
+    left, it is carriageway and no island.
+    """
+    import shapely
+
+    rows = np.flatnonzero(group >= 0)
+    found = []
+    for junction in np.unique(group[rows]).tolist():
+        part = rings.take(rows[group[rows] == junction])
+        index = np.repeat(np.arange(part.total), np.diff(part.start))
+        try:
+            polygons = shapely.make_valid(
+                shapely.polygons(shapely.linearrings(part.xy, indices=index))
+            )
+            whole = shapely.union_all(polygons, grid_size=0.01)
+        except (shapely.errors.GEOSException, ValueError):
+            continue  # a folded lane: the drawing does without its gaps
+        for piece in shapely.get_parts(whole):
+            if shapely.get_type_id(piece) == 3:
+                holes = [
+                    shapely.get_interior_ring(piece, k)
+                    for k in range(shapely.get_num_interior_rings(piece))
+                ]
+                found += [
+                    shapely.get_coordinates(ring)
+                    for ring in holes
+                    if shapely.area(shapely.polygons(ring)) < _SMALL_GAP
+                ]
+    return rings_of(found)
 
 
 def _ring_areas(rings: Lines) -> FloatArray:
