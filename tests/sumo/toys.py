@@ -60,7 +60,12 @@ def street_net() -> RoadNet:
         Link(":9_0_0", "out_1"),
         Link(":9_0_1", "out_2"),
     )
-    return RoadNet({lane.id: lane for lane in lanes}, links, frozenset({("in", "out")}))
+    return RoadNet(
+        {lane.id: lane for lane in lanes},
+        links,
+        frozenset({("in", "out")}),
+        ends={"in": ("a", "9"), "out": ("9", "b")},
+    )
 
 
 def lane_places(graph: LaneGraph) -> Places:

@@ -58,6 +58,7 @@ def sumo_config(settings: RunSettings) -> str:
             "step-length": f"{settings.step_length:g}",
         },
         "processing": {
+            "ignore-route-errors": "true",
             "collision.action": "warn",
             "collision.mingap-factor": "0",
             "collision.check-junctions": "true",

@@ -38,7 +38,7 @@ class Demand:
             ("departLane", str(route.depart_lane)),
             ("departPos", number(route.depart_pos, digits=4)),
             ("departSpeed", "0"),
-            ("departPosLat", number(user.lateral_offset, digits=4)),
+            ("departPosLat", number(route.depart_pos_lat, digits=4)),
             ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
             ("arrivalPos", number(route.arrival_pos, digits=4)),
             ("speedFactor", number(driver.speed_factor, digits=4)),

@@ -57,13 +57,17 @@ class RoadNet:
     walk_links
         Pairs of edges between which one can walk, either way.
     lefthand
-        Whether traffic keeps left; lane 0 is then the leftmost.
+        Whether traffic keeps left; lane 0 is then the leftmost, and SUMO mirrors vehicles'
+        positions.
+    ends
+        Junctions that each edge comes from and goes to.
     """
 
     lanes: dict[str, NetLane]
     links: tuple[Link, ...]
     walk_links: frozenset[tuple[str, str]] = frozenset()
     lefthand: bool = False
+    ends: dict[str, tuple[str, str]] = field(default_factory=dict)
     _ways: dict[tuple[str, str, str], tuple[str, ...] | None] = field(default_factory=dict)
 
     @cached_property
@@ -120,6 +124,13 @@ class RoadNet:
         """Return the one lane of an edge on which SUMO's pedestrians walk: the outermost."""
         lanes = self.edge_lanes.get(edge, ())
         return next((lane for lane in lanes if lane.allows(PEDESTRIAN)), None)
+
+    def pos_lat(self, left: float) -> float:
+        """SUMO's lateral position of a vehicle ``left`` metres left of the middle of its lane.
+
+        Persons are not mirrored.
+        """
+        return -left if self.lefthand else left
 
     def left_of(self, lane: NetLane, other: NetLane) -> float:
         """Metres that the centre of ``lane`` lies left of that of ``other``, on the same edge."""

@@ -163,7 +163,9 @@ class _Writer:
             self.demand.add_walk(user, manner, walk)
             return walk.repairs
         vclass = KINDS[user.category].vclass
-        route = self._routes.plan(path, length=body.length, vclass=vclass)
+        route = self._routes.plan(
+            path, length=body.length, vclass=vclass, lateral_offset=user.lateral_offset
+        )
         self.demand.add_vehicle(user, manner, route)
         return route.repairs
 

@@ -76,6 +76,7 @@ class Route:
     edges: tuple[str, ...]
     depart_lane: int
     depart_pos: float
+    depart_pos_lat: float
     arrival_lane: int | None
     arrival_pos: float
     repairs: tuple[str, ...] = ()
@@ -99,7 +100,9 @@ class RoutePlanner:
         self._net = net
         self._places = places
 
-    def plan(self, path: IntArray, *, length: float, vclass: str) -> Route:
+    def plan(
+        self, path: IntArray, *, length: float, vclass: str, lateral_offset: float = 0.0
+    ) -> Route:
         """Route of a vehicle of this length along a path of the lane graph.
 
         Parameters
@@ -110,6 +113,8 @@ class RoutePlanner:
             Of the body, metres.
         vclass
             SUMO's vehicle class.
+        lateral_offset
+            Metres to the left.
 
         Raises
         ------
@@ -129,7 +134,8 @@ class RoutePlanner:
         edges, arrival_lane, arrival_pos = self._arrival(edges, path, vclass, length)
         if len(edges) == 1:  # there and back again is not meant: stop where it has just started
             arrival_pos = min(max(arrival_pos, front + 0.1), lane.length)
-        return Route(edges, lane.index, front, arrival_lane, arrival_pos, repairs)
+        lateral = self._net.pos_lat(lateral_offset)
+        return Route(edges, lane.index, front, lateral, arrival_lane, arrival_pos, repairs)
 
     def _edges(self, path: IntArray, vclass: str) -> list[str]:
         """Return normal edges that the path runs over, in order, each run of equal ones once."""

@@ -53,8 +53,8 @@ class PreparedRun:
         SUMO network file of the map.
     scenario_json
         The scenario document, kept in the run folder.
-    problems
-        What could not be realized, in words.
+    problems, notes
+        What could not be realized, and which routes had to be repaired, in words.
     about
         Further fields of the summary, for example the map's name and hash.
     """
@@ -64,6 +64,7 @@ class PreparedRun:
     net: Path
     scenario_json: str | None = None
     problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -264,6 +265,7 @@ def _summary(
         for v in evaluate(expectations, summary)
     ]
     summary["problems"] = list(prepared.problems)
+    summary["notes"] = list(prepared.notes)
     summary["files"] = _files(folder)
     summary["versions"] = {
         "odscen": __version__,

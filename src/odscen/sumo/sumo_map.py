@@ -107,7 +107,10 @@ def _road_net(table: LaneTable) -> RoadNet:
         for lane in table.lane_list
     }
     links = tuple(Link(link.from_lane, link.to_lane, link.via or None) for link in table.links)
-    return RoadNet(lanes, links, _walk_links(table), lefthand=table.lefthand)
+    ends: dict[str, tuple[str, str]] = {
+        edge.id: (edge.from_junction, edge.to_junction) for edge in table.edges.values()
+    }
+    return RoadNet(lanes, links, _walk_links(table), lefthand=table.lefthand, ends=ends)
 
 
 def _walk_links(table: LaneTable) -> frozenset[tuple[str, str]]:

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from odscen.sumo.routes import Places
 
 
+ALONG = 0.5
+"""Share of an edge that a path must cover to be walking along it, not only touching it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Walk:
     """A SUMO walk; ``depart_pos`` is where the front of the body is.
@@ -83,11 +87,23 @@ class WalkPlanner:
         return lane, place[1]
 
     def _edges(self, path: IntArray) -> list[str]:
+        """Return the edges that the path walks along, in order.
+
+        An edge that is only touched, at a corner between two crosswalks, is left out: SUMO would
+        have it walked to its other end. SUMO finds the way across a junction by itself.
+        """
         rows = self._places.lane[path]
+        starts = np.flatnonzero(np.diff(rows, prepend=-2))
+        ends = np.append(starts[1:], len(rows)) - 1
         edges: list[str] = []
-        for row in rows[rows >= 0].tolist():
-            lane = self._net.lanes[self._places.lanes[row]]
-            if not lane.internal and lane.allows(PEDESTRIAN) and lane.edge not in edges[-1:]:
+        for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+            if rows[start] < 0:
+                continue
+            lane = self._net.lanes[self._places.lanes[int(rows[start])]]
+            if lane.internal or not lane.allows(PEDESTRIAN) or lane.edge in edges[-1:]:
+                continue
+            walked = abs(float(self._places.pos[path[end]] - self._places.pos[path[start]]))
+            if start == 0 or end == len(rows) - 1 or walked >= ALONG * lane.length:
                 edges.append(lane.edge)
         return edges
 
@@ -108,9 +124,14 @@ class WalkPlanner:
         end: tuple[NetLane, float],
         edges: tuple[str, ...],
     ) -> float:
-        """Return 1 if the walk begins along its first lane, -1 if against it."""
+        """Return 1 if SUMO's walk begins along its first edge, -1 if against it."""
         if len(edges) == 1:
             return 1.0 if end[1] >= start[1] else -1.0
+        nowhere = ("", "")
+        come_from, go_to = self._net.ends.get(edges[0], nowhere)
+        others = self._net.ends.get(edges[1], nowhere)
+        if (go_to in others) != (come_from in others):
+            return 1.0 if go_to in others else -1.0
         for node in path[1:].tolist():
             place = self._places.of(node)
             if place is None or place[0] != start[0].id:

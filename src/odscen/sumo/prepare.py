@@ -1,0 +1,99 @@
+"""From a scenario and its map to a prepared run, and from a finished run to its report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.results.records import Plan, events_from_json
+from odscen.results.summary import actors_from_json
+from odscen.scenario.files import dumps
+from odscen.sumo import layout
+from odscen.sumo.realize import realize
+from odscen.sumo.runner import PreparedRun
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
+
+    from odscen.catalog.drawing import MapDrawing
+    from odscen.scenario.document import Scenario
+    from odscen.sumo.realize import Assets
+    from odscen.sumo.sumo_map import SumoMap
+
+
+def prepare(
+    scenario: Scenario,
+    sumo_map: SumoMap,
+    net: Path,
+    assets: Assets | None = None,
+    *,
+    seed: int | None = None,
+    until: float | None = None,
+    step_length: float | None = None,
+    weather: bool = True,
+) -> PreparedRun:
+    """Realize a scenario and put together what its run folder will hold.
+
+    Parameters
+    ----------
+    sumo_map
+        Of the scenario's map; made once by :meth:`odscen.sumo.sumo_map.SumoMap.of` for many runs.
+    net
+        The map's ``net.net.xml``.
+    assets, seed, until, step_length, weather
+        See :func:`odscen.sumo.realize.realize`.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    realization = realize(
+        scenario,
+        sumo_map,
+        assets,
+        seed=seed,
+        until=until,
+        step_length=step_length,
+        weather=weather,
+    )
+    return PreparedRun(
+        plan=realization.plan,
+        sumo_files=realization.files,
+        net=net,
+        scenario_json=dumps(scenario),
+        problems=realization.problems,
+        notes=realization.notes,
+        about={"map": scenario.map.name, "map_sha256": scenario.map.sha256},
+    )
+
+
+def write_report(
+    folder: Path, summary: Mapping[str, Any], *, drawing: MapDrawing | None = None
+) -> Path:
+    """Write ``report.html`` into a run folder from its files; made for ``finish`` of a run.
+
+    Parameters
+    ----------
+    drawing
+        Of the map, to be shown below the ways.
+    """
+    import polars as pl
+
+    from odscen.results.report import render_report
+
+    def text(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    page = render_report(
+        summary,
+        Plan.from_json(text(layout.PLAN_FILE)),
+        actors_from_json(text(layout.ACTORS_FILE)),
+        events_from_json(text(layout.EVENTS_FILE)),
+        pl.read_parquet(folder / layout.TRAJECTORIES_FILE),
+        drawing=drawing,
+    )
+    report = folder / layout.REPORT_FILE
+    report.write_text(page, encoding="utf-8")
+    return report
