@@ -53,7 +53,7 @@ def build_map_graph(
     InputError
         If ``spacing`` is out of range.
     OpenDriveError
-        If the map is longer than any map.
+        If the lanes together are longer than 1,000 km.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
         problem = f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m"

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SAMPLE_STEP = 1.0
 """Metres of s between samples of a centre line; a chord of 1 m at radius 5 m is 0.2 % short."""
 
-MAX_SAMPLES = 3_000_000
-"""More samples than this (3,000 km of lanes) are refused: nothing that long is a map."""
+MAX_SAMPLES = 1_000_000
+"""More samples than this (1,000 km of lanes) are refused; they take about 0.3 kB of memory each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,14 +74,17 @@ class CentreLines:
         Raises
         ------
         OpenDriveError
-            If the lanes are longer than any map's.
+            If the lanes are longer than :data:`MAX_SAMPLES` allows.
         """
         s0, s1 = table.lane_s0[rows], table.lane_s1[rows]
         extent = np.maximum(s1 - s0, 0.0)
         total = float(np.sum(extent)) / SAMPLE_STEP + 2 * len(rows)
         if not total < MAX_SAMPLES:
             longest = table.lane_keys[int(rows[np.argmax(extent)])]
-            problem = f"the lanes are {np.sum(extent):.3g} m long together; that is no map"
+            problem = (
+                f"the lanes of the map are {np.sum(extent):.3g} m long together, "
+                f"more than {MAX_SAMPLES * SAMPLE_STEP:.3g} m; this road has the longest"
+            )
             raise OpenDriveError(problem, element=f"road {longest.road}")
         count = np.ceil(extent / SAMPLE_STEP).astype(np.int64) + 1
         count = np.maximum(count, 2)
