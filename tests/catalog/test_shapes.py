@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+import shapely
 
 from odscen.catalog.drawing import BRIDGE
 from odscen.catalog.shapes import map_drawing
@@ -194,6 +195,18 @@ def test_small_gaps_in_a_junction_are_carriageway_and_islands_are_not():
     assert min(square(3.0)) == pytest.approx(9.0)
     assert len(square(3.0)) == 6
     assert len(square(20.0)) == 5
+
+
+def test_bits_of_bicycle_lanes_inside_a_crossing_are_carriageway(pytestconfig):
+    text = (pytestconfig.rootpath / "maps" / "signal_crossing.xodr").read_bytes()
+    kinds = by_kind(draw(text))
+    middle = shapely.box(-8.0, -8.0, 8.0, 8.0)
+    painted = [
+        shapely.polygons(kinds["road"].xy[a:b])
+        for a, b in itertools.pairwise(kinds["road"].start.tolist())
+    ]
+    covered = shapely.union_all(shapely.make_valid(painted))
+    assert shapely.area(shapely.difference(middle, covered)) < 0.1
 
 
 def test_real_towns_are_drawn_small_and_the_same_every_time(shared_maps):

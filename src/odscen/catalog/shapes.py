@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from odscen.catalog.borders import evaluate_borders, inner_rows, thinned
 from odscen.catalog.drawing import BRIDGE, Area, Bounds, Lines, MapDrawing, Mark, offsets, ranges
-from odscen.catalog.furniture import add_furniture, rings_of
+from odscen.catalog.furniture import add_furniture
+from odscen.catalog.gaps import small_gaps
 from odscen.catalog.marks import road_marks
 from odscen.opendrive.model import DRIVABLE_TYPES
 
@@ -34,9 +35,6 @@ _MOST_PAIRS = 20_000_000
 
 _CLEARANCE = 2.5
 """Metres of height between two lanes in the same place that make one of them a bridge."""
-
-_SMALL_GAP = 15.0
-"""Square metres that lanes of a junction may leave between them without its being an island."""
 
 AREA_KINDS = {
     **dict.fromkeys(DRIVABLE_TYPES, "road"),
@@ -113,7 +111,8 @@ def _areas(
     areas = [
         Area(at, kind, rings.take(drawn & (level == at) & (kinds == kind))) for at, kind in groups
     ]
-    gaps = _gaps(rings, np.where(drawn & (level == 0) & (kinds == "road"), junction, -1))
+    within = np.where(drawn & (level == 0) & (kinds != "sidewalk"), junction, -1)
+    gaps = small_gaps(rings, within, kinds == "road")
     return tuple(
         area._replace(rings=_joined(area.rings, gaps)) if area[:2] == (0, "road") else area
         for area in areas
@@ -132,40 +131,6 @@ def _junctions(odr: OpenDrive, table: RoadTable) -> IntArray:
         for road in odr.roads.values()
     ]
     return np.array(of_road, dtype=np.int64)[np.asarray(table.lane_road)]
-
-
-def _gaps(rings: Lines, group: IntArray) -> Lines:
-    """Small holes that the rings of each group leave between them.
-
-    OpenDRIVE says nothing of the surface between the lanes of a junction; where so little of it is
-    left, it is carriageway and no island.
-    """
-    import shapely
-
-    rows = np.flatnonzero(group >= 0)
-    found = []
-    for junction in np.unique(group[rows]).tolist():
-        part = rings.take(rows[group[rows] == junction])
-        index = np.repeat(np.arange(part.total), np.diff(part.start))
-        try:
-            polygons = shapely.make_valid(
-                shapely.polygons(shapely.linearrings(part.xy, indices=index))
-            )
-            whole = shapely.union_all(polygons, grid_size=0.01)
-        except (shapely.errors.GEOSException, ValueError):
-            continue  # a folded lane: the drawing does without its gaps
-        for piece in shapely.get_parts(whole):
-            if shapely.get_type_id(piece) == 3:
-                holes = [
-                    shapely.get_interior_ring(piece, k)
-                    for k in range(shapely.get_num_interior_rings(piece))
-                ]
-                found += [
-                    shapely.get_coordinates(ring)
-                    for ring in holes
-                    if shapely.area(shapely.polygons(ring)) < _SMALL_GAP
-                ]
-    return rings_of(found)
 
 
 def _ring_areas(rings: Lines) -> FloatArray:
