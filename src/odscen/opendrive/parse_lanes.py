@@ -143,7 +143,7 @@ def _lane(element: Element, side: str, s0: float, notes: Notes) -> Lane:
         heights=_heights(groups.get("height", ()), s0),
         road_marks=_road_marks(groups.get("roadMark", ()), s0),
         speeds=_speeds(groups.get("speed", ()), s0, notes),
-        access=tuple(_access(found, s0) for found in groups.get("access", ())),
+        access=_access(groups.get("access", ()), s0),
         predecessors=predecessors,
         successors=successors,
         direction=element.get("direction", "standard"),
@@ -201,9 +201,15 @@ def _speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneS
     )
 
 
-def _access(element: Element, s0: float) -> LaneAccess:
-    rule = choice(element, "rule", {None: "allow", "allow": "allow", "deny": "deny"})
-    return LaneAccess(_s(element, s0), rule, element.get("restriction", ""))
+def _access(elements: Sequence[Element], s0: float) -> tuple[LaneAccess, ...]:
+    """One record per restriction: an attribute up to 1.7, elements below from 1.8 on."""
+    records = []
+    for element in elements:
+        rule = choice(element, "rule", {None: "allow", "allow": "allow", "deny": "deny"})
+        below = [str(child.get("type", "")) for child in element if child.tag == "restriction"]
+        names = below or [str(element.get("restriction", ""))]
+        records += [LaneAccess(_s(element, s0), rule, name) for name in names]
+    return tuple(records)
 
 
 def _road_marks(elements: Sequence[Element], s0: float) -> tuple[RoadMark, ...]:

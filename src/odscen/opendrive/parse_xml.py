@@ -89,8 +89,7 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
 def _refuse_underscored_numbers(root: Element) -> None:
     """Refuse ``1_000``: Python's float() would take it for a number, XML has no such numbers."""
     for element in root.iter(etree.Element):
-        for name, value in element.items():
-            text = cast("str", value)
+        for name, text in cast("dict[str, str]", element.attrib).items():
             if name not in _TEXTS and _UNDERSCORED.search(f'"{text}"'.encode()):
                 raise refusal(element, f"{name}={shown(text)} is not a number")
 
