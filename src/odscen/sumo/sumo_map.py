@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.lanegraph.model import Relation
 from odscen.sumo.network import Link, NetLane, RoadNet
 from odscen.sumo.routes import Places
 
@@ -15,10 +16,13 @@ if TYPE_CHECKING:
 
     from odscen.convert.lane_table import LaneTable
     from odscen.ids import LaneKey
-    from odscen.lanegraph.model import FloatArray, IntArray, MapGraph
+    from odscen.lanegraph.model import FloatArray, IntArray, LaneGraph, MapGraph
 
 NORMAL = "normal"
 INTERNAL = "internal"
+
+LEAST_GAP = 0.2
+"""Metres; shorter gaps between SUMO edges are left at SUMO's own length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,10 +50,12 @@ class SumoMap:
     def of(cls, graph: MapGraph, table: LaneTable) -> SumoMap:
         """Bring graph and lane table together."""
         lanes, walks = graph.lanes, graph.walks
+        net = _road_net(table)
+        places = _places(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y)
         return cls(
             graph=graph,
-            net=_road_net(table),
-            lane_places=_places(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y),
+            net=net,
+            lane_places=with_gaps(places, lanes, net),
             walk_places=_places(table, walks.lane_keys, walks.lane, walks.s, walks.x, walks.y),
             net_offset=table.net_offset,
             elevation=table.elevation,
@@ -90,6 +96,33 @@ def pos_per_metre(
     totals = np.bincount(row, weights=ground, minlength=lanes)
     moves = np.bincount(row, weights=moved, minlength=lanes)
     return np.where(totals > 0, moves / np.where(totals > 0, totals, 1.0), 1.0)
+
+
+def with_gaps(places: Places, graph: LaneGraph, net: RoadNet) -> Places:
+    """Places with the scale of short internal lanes on which no node lies.
+
+    SUMO's length of such a lane may be twice what it measures on the ground, which is what is left
+    of the way between the nodes before and behind it.
+    """
+    scale = places.scale.copy()
+    row_of = {name: row for row, name in enumerate(places.lanes)}
+    seen = set(places.lane.tolist())
+    before, after = places.lane[graph.source], places.lane[graph.target]
+    crosses = (graph.relation == Relation.SUCCESSOR) & (before != after)
+    crosses &= (before >= 0) & (after >= 0)
+    for edge in np.flatnonzero(crosses).tolist():
+        start, end = int(graph.source[edge]), int(graph.target[edge])
+        one, other = (net.lanes[places.lanes[places.lane[node]]] for node in (start, end))
+        inside = (net.passage(one.id, other.edge) or ())[:-1]
+        rows = [row_of[lane.id] for lane in inside]
+        if not rows or seen & set(rows):
+            continue
+        left = (one.length - float(places.pos[start])) / scale[row_of[one.id]]
+        gone = float(places.pos[end]) / scale[row_of[other.id]]
+        ground = float(graph.length[edge]) - left - gone
+        if ground > LEAST_GAP:
+            scale[rows] = sum(lane.length for lane in inside) / ground
+    return replace(places, scale=scale)
 
 
 def _road_net(table: LaneTable) -> RoadNet:

@@ -63,7 +63,7 @@ class WalkPlanner:
         start = self._place(int(path[0]), "spawn")
         end = self._place(int(path[-1]), "goal")
         edges, repairs = connected(self._net, self._edges(path), PEDESTRIAN)
-        onwards = self._onwards(path, start, end, edges)
+        onwards = self._onwards(start, end, edges)
         front = start[1] + length / 2.0 * onwards * self._places.scales[start[0].id]
         walked = self._net.walked_lane(start[0].edge) or start[0]
         aside = self._net.left_of(start[0], walked)
@@ -119,7 +119,6 @@ class WalkPlanner:
 
     def _onwards(
         self,
-        path: IntArray,
         start: tuple[NetLane, float],
         end: tuple[NetLane, float],
         edges: tuple[str, ...],
@@ -132,10 +131,7 @@ class WalkPlanner:
         others = self._net.ends.get(edges[1], nowhere)
         if (go_to in others) != (come_from in others):
             return 1.0 if go_to in others else -1.0
-        for node in path[1:].tolist():
-            place = self._places.of(node)
-            if place is None or place[0] != start[0].id:
-                break
-            if place[1] != start[1]:
-                return float(np.sign(place[1] - start[1]))
-        return 1.0 if start[1] > start[0].length / 2.0 else -1.0
+        # Two sides of one street: SUMO takes the shorter way round.
+        there = start[0].length - start[1]
+        onwards = end[1] if go_to == others[0] else end[0].length - end[1]
+        return 1.0 if there + onwards <= start[1] + end[0].length - onwards else -1.0
