@@ -7,14 +7,16 @@ needs only another pair of such files (requirement R13).
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.categories import Body, Category
 from odscen.errors import NotFoundError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 TimeOfDay = Literal["day", "sunset", "night"]
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 @contextmanager
 def new_folder(final: Path) -> Iterator[Path]:
     """Yield an empty folder that is renamed to ``final`` when the block succeeds.
 
-    It lies beside ``final``, so that the rename is one step; whatever ``final`` held is replaced. If
-    the block raises, nothing is left of the new folder and ``final`` is untouched.
+    It lies beside ``final``, so that the rename is one step; whatever ``final`` held is replaced.
+    If the block raises, nothing is left of the new folder and ``final`` is untouched.
     """
     final.parent.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix=".building-", dir=final.parent))

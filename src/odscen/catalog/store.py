@@ -1,8 +1,8 @@
 """The workspace: maps, scenarios and runs on disk.
 
-A map is built once (requirement R7) into a folder of its own; the folder is written beside the final
-place and renamed into it, so that a half-written map is never visible. Names are checked before they
-become paths.
+A map is built once (requirement R7) into a folder of its own; the folder is written beside the
+final place and renamed into it, so that a half-written map is never visible. Names are checked
+before they become paths.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from odscen.catalog.folders import discard, new_folder
 from odscen.errors import InputError, NotFoundError, WorkspaceError
 
 if TYPE_CHECKING:
+    from odscen.catalog.drawing import MapDrawing
+    from odscen.catalog.statistics import MapStatistics
     from odscen.convert.lane_table import LaneTable
     from odscen.lanegraph.model import MapGraph
 
@@ -52,13 +54,25 @@ def name_from_file(path: Path) -> str:
     return name[:64] or "map"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MapEntry:
     """One map of the catalogue: its folder, and lazy access to what was built."""
 
     name: str
     folder: Path
     info: dict[str, Any]
+
+    def __eq__(self, other: object) -> bool:
+        """Equal if it is the same build of the same map."""
+        return isinstance(other, MapEntry) and self._key == other._key
+
+    def __hash__(self) -> int:
+        """Hash of the same."""
+        return hash(self._key)
+
+    @property
+    def _key(self) -> tuple[Path, str, float, str]:
+        return self.folder, self.sha256, self.info["spacing"], self.info["builder"]
 
     @property
     def sha256(self) -> str:
@@ -79,7 +93,20 @@ class MapEntry:
         """The table between OpenDRIVE lanes and SUMO lanes."""
         from odscen.convert.lane_table import LaneTable
 
-        return LaneTable.from_json(self.path("lane_table").read_text(encoding="utf-8"))
+        return LaneTable.from_json(self.path("lane_table").read_bytes())
+
+    def drawing(self) -> MapDrawing:
+        """What is drawn of the map."""
+        from odscen.catalog.drawing import MapDrawing
+
+        return MapDrawing.from_json(self.path("drawing").read_bytes())
+
+    def statistics(self) -> MapStatistics:
+        """Figures of the map."""
+        from odscen.catalog.statistics import MapStatistics
+
+        values = self.info["statistics"]
+        return MapStatistics(**{**values, "bounds": tuple(values["bounds"])})
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,8 +198,8 @@ class Workspace:
         if name not in self.map_names():
             raise NotFoundError("map", name, self.map_names())
         msg = (
-            f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) than the "
-            f"one the scenario was made on ({sha256[:12]}...); add that .xodr under another name"
+            f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) "
+            f"than the one the scenario was made on ({sha256[:12]}...); add that .xodr under another name"
         )
         raise InputError(msg)
 

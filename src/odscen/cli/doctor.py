@@ -11,7 +11,17 @@ import typer
 from odscen.cli.output import JsonOption, WorkspaceOption, print_json, print_table
 from odscen.errors import OdscenError
 
-NEEDED = ("eclipse-sumo", "libsumo", "lxml", "numpy", "polars", "pydantic", "scipy", "shapely")
+NEEDED = (
+    "odscen",
+    "eclipse-sumo",
+    "libsumo",
+    "lxml",
+    "numpy",
+    "polars",
+    "pydantic",
+    "scipy",
+    "shapely",
+)
 OPTIONAL = {
     "cairosvg": "PNG drawings: pip install 'odscen[png]'",
     "carla": "co-simulation with CARLA (CPython 3.11 or 3.12): pip install 'odscen[carla]'",
@@ -22,7 +32,10 @@ def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> No
     """Show versions, what is installed, what is missing and how to get it."""
     checks = [
         _check("python", platform.python_version(), needed=True),
-        *(_package(name, needed=True, advice=f"pip install {name}") for name in ("odscen", *NEEDED)),
+        *(
+            _package(name, needed=True, advice=f"pip install {name}")
+            for name in ("odscen", *NEEDED)
+        ),
         *(_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
         _netconvert(),
         _workspace(workspace),

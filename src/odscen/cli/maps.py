@@ -155,7 +155,9 @@ def remove(
 def render(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     out: Annotated[Path, typer.Option("-o", "--out", help="File ending in .svg or .png.")],
-    width: Annotated[int, typer.Option(help="Width of a PNG in pixels.", min=100, max=16000)] = 2400,
+    width: Annotated[
+        int, typer.Option(help="Width of a PNG in pixels.", min=100, max=16000)
+    ] = 2400,
     graph: Annotated[bool, typer.Option("--graph", help="Draw the lane graph on top.")] = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,

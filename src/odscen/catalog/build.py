@@ -1,0 +1,182 @@
+"""Everything that later steps need of a map, made once from its .xodr (requirement R7)."""
+
+from __future__ import annotations
+
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.catalog.render import RenderOptions, render_drawing, svg_to_png
+from odscen.catalog.shapes import map_drawing
+from odscen.catalog.statistics import map_semantics, map_statistics
+from odscen.convert.network import build_network
+from odscen.errors import InputError, in_file
+from odscen.lanegraph.build import build_map_graph
+from odscen.lanegraph.files import to_graphml, to_npz_bytes
+from odscen.lanegraph.model import MapGraph, Relation
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.parse import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from odscen.catalog.store import MapEntry
+
+FORMAT = "odscen-map"
+
+FILES = {
+    "xodr": "map.xodr",
+    "info": "map.json",
+    "graph": "graph.graphml",
+    "graph_npz": "graph.npz",
+    "net": "net.net.xml",
+    "lane_table": "lane_table.json",
+    "drawing": "drawing.json",
+    "preview": "preview.svg",
+}
+"""Name of each file in a map's folder."""
+
+
+def build_map(
+    content: bytes,
+    folder: Path,
+    *,
+    name: str,
+    file: str,
+    sha256: str,
+    spacing: float,
+    builder: str,
+    progress: Callable[[str, float], None],
+) -> None:
+    """Fill ``folder`` with all of :data:`FILES`.
+
+    Parameters
+    ----------
+    content
+        The .xodr; ``file`` is its name for messages and ``sha256`` its hash.
+    folder
+        Exists and is empty.
+    spacing
+        Metres between nodes of the lane graph.
+    builder
+        Version of the folder's content.
+    progress
+        Called with what comes next and the share done.
+
+    Raises
+    ------
+    OpenDriveError
+        If the map cannot be read.
+    NetconvertError
+        If netconvert fails on it.
+    """
+    with in_file(file):
+        _build(content, folder, name, file, sha256, spacing, builder, progress)
+
+
+def _build(
+    content: bytes,
+    folder: Path,
+    name: str,
+    file: str,
+    sha256: str,
+    spacing: float,
+    builder: str,
+    progress: Callable[[str, float], None],
+) -> None:
+    start = time.perf_counter()
+    progress("reading the map", 0.0)
+    odr = parse(content, file=file)
+    table = RoadTable.of(odr)
+    xodr = folder / FILES["xodr"]
+    xodr.write_bytes(content)
+    work = folder / "work"
+    work.mkdir()
+    # netconvert is a process of its own: the graph and the drawing are made while it runs.
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        converting = pool.submit(build_network, odr, table, xodr, work)
+        progress("building the lane graph", 0.1)
+        graph = build_map_graph(odr, name=name, sha256=sha256, spacing=spacing, table=table)
+        (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
+        (folder / FILES["graph"]).write_bytes(to_graphml(graph))
+        progress("drawing the map", 0.4)
+        drawing = map_drawing(odr, table, name=name)
+        statistics = map_statistics(odr, table, graph)
+        preview = render_drawing(drawing, statistics=statistics)
+        (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
+        (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
+        progress("making the SUMO network", 0.6)
+        network = converting.result()
+    for left in work.iterdir():
+        left.unlink()
+    work.rmdir()
+    (folder / FILES["net"]).write_bytes(network.net_xml)
+    (folder / FILES["lane_table"]).write_text(network.table.to_json(), encoding="utf-8")
+    header = odr.header
+    info: dict[str, Any] = {
+        "format": FORMAT,
+        "builder": builder,
+        "name": name,
+        "source": file,
+        "sha256": sha256,
+        "spacing": spacing,
+        "opendrive": {"version": f"{header.rev_major}.{header.rev_minor}", "rule": odr.rule},
+        "statistics": statistics.to_dict(),
+        "graph": graph_counts(graph),
+        "sumo": {"net_file": FILES["net"], **network.table.counts},
+        "files": FILES,
+        "semantics": map_semantics(odr, table),
+        "report": network.report.to_dict(),
+        "build_seconds": round(time.perf_counter() - start, 3),
+    }
+    text = json.dumps(info, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / FILES["info"]).write_text(text + "\n", encoding="utf-8")
+    progress("done", 1.0)
+
+
+def graph_counts(graph: MapGraph) -> dict[str, Any]:
+    """Sizes of the graphs of a map, as ``maps show`` gives them."""
+    relations = np.bincount(graph.lanes.relation, minlength=3)
+    return {
+        "spacing": graph.lanes.spacing,
+        "nodes": len(graph.lanes.s),
+        "successor_edges": int(relations[Relation.SUCCESSOR]),
+        "left_edges": int(relations[Relation.LEFT]),
+        "right_edges": int(relations[Relation.RIGHT]),
+        "segments": len(graph.segments.ids),
+        "pedestrian_nodes": len(graph.walks.s),
+        "pedestrian_edges": len(graph.walks.source),
+    }
+
+
+def draw_map(
+    entry: MapEntry, out: Path, *, width: int, with_graph: bool, with_segments: bool = False
+) -> None:
+    """Write a drawing of a map as SVG or PNG, by the ending of ``out``.
+
+    Raises
+    ------
+    InputError
+        If the ending is another.
+    MissingDependencyError
+        For PNG, if ``cairosvg`` is not installed.
+    """
+    if out.suffix.lower() not in (".svg", ".png"):
+        msg = f"a drawing is written as .svg or .png, not {out.suffix or 'without ending'}"
+        raise InputError(msg, file=str(out))
+    options = RenderOptions(graph=with_graph, segments=with_segments)
+    graph = entry.graph() if with_graph or with_segments else None
+    statistics = entry.statistics()
+    svg = render_drawing(entry.drawing(), statistics=statistics, graph=graph, options=options)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if out.suffix.lower() == ".png":
+            out.write_bytes(svg_to_png(svg, width=width))
+        else:
+            out.write_text(svg, encoding="utf-8")
+    except OSError as error:
+        raise InputError(error.strerror or str(error), file=str(out)) from error

@@ -1,0 +1,109 @@
+"""``odscen run``: scenarios in SUMO."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from odscen.sumo.progress import Progress
+    from odscen.sumo.runner import RunJob, RunResult
+
+
+def run(
+    scenarios: Annotated[
+        list[Path],
+        typer.Argument(help="Scenarios, or folders of them.", metavar="SCENARIO..."),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the runs. [default: the workspace's runs]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(min=0.1, help="Simulated seconds, at most.")
+    ] = None,
+    step_length: Annotated[
+        float | None, typer.Option(min=0.01, max=1, help="Seconds per step.")
+    ] = None,
+    expect: Annotated[
+        list[str] | None,
+        typer.Option(help='Expectation, for example "arrived>=0.95"; repeatable.'),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    time_limit: Annotated[
+        float | None, typer.Option(min=1, help="Wall seconds after which a run has failed.")
+    ] = None,
+    weather: Annotated[
+        bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
+    ] = True,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run scenarios in SUMO, without a window; write trajectories, events, figures and a report.
+
+    Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input; 3: a run failed.
+    """
+    from odscen import workflow
+    from odscen.catalog.store import Workspace
+    from odscen.results.expectations import parse_expectation
+
+    expectations = [parse_expectation(text) for text in expect or ()]
+    paths = workflow.scenario_files(scenarios)
+    with progress("running") as step:
+        results = workflow.run(
+            Workspace.open(workspace),
+            paths,
+            out=out,
+            seed=seed,
+            until=until,
+            step_length=step_length,
+            weather=weather,
+            expectations=expectations,
+            processes=jobs,
+            time_limit=time_limit,
+            progress=_follow(step, len(paths)),
+        )
+    show_results(results, as_json=as_json, several=len(paths) > 1)
+    raise typer.Exit(max(result.exit_code for result in results))
+
+
+def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) -> None:
+    """Print finished runs: a table for people, JSON for scripts."""
+    if as_json:
+        runs = [result.to_dict() for result in results]
+        print_json({"runs": runs} if several else runs[0])
+    else:
+        columns = ("run", "status", "planned", "inserted", "arrived", "teleported", "collided")
+        rows = []
+        for result in results:
+            counts = result.summary["actors"]
+            verdict = result.status if result.expectations_met else "expectation failed"
+            rows.append((result.folder.name, verdict, *(counts[key] for key in columns[2:])))
+        print_table("", columns, rows)
+    for result in results:
+        for verdict in result.summary["expectations"]:
+            if not verdict["passed"]:
+                log(f"{result.folder.name}: failed: {verdict['text']} (is {verdict['value']})")
+        if result.status == "failed":
+            log(f"{result.folder.name}: {result.summary['error']}")
+        else:
+            log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
+
+
+def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob, Progress], None]:
+    shares: dict[str, float] = {}
+
+    def follow(job: RunJob, message: Progress) -> None:
+        shares[job.name] = message.time / message.until if message.until else 0.0
+        what = f"{job.name}: {message.time:.0f} s, {message.running} on the road"
+        step(what, sum(shares.values()) / total)
+
+    return follow
