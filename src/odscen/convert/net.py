@@ -131,7 +131,7 @@ class Net:
         try:
             root = etree.fromstring(content, parser)
             return _read(root)
-        except (etree.XMLSyntaxError, KeyError, ValueError, AttributeError) as error:
+        except (etree.XMLSyntaxError, LookupError, ValueError) as error:
             msg = f"netconvert's network cannot be read: {type(error).__name__}: {error}"
             raise NetconvertError(msg) from error
 
@@ -238,6 +238,9 @@ def _shapes(texts: list[str], offset: tuple[float, float]) -> list[FloatArray]:
     counts = [text.count(" ") + 1 for text in texts]
     widths = [text.count(",") // count + 1 for text, count in zip(texts, counts, strict=True)]
     numbers = np.fromstring(" ".join(texts).replace(",", " "), sep=" ", dtype=np.float64)
+    if not np.isfinite(numbers).all():
+        msg = "a lane's shape is not finite"
+        raise ValueError(msg)
     shapes: list[FloatArray] = []
     start = 0
     for count, width in zip(counts, widths, strict=True):

@@ -23,9 +23,13 @@ IndexArray = NDArray[np.intp]
 STEP = 1.0
 """Metres between samples; curves of 6 m radius are then followed within 2 cm."""
 
+MOST_SAMPLES = 2_000_000
+"""Longer maps are sampled less densely: 2,000 km of lanes are, and files with absurd lengths."""
+
 
 def _counts(lengths: FloatArray, step: float) -> IndexArray:
     """Count samples per line, both ends included."""
+    step = max(step, float(lengths.sum()) / MOST_SAMPLES)
     return np.maximum(1, np.ceil(lengths / step - 1e-9)).astype(np.intp) + 1
 
 
