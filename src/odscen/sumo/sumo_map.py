@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 NORMAL = "normal"
 INTERNAL = "internal"
 
-LEAST_GAP = 0.2
-"""Metres; shorter gaps between SUMO edges are left at SUMO's own length."""
+NOTHING = 1e-3
+"""Metres that stand for no ground at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,9 @@ class SumoMap:
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
-            walk_places=_places(table, walks.lane_keys, walks.lane, walks.s, walks.x, walks.y),
+            walk_places=_all_scaled(
+                _places(table, walks.lane_keys, walks.lane, walks.s, walks.x, walks.y)
+            ),
             net_offset=table.net_offset,
             elevation=table.elevation,
         )
@@ -82,7 +84,7 @@ def pos_per_metre(
 
     All lanes of a SUMO edge have one length, that of their middle; in a curve the outer ones are
     longer on the ground, the inner ones shorter. Measured between neighbouring nodes on the same
-    SUMO lane; 1 where there are none.
+    SUMO lane; NaN where there are none.
 
     Parameters
     ----------
@@ -95,34 +97,47 @@ def pos_per_metre(
     moved = np.abs(np.diff(pos))[same]
     totals = np.bincount(row, weights=ground, minlength=lanes)
     moves = np.bincount(row, weights=moved, minlength=lanes)
-    return np.where(totals > 0, moves / np.where(totals > 0, totals, 1.0), 1.0)
+    return np.where(totals > 0, moves / np.where(totals > 0, totals, 1.0), np.nan)
 
 
 def with_gaps(places: Places, graph: LaneGraph, net: RoadNet) -> Places:
-    """Places with the scale of short internal lanes on which no node lies.
+    """Places with the scale of short internal lanes, on which no two nodes lie.
 
-    SUMO's length of such a lane may be twice what it measures on the ground, which is what is left
-    of the way between the nodes before and behind it.
+    SUMO's length of such a lane may be twice what it measures on the ground, or 0.1 m where there
+    is nothing at all. The ground is what is left of the way between the nodes before and behind it;
+    where one node lies on it, the way from its start to that node.
     """
     scale = places.scale.copy()
     row_of = {name: row for row, name in enumerate(places.lanes)}
-    seen = set(places.lane.tolist())
     before, after = places.lane[graph.source], places.lane[graph.target]
     crosses = (graph.relation == Relation.SUCCESSOR) & (before != after)
     crosses &= (before >= 0) & (after >= 0)
     for edge in np.flatnonzero(crosses).tolist():
         start, end = int(graph.source[edge]), int(graph.target[edge])
         one, other = (net.lanes[places.lanes[places.lane[node]]] for node in (start, end))
-        inside = (net.passage(one.id, other.edge) or ())[:-1]
-        rows = [row_of[lane.id] for lane in inside]
-        if not rows or seen & set(rows):
+        if one.internal:
             continue
-        left = (one.length - float(places.pos[start])) / scale[row_of[one.id]]
-        gone = float(places.pos[end]) / scale[row_of[other.id]]
-        ground = float(graph.length[edge]) - left - gone
-        if ground > LEAST_GAP:
-            scale[rows] = sum(lane.length for lane in inside) / ground
-    return replace(places, scale=scale)
+        way = float(graph.length[edge])
+        way -= (one.length - float(places.pos[start])) / _or_one(scale[row_of[one.id]])
+        if other.internal:
+            inside: tuple[NetLane, ...] = (other,)
+            length = float(places.pos[end])
+        else:
+            inside = (net.passage(one.id, other.edge) or ())[:-1]
+            length = sum(lane.length for lane in inside)
+            way -= float(places.pos[end]) / _or_one(scale[row_of[other.id]])
+        rows = [row_of[lane.id] for lane in inside]
+        if rows and np.all(np.isnan(scale[rows])):
+            scale[rows] = max(length, NOTHING) / max(way, NOTHING)
+    return _all_scaled(replace(places, scale=scale))
+
+
+def _all_scaled(places: Places) -> Places:
+    return replace(places, scale=np.where(np.isnan(places.scale), 1.0, places.scale))
+
+
+def _or_one(scale: float) -> float:
+    return 1.0 if np.isnan(scale) else float(scale)
 
 
 def _road_net(table: LaneTable) -> RoadNet:
