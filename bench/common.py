@@ -28,9 +28,7 @@ def paired(
     """
     ours()
     peer()
-    times: list[tuple[float, float]] = []
-    for _ in range(repeats):
-        times.append((_seconds(ours), _seconds(peer)))
+    times = [(_seconds(ours), _seconds(peer)) for _ in range(repeats)]
     return (
         statistics.median(mine for mine, _ in times),
         statistics.median(theirs for _, theirs in times),

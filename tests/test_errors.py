@@ -1,6 +1,13 @@
 import pytest
 
-from odscen.errors import InputError, NotFoundError, OpenDriveError, ScenarioError, ToolError, in_file
+from odscen.errors import (
+    InputError,
+    NotFoundError,
+    OpenDriveError,
+    ScenarioError,
+    ToolError,
+    in_file,
+)
 
 
 def test_a_message_names_file_then_element_then_problem():
@@ -31,4 +38,5 @@ def test_all_problems_of_a_scenario_are_shown():
 
 
 def test_a_tool_speaks_in_its_own_words():
-    assert str(ToolError("netconvert failed", output="Error: no\n")) == "netconvert failed\nError: no"
+    error = ToolError("netconvert failed", output="Error: no\n")
+    assert str(error) == "netconvert failed\nError: no"

@@ -2,11 +2,11 @@
 
 ::
 
-    OdscenError                     everything odscen raises on purpose; ``exit_code`` for the command line
+    OdscenError                     everything raised on purpose; has an ``exit_code``
     |-- InputError (2)              what the user gave cannot be used; names file, place and value
     |   |-- OpenDriveError          an .xodr file, with the element path and the value at fault
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
-    |   |-- ScenarioError           a scenario document or its graph form; carries all problems found
+    |   |-- ScenarioError           a scenario document or its graph form; carries all problems
     |   `-- NotFoundError           a name that is not in the catalogue, with close names
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
@@ -20,8 +20,11 @@ Messages read ``place: what is wrong``; a place is a file, then the path of the 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
 
 
 class OdscenError(Exception):

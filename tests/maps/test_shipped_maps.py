@@ -75,7 +75,7 @@ def test_crosswalks_cross_the_carriageway_in_carla_too(carla):
     points = carla.Map("x", path.read_text(encoding="utf-8")).get_crosswalks()
     assert len(points) == 4 * 5
     west_east = np.array([(p.x, -p.y) for p in points[:5]])
-    # The arm from the east has 2 + 1 driving lanes and two bicycle lanes: 13.25 m, and 0.3 m beyond.
+    # Three driving lanes and two bicycle lanes, 13.25 m, and 0.3 m beyond on each side.
     assert np.ptp(west_east[:, 1]) == pytest.approx(3 * 3.25 + 2 * 1.75 + 0.6, abs=0.01)
     assert np.ptp(west_east[:, 0]) == pytest.approx(3.0, abs=0.01)
     assert west_east[:, 0].min() == pytest.approx(22.0 + 1.0, abs=0.01)

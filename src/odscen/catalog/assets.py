@@ -74,17 +74,17 @@ class Assets:
     def category_of(self, model: str) -> Category | None:
         """Category of a model, ``None`` if there is no such model."""
         found = self.blueprints.get(model)
-        return found and found.category
+        return found.category if found else None
 
     def dimensions(self, model: str) -> Body | None:
         """Size of a model, ``None`` if there is no such model."""
         found = self.blueprints.get(model)
-        return found and found.body
+        return found.body if found else None
 
     def weather(self, preset: str) -> Mapping[str, float] | None:
         """Parameters of a weather preset, ``None`` if there is no such preset."""
         found = self.presets.get(preset)
-        return found and found.parameters
+        return found.parameters if found else None
 
 
 def parse_assets(blueprints: str, weather: str) -> Assets:

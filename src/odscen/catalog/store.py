@@ -81,7 +81,7 @@ class MapEntry:
 
     def path(self, key: str) -> Path:
         """Absolute path of one of the files named in ``map.json``, for example ``"net"``."""
-        return self.folder / self.info["files"][key]
+        return self.folder / str(self.info["files"][key])
 
     def graph(self) -> MapGraph:
         """Lane graph, segments and pedestrian graph."""
@@ -199,7 +199,8 @@ class Workspace:
             raise NotFoundError("map", name, self.map_names())
         msg = (
             f"map {name!r} in {self.root} has other content (sha256 {entry.sha256[:12]}...) "
-            f"than the one the scenario was made on ({sha256[:12]}...); add that .xodr under another name"
+            f"than the one the scenario was made on ({sha256[:12]}...); "
+            "add that .xodr under another name"
         )
         raise InputError(msg)
 

@@ -10,9 +10,14 @@ from typing import Annotated
 
 import typer
 
+import odscen.cli.assets
+import odscen.cli.maps
 from odscen import __version__
-from odscen.cli import assets, demo, doctor, maps, runs, scenarios
+from odscen.cli.demo import demo
+from odscen.cli.doctor import doctor
 from odscen.cli.output import report_error
+from odscen.cli.runs import run
+from odscen.cli.scenarios import check, export, generate
 from odscen.errors import OdscenError
 
 app = typer.Typer(
@@ -22,14 +27,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(maps.app, name="maps")
-app.add_typer(assets.app, name="assets")
-app.command()(scenarios.generate)
-app.command()(scenarios.check)
-app.command()(scenarios.export)
-app.command()(runs.run)
-app.command()(doctor.doctor)
-app.command()(demo.demo)
+app.add_typer(odscen.cli.maps.app, name="maps")
+app.add_typer(odscen.cli.assets.app, name="assets")
+app.command()(generate)
+app.command()(check)
+app.command()(export)
+app.command()(run)
+app.command()(doctor)
+app.command()(demo)
 
 
 def _show_version(wanted: bool) -> None:
