@@ -30,8 +30,8 @@ FLATTEN = 0.5
 """Share of heights that counts: decks are told apart, superelevation (SUMO has none) is not."""
 NEIGHBOURS = 10
 
-_TIP = 0.1
-"""Metres: shorter pieces are left out, unless the lane has no other."""
+_TIP = 0.5
+"""Metres: shorter pieces at the ends of a SUMO lane may be mere touches of another lane."""
 _STRAY = 3
 """Samples: a shorter run on another lane, between two runs on the same lane, is a stray."""
 
@@ -159,7 +159,7 @@ def pieces_of(
             _Run(lane, pos[a:b], found.s[part][a:b], found.deviation[part][a:b])
             for lane, a, b in runs
         ]
-        own = _without_tips(_meeting(own, lanes, table))
+        own = _without_tips(_meeting(own, lanes, table), lanes)
         for run in own:
             piece = Piece(int(lanes.rows[run.lane]), int(row), run.pos, run.s, run.deviation)
             kept = monotone(piece, growing=_growing(run, lanes, table))
@@ -227,10 +227,20 @@ def _meeting(runs: list[_Run], lanes: LaneSamples, table: RoadTable) -> list[_Ru
     return made
 
 
-def _without_tips(runs: list[_Run]) -> list[_Run]:
-    """Drop what a SUMO lane touches of the lanes before and after its own at its very ends."""
-    long = [run for run in runs if run.pos[-1] - run.pos[0] > _TIP]
-    return long or runs
+def _without_tips(runs: list[_Run], lanes: LaneSamples) -> list[_Run]:
+    """Drop what a SUMO lane touches of the lanes before and after its own at its very ends.
+
+    Roads overlap a little where they meet; a run that covers most of a short lane stays.
+    """
+    kept = list(runs)
+    for end in (0, -1):
+        if len(kept) < 2:
+            break
+        run = kept[end]
+        extent = float(run.pos[-1] - run.pos[0])
+        if extent < _TIP and extent < 0.5 * lanes.length(run.lane):
+            kept.pop(end)
+    return kept
 
 
 def _growing(run: _Run, lanes: LaneSamples, table: RoadTable) -> bool:
