@@ -115,7 +115,8 @@ def test_what_sumo_refuses_is_a_failed_run_in_sumos_own_words(
     assert result.status == "failed"
     assert result.exit_code == 3
     assert "The edge 'nowhere'" in result.summary["error"]
-    assert result.summary["actors"] == {"planned": 1}
+    assert result.summary["actors"]["planned"] == 1
+    assert result.summary["actors"]["inserted"] is None
     assert (tmp_path / "run" / "sumo.log").is_file()
 
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from odscen import __version__
 from odscen.catalog.folders import new_folder
 from odscen.errors import WorkspaceError
-from odscen.results.expectations import evaluate
+from odscen.results.expectations import COUNTS, evaluate
 from odscen.results.summary import actor_counts, actors_from_json, key_figures, summary_to_json
 from odscen.sumo import layout
 from odscen.sumo.process import run_worker
@@ -249,7 +249,7 @@ def _summary(
         "steps": done.steps if done else None,
         "wall_seconds": round(ended.wall_seconds, 3),
         "real_time_factor": round(done.sim_seconds / ended.wall_seconds, 2) if done else None,
-        "actors": {"planned": len(plan.actors)},
+        "actors": dict.fromkeys(COUNTS) | {"planned": len(plan.actors)},
         "insertion_error_max": None,
         "figures": {},
     }
