@@ -1,4 +1,4 @@
-"""Small OpenDRIVE texts for tests: one road or a few, everything but the matter left at defaults."""
+"""Small OpenDRIVE texts for tests: one road or a few, defaults wherever it does not matter."""
 
 from __future__ import annotations
 

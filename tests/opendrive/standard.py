@@ -54,12 +54,18 @@ def _walk(
     seen.add((key, kind))
     rows.add((key, ""))
     bodies = [element, *_bases(types[kind], types)] if kind in types else [element]
+    # An element of a base type may be any of the types derived from it (junctions of 1.8).
+    bodies += [body for body in types.values() if kind and _extends(body, kind)]
     for body in bodies:
         for child in _parts(body, types):
             if child.tag == XS + "attribute" and child.get("name"):
                 rows.add((key, child.get("name", "")))
             elif child.tag == XS + "element" and child.get("name"):
                 _walk(child, name, types, rows, seen)
+
+
+def _extends(body: etree._Element, base: str) -> bool:
+    return any(part.get("base", "").split(":")[-1] == base for part in body.iter(XS + "extension"))
 
 
 def _bases(body: etree._Element, types: dict[str, etree._Element]) -> list[etree._Element]:

@@ -62,7 +62,8 @@ def test_corners_in_road_coordinates_follow_the_road() -> None:
     corners = "".join(
         f'<cornerRoad s="{s}" t="{t}" dz="0.1"/>' for s, t in ((10, -4), (13, -4), (13, 4), (10, 4))
     )
-    text = f'<object id="1" name="Zebra" type="none" s="0" t="0"><outlines><outline>{corners}</outline></outlines></object>'
+    outlines = f"<outlines><outline>{corners}</outline></outlines>"
+    text = f'<object id="1" name="Zebra" type="none" s="0" t="0">{outlines}</object>'
     (crosswalk,) = crosswalks(*model_with(text))
     assert sorted(map(tuple, crosswalk.polygon.tolist())) == [(10, -4), (10, 4), (13, -4), (13, 4)]
     assert crosswalk.z == pytest.approx(0.1)

@@ -87,8 +87,9 @@ def test_normalized_cubics_are_brought_to_metres() -> None:
 
 
 def test_1_8_access_restrictions_are_read_like_older_ones() -> None:
-    new = '<access sOffset="0" rule="deny"><restriction type="bus"/><restriction type="taxi"/></access>'
-    old = '<access sOffset="0" rule="deny" restriction="bus"/><access sOffset="0" rule="deny" restriction="taxi"/>'
+    start = '<access sOffset="0" rule="deny"'
+    new = f'{start}><restriction type="bus"/><restriction type="taxi"/></access>'
+    old = f'{start} restriction="bus"/>{start} restriction="taxi"/>'
     one, other = (
         parse(document(road(lanes=section(lane(-1, inside=text))))) for text in (new, old)
     )
@@ -229,7 +230,8 @@ TOLERATED = {
     "zero-length": document(road(lanes=section(lane(-1)) + section(lane(-1), s=100))),
     "late-start": document(
         road(
-            inside='<elevationProfile><elevation s="10" a="0" b="0" c="0" d="0"/></elevationProfile>'
+            inside="<elevationProfile>"
+            '<elevation s="10" a="0" b="0" c="0" d="0"/></elevationProfile>'
         )
     ),
     "same-s": document(

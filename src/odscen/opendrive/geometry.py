@@ -148,8 +148,8 @@ def _spiral(
     With sigma > 0 the square is completed: the integral is a difference of Fresnel integrals at
     :math:`(\kappa + \sigma \tau) / \sqrt{\pi \sigma}`, turned by
     :math:`-\kappa^2 / (2 \sigma)`; sigma < 0 is its mirror image. Where the curvature
-    hardly changes these are large and their difference loses digits; Gauss-Legendre quadrature of the
-    integral itself is then exact to rounding, as the whole turns by less than 100 rad.
+    hardly changes these are large and their difference loses digits; Gauss-Legendre quadrature of
+    the integral itself is then exact to rounding, as the whole turns by less than 100 rad.
     """
     scale = np.sqrt(np.pi * np.abs(change))
     ends = np.maximum(np.abs(curvature), np.abs(curvature + change * ds))
