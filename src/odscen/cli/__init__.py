@@ -10,11 +10,11 @@ from typing import Annotated
 
 import typer
 
-import odscen.cli.assets
-import odscen.cli.maps
 from odscen import __version__
+from odscen.cli.assets import app as assets
 from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
+from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
@@ -27,8 +27,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(odscen.cli.maps.app, name="maps")
-app.add_typer(odscen.cli.assets.app, name="assets")
+app.add_typer(maps, name="maps")
+app.add_typer(assets, name="assets")
 app.command()(generate)
 app.command()(check)
 app.command()(export)

@@ -91,7 +91,9 @@ def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) 
     for result in results:
         for verdict in result.summary["expectations"]:
             if not verdict["passed"]:
-                log(f"{result.folder.name}: failed: {verdict['text']} (is {verdict['value']})")
+                log(
+                    f"{result.folder.name}: failed: {verdict['expectation']} (is {verdict['value']})"
+                )
         if result.status == "failed":
             log(f"{result.folder.name}: {result.summary['error']}")
         else:

@@ -1,0 +1,165 @@
+import json
+import sys
+
+import pytest
+
+from tests.cli.conftest import SHIPPED, odscen
+
+STATISTICS = {
+    "bounds",
+    "road_length",
+    "driving_lane_length",
+    "junctions",
+    "crosswalks",
+    "traffic_lights",
+    "stop_signs",
+    "yield_signs",
+    "speed_limit_min",
+    "speed_limit_max",
+}
+
+
+def test_show_gives_what_scripts_rely_on(workspace):
+    done = odscen("maps", "show", "signal_crossing", "--json", "--workspace", workspace)
+    info = done.json
+    assert done.code == 0
+    assert info["name"] == "signal_crossing"
+    assert len(info["sha256"]) == 64
+    assert info["opendrive"] == {"version": "1.5", "rule": "RHT"}
+    assert set(info["statistics"]) >= STATISTICS
+    assert info["statistics"]["crosswalks"] == 4
+    assert info["statistics"]["traffic_lights"] == 4
+    assert info["statistics"]["speed_limit_max"] == pytest.approx(50 / 3.6, abs=1e-3)
+    assert info["graph"]["spacing"] == 2.0
+    assert info["graph"]["nodes"] > 700
+    # Two approaches of 110 m with two lanes each: one change per node, but for the last ones.
+    assert 100 <= info["graph"]["right_edges"] <= info["graph"]["left_edges"] <= 110
+    assert set(info["sumo"]) >= {
+        "net_file",
+        "edges",
+        "lanes",
+        "junctions",
+        "tl_logics",
+        "crossings",
+    }
+    assert info["sumo"]["tl_logics"] == 1
+    assert info["build_seconds"] > 0
+
+
+def test_all_files_of_a_map_are_there(workspace):
+    files = odscen("maps", "show", "signal_crossing", "--json", "--workspace", workspace).json[
+        "files"
+    ]
+    assert set(files) >= {"xodr", "graph", "graph_npz", "net", "lane_table", "preview"}
+    for path in files.values():
+        with open(path, "rb") as file:
+            assert file.read(1)
+
+
+def test_add_reports_refusals_by_element_and_adds_the_others(tmp_path):
+    bad = tmp_path / "bad.xodr"
+    text = (SHIPPED / "t_junction_signs.xodr").read_text(encoding="utf-8")
+    bad.write_text(text.replace('length="60"', 'length="-60"'), encoding="utf-8")
+    good = SHIPPED / "roundabout.xodr"
+    done = odscen("maps", "add", bad, good, "--json", "--workspace", tmp_path / "w")
+    assert done.code == 2
+    refused, added = done.json["maps"]
+    assert refused["error"]["file"] == "bad.xodr"
+    assert "road 1" in refused["error"]["message"]
+    assert "-60" in refused["error"]["message"]
+    assert added["name"] == "roundabout"
+    listed = odscen("maps", "list", "--json", "--workspace", tmp_path / "w").json["maps"]
+    assert [row["name"] for row in listed] == ["roundabout"]
+    left = {path.name for path in (tmp_path / "w" / "maps").iterdir()}
+    assert left == {"roundabout"}, "nothing half-written is left"
+
+
+def test_files_of_the_same_name_also_get_their_folders(tmp_path):
+    text = (SHIPPED / "t_junction_signs.xodr").read_text(encoding="utf-8")
+    files = []
+    for year in ("2019", "2020"):
+        (tmp_path / year).mkdir()
+        files.append(tmp_path / year / "Town.xodr")
+        files[-1].write_text(text, encoding="utf-8")
+    done = odscen("maps", "add", *files, "--json", "--workspace", tmp_path / "w")
+    assert [row["name"] for row in done.json["maps"]] == ["2019-Town", "2020-Town"]
+
+
+def test_names_never_become_paths(tmp_path):
+    done = odscen(
+        "maps", "add", SHIPPED / "roundabout.xodr", "--name", "../x", "--workspace", tmp_path / "w"
+    )
+    assert done.code == 2
+    assert "'../x'" in done.err
+    assert not (tmp_path / "x").exists()
+
+
+def test_an_unknown_map_is_answered_with_close_names(workspace):
+    done = odscen("maps", "show", "signal_crosing", "--json", "--workspace", workspace)
+    assert done.code == 2
+    assert done.json["error"]["type"] == "NotFoundError"
+    assert "did you mean signal_crossing" in done.err
+
+
+def test_a_removed_map_is_gone(tmp_path):
+    w = ("--workspace", tmp_path)
+    odscen("maps", "add", SHIPPED / "roundabout.xodr", *w)
+    assert odscen("maps", "remove", "roundabout", "--json", *w).json == {"removed": ["roundabout"]}
+    assert odscen("maps", "list", "--json", *w).json == {"maps": []}
+    assert odscen("maps", "remove", "roundabout", *w).code == 2
+
+
+def test_render_writes_svg_and_png_and_refuses_the_rest(workspace, tmp_path):
+    w = ("--workspace", workspace)
+    assert odscen("maps", "render", "signal_crossing", "-o", tmp_path / "a.svg", *w).code == 0
+    assert (tmp_path / "a.svg").read_text(encoding="utf-8").endswith("</svg>\n")
+    done = odscen("maps", "render", "signal_crossing", "-o", tmp_path / "a.gif", *w)
+    assert done.code == 2
+    assert "not .gif" in done.err
+    pytest.importorskip("cairosvg", reason="needs the png extra")
+    assert odscen("maps", "render", "signal_crossing", "-o", tmp_path / "a.png", *w).code == 0
+    assert (tmp_path / "a.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_another_spacing_builds_the_map_again(tmp_path):
+    add = ("maps", "add", SHIPPED / "roundabout.xodr", "--json", "--workspace", tmp_path)
+    two = odscen(*add).json["maps"][0]["graph"]["nodes"]
+    four = odscen(*add, "--spacing", 4).json["maps"][0]["graph"]["nodes"]
+    assert four == pytest.approx(two / 2, rel=0.1)
+
+
+def test_help_needs_none_of_the_heavy_packages():
+    code = (
+        "import sys, odscen.cli;"
+        "print([m for m in ('numpy', 'scipy', 'lxml', 'polars', 'pydantic') if m in sys.modules])"
+    )
+    import subprocess
+
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_doctor_says_what_is_there(workspace):
+    done = odscen("doctor", "--json", "--workspace", workspace)
+    assert done.code == 0
+    checks = {check["name"]: check["found"] for check in done.json["checks"]}
+    assert done.json["healthy"] is True
+    assert checks["netconvert"].endswith("netconvert")
+    assert checks["workspace"] == str(workspace)
+
+
+def test_assets_are_listed():
+    done = odscen("assets", "list", "--json")
+    assert len(done.json["blueprints"]) == 93
+    assert {"ClearNoon", "FogNight"} <= {preset["name"] for preset in done.json["weather"]}
+
+
+def test_a_missing_command_explains_itself():
+    done = odscen("mpas")
+    assert done.code == 2
+    assert "maps" in done.err
+
+
+def test_map_json_is_valid_json_without_nan(workspace):
+    text = (workspace / "maps" / "signal_crossing" / "map.json").read_text(encoding="utf-8")
+    json.loads(text, parse_constant=lambda name: pytest.fail(name))

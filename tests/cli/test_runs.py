@@ -1,0 +1,167 @@
+import subprocess
+
+import polars as pl
+import pytest
+
+from odscen.convert.netconvert import netconvert_path
+from tests.cli.conftest import odscen
+
+GENERATE = ("generate", "--map", "signal_crossing", "--fill", "0.25", "--seed", "5", "--json")
+
+
+@pytest.fixture(scope="module")
+def scenario(workspace, tmp_path_factory):
+    out = tmp_path_factory.mktemp("scenarios")
+    done = odscen(*GENERATE, "--out", out, "--workspace", workspace)
+    assert done.code == 0, done.err
+    return done.json["scenarios"][0]["file"]
+
+
+@pytest.fixture(scope="module")
+def finished(workspace, scenario, tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs")
+    done = odscen("run", scenario, "--out", out, "--json", "--workspace", workspace)
+    assert done.code == 0, done.err
+    return done.json
+
+
+def test_a_sampled_scenario_has_nothing_to_remark(workspace, scenario):
+    done = odscen("check", scenario, "--json", "--workspace", workspace)
+    assert done.code == 0
+    assert done.json["problems"] == []
+
+
+def test_a_run_gives_what_scripts_rely_on(finished):
+    assert finished["status"] == "completed"
+    assert finished["sim_seconds"] > 10
+    assert finished["real_time_factor"] > 1
+    counts = finished["actors"]
+    assert set(counts) >= {"planned", "inserted", "arrived", "teleported", "collided", "waiting"}
+    assert counts["planned"] == counts["inserted"] > 10
+    assert counts["waiting"] == 0
+    assert finished["insertion_error_max"] < 0.1
+    for path in finished["files"].values():
+        with open(path, "rb"):
+            pass
+    assert set(finished["files"]) >= {"summary", "events", "actors", "trajectories", "report"}
+
+
+def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, finished, tmp_path):
+    again = odscen(*GENERATE, "--out", tmp_path, "--workspace", workspace).json["scenarios"][0]
+    assert _bytes(again["file"]) == _bytes(scenario)
+    second = odscen(
+        "run", again["file"], "--out", tmp_path, "--json", "--workspace", workspace
+    ).json
+    for name in ("trajectories", "events", "actors", "plan"):
+        assert _bytes(second["files"][name]) == _bytes(finished["files"][name]), name
+    for name in ("routes.rou.xml", "scenario.sumocfg", "net.net.xml"):
+        one, other = (f"{run['folder']}/sumo/{name}" for run in (finished, second))
+        assert _bytes(one) == _bytes(other), name
+
+
+def test_another_seed_gives_another_scenario(workspace, scenario, tmp_path):
+    arguments = [*GENERATE]
+    arguments[arguments.index("5")] = "6"
+    other = odscen(*arguments, "--out", tmp_path, "--workspace", workspace).json["scenarios"][0]
+    assert _bytes(other["file"]) != _bytes(scenario)
+
+
+def test_a_failed_expectation_is_exit_code_1(workspace, scenario, tmp_path):
+    w = ("--out", tmp_path, "--json", "--workspace", workspace)
+    done = odscen("run", scenario, "--expect", "arrived>=0.9", "--expect", "collided>100", *w)
+    assert done.code == 1
+    assert [verdict["passed"] for verdict in done.json["expectations"]] == [True, False]
+    assert "collided>100" in done.err
+    done = odscen("run", scenario, "--expect", "arived>=0.9", *w)
+    assert done.code == 2
+    assert "did you mean arrived" in done.err
+
+
+def test_several_scenarios_give_one_table(workspace, tmp_path):
+    w = ("--workspace", workspace)
+    odscen("generate", "--map", "t_junction_signs", "--count", 3, "--out", tmp_path / "s", *w)
+    out = ("--out", tmp_path / "r", "--jobs", 2)
+    done = odscen("run", tmp_path / "s", *out, "--json", *w)
+    assert done.code == 0, done.err
+    assert [run["status"] for run in done.json["runs"]] == ["completed"] * 3
+    assert sorted(path.name for path in (tmp_path / "r").iterdir()) == [
+        f"t_junction_signs-000{k}" for k in range(3)
+    ]
+
+
+def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
+    workspace, scenario, finished, tmp_path
+):
+    done = odscen("export", scenario, "--to", "sumo", "-o", tmp_path, "--workspace", workspace)
+    assert done.code == 0, done.err
+    sumo = netconvert_path().with_name("sumo")
+    subprocess.run([sumo, "-c", tmp_path / "scenario.sumocfg"], check=True, capture_output=True)
+    plain = pl.read_parquet(next(tmp_path.glob("*.parquet")))
+    ours = pl.read_parquet(finished["files"]["trajectories"])
+    assert plain.equals(ours)
+
+
+def test_the_graph_form_runs_like_the_document(workspace, scenario, finished, tmp_path):
+    w = ("--json", "--workspace", workspace)
+    graph = odscen("export", scenario, "--to", "graphml", "-o", tmp_path, *w).json["files"][0]
+    assert graph.endswith(".graphml")
+    done = odscen("run", graph, "--out", tmp_path, *w)
+    assert done.json["actors"] == finished["actors"]
+
+
+def test_bodies_stand_where_they_were_placed_by_the_recorded_trajectories(finished):
+    """The insertion error, once more from the files alone: SUMO's bumper against the plan's centre."""
+    import json
+    import math
+
+    plan = json.loads(_bytes(finished["files"]["plan"]))
+    traces = pl.read_parquet(finished["files"]["trajectories"])
+    prefix = "vehicle" if "vehicle_id" in traces.columns else "person"
+    first = traces.filter(pl.col(f"{prefix}_id").is_not_null()).group_by(f"{prefix}_id").first()
+    seen = {row[f"{prefix}_id"]: row for row in first.to_dicts()}
+    off_x, off_y = plan["net_offset"]
+    checked = 0
+    for actor in plan["actors"]:
+        row = seen[actor["id"]]
+        if actor["category"] == "pedestrian":
+            continue
+        angle = math.radians(90 - row[f"{prefix}_angle"])
+        half = actor["length"] / 2
+        x = row[f"{prefix}_x"] - half * math.cos(angle) - off_x
+        y = row[f"{prefix}_y"] - half * math.sin(angle) - off_y
+        assert math.hypot(x - actor["x"], y - actor["y"]) < 0.1, actor["id"]
+        checked += 1
+    assert checked > 10
+
+
+def test_a_scenario_with_errors_is_not_run_and_all_of_them_are_shown(workspace, scenario, tmp_path):
+    import json
+
+    document = json.loads(_bytes(scenario))
+    document["actors"][0]["spawn"] = "99.0.-1.0"
+    document["actors"][1]["lateral_offset"] = 9.0
+    bad = tmp_path / "bad.scenario.json"
+    bad.write_text(json.dumps(document), encoding="utf-8")
+    done = odscen("run", bad, "--out", tmp_path / "r", "--workspace", workspace)
+    assert done.code == 2
+    assert "actors[0].spawn" in done.err
+    assert "actors[1].lateral_offset" in done.err
+    assert not (tmp_path / "r").exists()
+    assert odscen("check", bad, "--workspace", workspace).code == 2
+
+
+def test_a_scenario_on_a_missing_map_says_so(scenario, tmp_path):
+    done = odscen("check", scenario, "--workspace", tmp_path)
+    assert done.code == 2
+    assert "no map named 'signal_crossing'" in done.err
+
+
+def test_generating_without_maps_says_how_to_add_one(tmp_path):
+    done = odscen("generate", "--workspace", tmp_path)
+    assert done.code == 2
+    assert "odscen maps add" in done.err
+
+
+def _bytes(path):
+    with open(path, "rb") as file:
+        return file.read()
