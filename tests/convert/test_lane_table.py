@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.convert.lane_table import SNAP, LaneTable
+from odscen.convert.lane_table import LaneTable
+from odscen.convert.lookup import SNAP
 from odscen.errors import GraphFormatError
 from odscen.ids import LaneKey, RoadId, SumoEdgeId, SumoLaneId
 from tests.convert.tables import AGAINST, DRIVE, INSIDE, WALK, table

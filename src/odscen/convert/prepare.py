@@ -188,58 +188,65 @@ def _joint(
     far = _end(linked, connection.get("contactPoint", "start"))
     if near is None or far is None:
         return None
-    namespace = etree.QName(incoming).namespace
-
-    def new(parent: etree._Element | None, tag: str, **attributes: str) -> etree._Element:
-        qname = etree.QName(namespace, tag)
-        if parent is None:
-            return etree.Element(qname, attributes)
-        return etree.SubElement(parent, qname, attributes)
-
-    road = new(None, "road", name="", length=str(_JOINT), id=name, junction=junction)
-    links = new(road, "link")
-    for tag, end in (("predecessor", near), ("successor", far)):
-        new(
-            links,
-            tag,
-            elementType="road",
-            elementId=end.road.get("id", ""),
-            contactPoint=end.contact,
-        )
     x, y, hdg = _pose(near)
-    plan = new(road, "planView")
-    new(
-        new(plan, "geometry", s="0", x=repr(x), y=repr(y), hdg=repr(hdg), length=str(_JOINT)),
-        "line",
-    )
-    section = new(new(road, "lanes"), "laneSection", s="0")
-    sides = {side: new(section, side) for side in ("left", "center", "right")}
-    new(sides["center"], "lane", id="0", type="none", level="false")
-    count = {"left": 0, "right": 0}
-    for link in list(connection.iterchildren("{*}laneLink")):
-        start, end_id = int(link.get("from", "0")), int(link.get("to", "0"))
-        lane = near.lanes.get(start)
-        if lane is None or end_id not in far.lanes:
-            continue
-        # Right of the joint lies what is right when one leaves the incoming road.
-        side = "right" if (start < 0) == (near.contact == "end") else "left"
-        count[side] += 1
-        own = str(count[side] if side == "left" else -count[side])
-        made = new(sides[side], "lane", id=own, type=lane.get("type", "driving"), level="false")
-        lane_links = new(made, "link")
-        new(lane_links, "predecessor", id=str(start))
-        new(lane_links, "successor", id=str(end_id))
-        new(made, "width", sOffset="0", a="3", b="0", c="0", d="0")
-        link.set("to", own)
-    for lane in reversed(list(sides["left"])):
-        sides["left"].append(lane)
-    for side in ("left", "right"):
-        if not count[side]:
-            section.remove(sides[side])
+    make = _Maker(etree.QName(incoming).namespace)
+    road = make(None, "road", name="", length=str(_JOINT), id=name, junction=junction)
+    links = make(road, "link")
+    for tag, end in (("predecessor", near), ("successor", far)):
+        target = {"elementId": end.road.get("id", ""), "contactPoint": end.contact}
+        make(links, tag, elementType="road", **target)
+    plan = make(road, "planView")
+    pose = {"x": repr(x), "y": repr(y), "hdg": repr(hdg)}
+    make(make(plan, "geometry", s="0", **pose, length=str(_JOINT)), "line")
+    _joint_lanes(make, make(road, "lanes"), connection, near, far)
     connection.attrib.pop("linkedRoad")
     connection.set("connectingRoad", name)
     connection.set("contactPoint", "start")
     return road
+
+
+class _Maker:
+    """Makes elements in one namespace."""
+
+    def __init__(self, namespace: str | None) -> None:
+        self._namespace = namespace
+
+    def __call__(
+        self, parent: etree._Element | None, tag: str, **attributes: str
+    ) -> etree._Element:
+        name = etree.QName(self._namespace, tag)
+        if parent is None:
+            return etree.Element(name, attributes)
+        return etree.SubElement(parent, name, attributes)
+
+
+def _joint_lanes(
+    make: _Maker, lanes: etree._Element, connection: etree._Element, near: _End, far: _End
+) -> None:
+    """Make one lane for each lane link, which is changed to lead to it."""
+    made: dict[str, list[etree._Element]] = {"left": [], "right": []}
+    for link in connection.iterchildren("{*}laneLink"):
+        start, end = int(link.get("from", "0")), int(link.get("to", "0"))
+        lane = near.lanes.get(start)
+        if lane is None or end not in far.lanes:
+            continue
+        # Right of the joint lies what is right when one leaves the incoming road.
+        right = (start < 0) == (near.contact == "end")
+        side = made["right" if right else "left"]
+        own = str(-len(side) - 1 if right else len(side) + 1)
+        element = make(None, "lane", id=own, type=lane.get("type", "driving"), level="false")
+        links = make(element, "link")
+        make(links, "predecessor", id=str(start))
+        make(links, "successor", id=str(end))
+        make(element, "width", sOffset="0", a="3", b="0", c="0", d="0")
+        side.append(element)
+        link.set("to", own)
+    section = make(lanes, "laneSection", s="0")
+    if made["left"]:
+        make(section, "left").extend(reversed(made["left"]))
+    make(make(section, "center"), "lane", id="0", type="none", level="false")
+    if made["right"]:
+        make(section, "right").extend(made["right"])
 
 
 def _end_at(road: etree._Element, junction: str) -> _End | None:
