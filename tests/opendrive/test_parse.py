@@ -285,6 +285,38 @@ def test_a_link_that_leads_nowhere_is_left_out_of_the_model() -> None:
     assert "there is no road '7'" in odr.notes[0]
 
 
+def test_files_beyond_the_limits_are_refused_before_they_cost_anything(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    text = document(road())
+    for limit, value in (("MAX_TAGS", 5), ("MAX_BYTES", 100)):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"odscen.opendrive.parse.{limit}", value)
+            with pytest.raises(OpenDriveError, match=f"the limit is {value}"):
+                parse(text)
+
+
+def test_a_map_of_more_lanes_than_memory_is_refused() -> None:
+    lanes = section(*(lane(-number) for number in range(1, 501)))
+    long = LINE.replace('length="100"', 'length="100000"')
+    with pytest.raises(OpenDriveError, match=r"all lanes together are 5e\+07 m long"):
+        parse(document(road(length=1e5, plan=long, lanes=lanes)))
+
+
+def test_a_lane_link_of_a_junction_that_leads_nowhere_is_left_out() -> None:
+    junction = (
+        '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="2" '
+        'contactPoint="start"><laneLink from="-1" to="-7"/><laneLink from="-1" to="-1"/>'
+        "</connection></junction>"
+    )
+    odr = parse(document(road("1"), road("2", junction="9"), junction))
+    assert odr.junctions["9"].connections[0].lane_links == ((-1, -1),)
+    assert odr.notes == (
+        "junction 9 > connection 0 > laneLink -1 -7: there is no lane -7 on road 2; "
+        "the link is left out [dangling-link]",
+    )
+
+
 def test_a_thousand_notes_of_one_kind_are_summed_up() -> None:
     objects = '<object id="1" type="pole" s="5" t="0"/>' * 1500
     odr = parse(document(road(inside=f"<objects>{objects}</objects>")))

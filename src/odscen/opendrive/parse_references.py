@@ -13,7 +13,6 @@ from odscen.opendrive.model import (
     LaneSection,
     Road,
     RoadLink,
-    SignalReference,
 )
 from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
 
@@ -81,17 +80,14 @@ def _road(road: Road, roads: Roads, junctions: Junctions, signals: set[str], not
             detail = f"there is no {link.element_type} {link.element_id!r}; the link is left out"
             notes.add(Rule.DANGLING_LINK, f"{place} > {name}", detail)
             changes[name] = None
-    lost = [reference for reference in road.signal_references if reference.id not in signals]
-    if lost:
-        changes["signal_references"] = _without(road, lost, notes)
+    kept = tuple(item for item in road.signal_references if item.id in signals)
+    if len(kept) != len(road.signal_references):
+        changes["signal_references"] = kept
+        for item in road.signal_references:
+            if item.id not in signals:
+                detail = f"there is no signal {item.id!r}; the reference is left out"
+                notes.add(Rule.DANGLING_LINK, f"{place} > signalReference", detail)
     return replace(road, **changes) if changes else road  # type: ignore[arg-type]
-
-
-def _without(road: Road, lost: list[SignalReference], notes: Notes) -> tuple[SignalReference, ...]:
-    for reference in lost:
-        detail = f"there is no signal {reference.id!r}; the reference is left out"
-        notes.add(Rule.DANGLING_LINK, f"road {road.id} > signalReference", detail)
-    return tuple(reference for reference in road.signal_references if reference not in lost)
 
 
 def _next_section(
@@ -172,23 +168,20 @@ def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Con
         links = tuple(
             link for link in connection.lane_links if link[0] in here and link[1] in there
         )
-        for link in connection.lane_links:
-            if link not in links:
-                detail = f"there is no lane {link[0]} or no lane {link[1]}; the link is left out"
-                notes.add(Rule.DANGLING_LINK, place, detail)
-        yield (
-            connection
-            if len(links) == len(connection.lane_links)
-            else connection._replace(lane_links=links)
-        )
+        for from_id, to_id in connection.lane_links:
+            if from_id not in here or to_id not in there:
+                lane, road = (to_id, connecting) if from_id in here else (from_id, incoming)
+                detail = f"there is no lane {lane} on road {road.id}; the link is left out"
+                notes.add(Rule.DANGLING_LINK, f"{place} > laneLink {from_id} {to_id}", detail)
+        yield connection._replace(lane_links=links)
 
 
 def _controller(controller: Controller, signals: set[str], notes: Notes) -> Controller:
-    lost = [control for control in controller.controls if control[0] not in signals]
-    for signal_id, _ in lost:
-        detail = f"there is no signal {signal_id!r}; the control is left out"
-        notes.add(Rule.DANGLING_LINK, f"controller {controller.id}", detail)
-    if not lost:
+    kept = tuple(control for control in controller.controls if control[0] in signals)
+    if len(kept) == len(controller.controls):
         return controller
-    controls = tuple(control for control in controller.controls if control not in lost)
-    return replace(controller, controls=controls)
+    for signal_id, _ in controller.controls:
+        if signal_id not in signals:
+            detail = f"there is no signal {signal_id!r}; the control is left out"
+            notes.add(Rule.DANGLING_LINK, f"controller {controller.id}", detail)
+    return replace(controller, controls=kept)

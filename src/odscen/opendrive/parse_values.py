@@ -33,19 +33,17 @@ def cubics(elements: Sequence[Element], s_name: str, s0: float, notes: Notes) ->
     last = -math.inf
     for element in elements:
         get = element.get
+        texts = (get(s_name), get("a"), get("b"), get("c"), get("d"))
         try:
-            s = float(cast("str", get(s_name)))
-            a = float(cast("str", get("a")))
-            b = float(cast("str", get("b")))
-            c = float(cast("str", get("c")))
-            d = float(cast("str", get("d")))
+            s, a, b, c, d = map(float, cast("tuple[str, ...]", texts))
+            # False for NaN, too.
+            plain = abs(s) + abs(a) + abs(b) + abs(c) + abs(d) <= MAX_NUMBER
+            plain = plain and "_" not in "".join(cast("tuple[str, ...]", texts))
         except (TypeError, ValueError):
+            plain = False
+        if not plain:
             # The slow way finds the attribute at fault and says so.
             s, a, b, c, d = (number(element, name) for name in (s_name, "a", "b", "c", "d"))
-        # False for NaN, too.
-        if not abs(s) + abs(a) + abs(b) + abs(c) + abs(d) <= MAX_NUMBER:
-            for name in (s_name, "a", "b", "c", "d"):
-                number(element, name, limit=MAX_NUMBER)
         if s <= last:
             _check_same(element, s_name, s, last, notes)
         last = s

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
@@ -31,12 +30,6 @@ _CONTAINERS = frozenset(
 )
 _NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection", "controller"})
 _SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
-_UNDERSCORED = re.compile(rb"[\"'][ \t\r\n]*[-+]?[0-9.]+_[0-9._]*[ \t\r\n]*[\"']")
-_TEXTS = frozenset(
-    {"id", "name", "text", "elementId", "junction", "incomingRoad", "connectingRoad", "date"}
-    | {"linkedRoad", "signalId", "type", "subtype", "high", "low", "mainRoad", "version"}
-)
-"""Attributes that may look like such a number and mean a text."""
 
 
 def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
@@ -79,19 +72,9 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     if dtd is not None and any(dtd.iterentities()):  # type: ignore[union-attr]  # not in the stubs
         msg = "the file declares XML entities; these are refused"
         raise OpenDriveError(msg)
-    if _UNDERSCORED.search(data):
-        _refuse_underscored_numbers(root)
     if b"xmlns" in data:
         _drop_namespaces(root)
     return root
-
-
-def _refuse_underscored_numbers(root: Element) -> None:
-    """Refuse ``1_000``: Python's float() would take it for a number, XML has no such numbers."""
-    for element in root.iter(etree.Element):
-        for name, text in cast("dict[str, str]", element.attrib).items():
-            if name not in _TEXTS and _UNDERSCORED.search(f'"{text}"'.encode()):
-                raise refusal(element, f"{name}={shown(text)} is not a number")
 
 
 def _drop_namespaces(root: Element) -> None:
@@ -113,7 +96,8 @@ def _label(element: Element) -> str:
         return f"{tag} {str(element.get('id'))[:60]}"
     if tag in _SINGLE:
         return tag
-    return f"{tag} {sum(1 for _ in element.itersiblings(element.tag, preceding=True))}"
+    before = element.xpath("count(preceding-sibling::*[name() = $tag])", tag=str(element.tag))
+    return f"{tag} {int(cast('float', before))}"
 
 
 def element_path(element: Element) -> str:
@@ -138,16 +122,29 @@ def required(element: Element, name: str) -> str:
 
 def number(element: Element, name: str, *, limit: float = 1e9) -> float:
     """A finite number that must be there, absolute value at most ``limit``."""
+    text = element.get(name)
+    try:
+        value = float(text)  # type: ignore[arg-type]  # None is a TypeError
+    except (TypeError, ValueError):
+        value = math.nan
+    # NaN is not between anything. "1_000" is a number in Python, but not in XML.
+    if -limit <= value <= limit and "_" not in cast("str", text):
+        return value
+    raise _no_number(element, name, limit)
+
+
+def _no_number(element: Element, name: str, limit: float) -> OpenDriveError:
+    """What is wrong with an attribute that :func:`number` refuses."""
     text = required(element, name)
     try:
         value = float(text)
-    except ValueError as err:
-        raise refusal(element, f"{name}={shown(text)} is not a number") from err
+    except ValueError:
+        value = None
+    if value is None or "_" in text:
+        return refusal(element, f"{name}={shown(text)} is not a number")
     if not math.isfinite(value):
-        raise refusal(element, f"{name}={shown(text)} is not a finite number")
-    if abs(value) > limit:
-        raise refusal(element, f"{name}={shown(text)} is beyond the limit of {limit:g}")
-    return value
+        return refusal(element, f"{name}={shown(text)} is not a finite number")
+    return refusal(element, f"{name}={shown(text)} is beyond the limit of {limit:g}")
 
 
 def positive(element: Element, name: str, *, limit: float = 1e9) -> float:
@@ -161,7 +158,7 @@ def positive(element: Element, name: str, *, limit: float = 1e9) -> float:
 def optional_number(element: Element, name: str) -> float | None:
     """A finite number, or ``None`` if the attribute is missing or empty."""
     value = element.get(name)
-    return None if value is None or not value.strip() else number(element, name)
+    return None if not value or value.isspace() else number(element, name)
 
 
 def number_or(element: Element, name: str, default: float) -> float:
@@ -174,7 +171,7 @@ def integer(element: Element, name: str, *, limit: int = 10**9) -> int:
     """A whole number that must be there."""
     text = required(element, name)
     try:
-        value = int(text)
+        value = int(text.replace("_", "?"))
     except ValueError as err:
         raise refusal(element, f"{name}={shown(text)} is not a whole number") from err
     if abs(value) > limit:
