@@ -10,7 +10,7 @@ from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, prog
 from odscen.cli.runs import show_results
 
 DEMO_MAP = "town_5x5"
-DEMO_FILL = 0.15
+DEMO_FILL = 0.3
 
 
 def demo(
