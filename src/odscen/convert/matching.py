@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from odscen.convert.pieces import Piece, monotone
+from odscen.convert.sampling import STEP
 
 if TYPE_CHECKING:
     from odscen.convert.sampling import LaneSamples, ShapeSamples
@@ -102,16 +103,27 @@ def _nearest(
     delta = places.xyz[:, None, :] - lanes.xyz[index]
     cos, sin = np.cos(lanes.hdg[index]), np.sin(lanes.hdg[index])
     across = np.abs(delta[..., 1] * cos - delta[..., 0] * sin)
-    along = np.abs(delta[..., 0] * cos + delta[..., 1] * sin)
+    beyond = _beyond(delta[..., 0] * cos + delta[..., 1] * sin, index, lanes)
     agree = np.cos(places.hdg[:, None] - lanes.hdg[index])
     if either_way:
         agree = np.abs(agree)
-    # Beyond half a sample step a place lies past the end of the lane; that distance counts.
-    cost = np.hypot(across, np.maximum(0.0, along - 0.6)) + FLATTEN * np.abs(delta[..., 2])
+    cost = np.hypot(across, beyond) + FLATTEN * np.abs(delta[..., 2])
     cost = np.where(missing | (agree < SAME_DIRECTION) | (across > REACH), np.inf, cost)
     best = np.argmin(cost + penalty[lanes.owner[index]], axis=1)
     rows = np.arange(len(best))
     return np.where(np.isfinite(cost[rows, best]), index[rows, best], -1)
+
+
+def _beyond(along: FloatArray, index: IndexArray, lanes: LaneSamples) -> FloatArray:
+    """Metres that places, ``along`` metres ahead of samples ``index``, lie past the lane's ends."""
+    first = np.zeros(len(lanes.owner), dtype=np.bool_)
+    last = first.copy()
+    first[lanes.first[:-1]] = True
+    last[lanes.first[1:] - 1] = True
+    outside = (last[index] & (along > 0.0)) | (first[index] & (along < 0.0))
+    # Elsewhere a sample half a step further on is nearer; a little more allows for curves.
+    past: FloatArray = np.abs(along) - np.where(outside, 0.0, 0.6 * STEP)
+    return np.maximum(past, 0.0)
 
 
 def _along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:

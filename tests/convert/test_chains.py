@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from odscen.convert.chains import (
+    Chain,
+    InternalLane,
+    Place,
+    Stretch,
+    chain_pieces,
+    chains_of,
+    shortest_way,
+)
+from odscen.convert.net import Net
+from odscen.convert.sampling import LaneSamples
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.parse import parse
+from tests.convert.test_net import NET
+from tests.opendrive.snippets import document, lane, road, section
+
+ROADS = [
+    road(
+        name,
+        length=length,
+        plan=f'<geometry s="0" x="{x}" y="0" hdg="0" length="{length}"><line/></geometry>',
+        lanes=section(lane(-1)),
+    )
+    for name, x, length in [("a", 0, 50), ("b", 50, 20), ("c", 50, 30), ("d", 80, 40)]
+]
+TABLE = RoadTable.of(parse(document(*ROADS)))
+A, B, C, D = range(4)
+LANES = LaneSamples.of(TABLE, np.arange(4))
+AFTER = {A: (B, C), B: (D,), C: (D,)}
+
+
+def test_the_shortest_way_is_taken_from_place_to_place() -> None:
+    way = shortest_way(Place(A, 48.0), Place(D, 1.5), AFTER, LANES, longest=100.0)
+    assert way is not None
+    assert [part.lane for part in way] == [A, B, D]
+    np.testing.assert_allclose([part[1:] for part in way], [(48, 50), (0, 20), (0, 1.5)])
+
+
+def test_a_way_within_one_lane_needs_no_other() -> None:
+    way = shortest_way(Place(A, 10.0), Place(A, 12.0), AFTER, LANES, longest=100.0)
+    assert way == (Stretch(A, 10.0, 12.0),)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "longest"),
+    [
+        (Place(D, 1.0), Place(A, 1.0), 500.0),
+        (Place(A, 48.0), Place(D, 1.5), 20.0),
+        (Place(A, 12.0), Place(A, 10.0), 500.0),
+    ],
+)
+def test_where_no_way_is_short_enough_there_is_none(
+    start: Place, end: Place, longest: float
+) -> None:
+    assert shortest_way(start, end, AFTER, LANES, longest=longest) is None
+
+
+def test_a_way_is_divided_among_internal_lanes_in_proportion() -> None:
+    way = (Stretch(A, 48.0, 50.0), Stretch(B, 0.0, 20.0), Stretch(D, 0.0, 2.0))
+    via = [InternalLane(7, 6.0, 6.1), InternalLane(8, 6.0, 5.9)]
+    pieces = chain_pieces(way, via, LANES, step=1.0)
+    ends = [
+        (piece.lane, piece.sumo, *np.round([*piece.s[[0, -1]], *piece.pos[[0, -1]]], 3).tolist())
+        for piece in pieces
+    ]
+    assert ends == [
+        (A, 7, 48.0, 50.0, 0.0, 1.017),
+        (B, 7, 0.0, 10.0, 1.017, 6.1),
+        (B, 8, 10.0, 20.0, 0.0, 4.917),
+        (D, 8, 0.0, 2.0, 4.917, 5.9),
+    ]
+
+
+def test_a_chain_runs_over_internal_lanes_from_normal_to_normal() -> None:
+    assert chains_of(Net.parse(NET.encode()), ()) == [Chain("a_1", (":j_0_0",), "b_0")]
+
+
+def test_a_stub_is_a_link_of_chains_and_not_their_end() -> None:
+    net = Net.parse(NET.encode())
+    assert chains_of(net, {"b_0"}) == []
