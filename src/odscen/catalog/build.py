@@ -13,7 +13,7 @@ from odscen.catalog.render import RenderOptions, render_drawing, svg_to_png
 from odscen.catalog.shapes import map_drawing
 from odscen.catalog.statistics import map_semantics, map_statistics
 from odscen.convert.network import build_network
-from odscen.errors import InputError, in_file
+from odscen.errors import InputError
 from odscen.lanegraph.build import build_map_graph
 from odscen.lanegraph.files import to_graphml, to_npz_bytes
 from odscen.lanegraph.model import MapGraph, Relation
@@ -74,20 +74,6 @@ def build_map(
     NetconvertError
         If netconvert fails on it.
     """
-    with in_file(file):
-        _build(content, folder, name, file, sha256, spacing, builder, progress)
-
-
-def _build(
-    content: bytes,
-    folder: Path,
-    name: str,
-    file: str,
-    sha256: str,
-    spacing: float,
-    builder: str,
-    progress: Callable[[str, float], None],
-) -> None:
     start = time.perf_counter()
     progress("reading the map", 0.0)
     odr = parse(content, file=file)

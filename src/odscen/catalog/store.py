@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.folders import discard, new_folder
-from odscen.errors import InputError, NotFoundError, WorkspaceError
+from odscen.errors import InputError, NotFoundError, WorkspaceError, in_file
 
 if TYPE_CHECKING:
     from odscen.catalog.drawing import MapDrawing
@@ -252,7 +252,7 @@ class Workspace:
             return built
         from odscen.catalog.build import build_map
 
-        with _workspace_errors(self.root), new_folder(final) as folder:
+        with _workspace_errors(self.root), in_file(source.name), new_folder(final) as folder:
             build_map(
                 content,
                 folder,
