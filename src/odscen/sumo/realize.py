@@ -16,6 +16,7 @@ import numpy as np
 
 from odscen.categories import DEFAULT_BODY, Body
 from odscen.errors import ScenarioError
+from odscen.lanegraph.paths import Router
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.results.records import Plan, PlannedActor
 from odscen.scenario.region import Region
@@ -138,6 +139,7 @@ class _Writer:
         self._assets = assets
         self._seed = seed
         self._effect = effect
+        self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
         self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
 
@@ -145,8 +147,7 @@ class _Writer:
         """Write one road user and return the plan for it."""
         body = self._body(user)
         manner = self._driver(user, body)
-        router = self._region.walk_router if user.person else self._region.router
-        path = router.path(user.spawn, user.goal)
+        path = self._path(user)
         problem = None
         try:
             repairs = self._write(user, body, manner, path)
@@ -156,6 +157,16 @@ class _Writer:
         else:
             self.notes += [f"{user.id}: {repair}" for repair in repairs]
         return self._planned(user, body, manner, path, problem)
+
+    def _path(self, user: RoadUser) -> IntArray:
+        """Return the shortest way inside the region; over lanes that SUMO has, if there is one."""
+        if user.person:
+            return self._region.walk_router.path(user.spawn, user.goal)
+        if self._drivable.mask[user.spawn]:
+            path = self._drivable.path(user.spawn, user.goal)
+            if len(path):
+                return path
+        return self._region.router.path(user.spawn, user.goal)
 
     def _write(self, user: RoadUser, body: Body, manner: Driver, path: IntArray) -> tuple[str, ...]:
         if user.person:

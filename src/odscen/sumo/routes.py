@@ -274,7 +274,8 @@ def connected(
     """Make a list of edges a connected route.
 
     Where two edges have no link, the shortest way between them is put in; where there is none of at
-    most :data:`DETOUR` metres, the second one is left out. The last edge is never left out.
+    most :data:`DETOUR` metres, the second one is left out. If the last edge cannot be reached then,
+    the route leaves the path for the shortest way to it, as late as possible.
 
     Returns
     -------
@@ -283,21 +284,36 @@ def connected(
     Raises
     ------
     NoRouteError
-        If the last edge cannot be reached.
+        If the last edge cannot be reached from any edge on the way.
     """
     route, repairs = [edges[0]], []
-    for position, edge in enumerate(edges[1:], start=1):
+    for edge in edges[1:-1]:
         if edge in net.next_edges(route[-1], vclass):
             route.append(edge)
             continue
         way = net.way(route[-1], edge, vclass)
-        last = position == len(edges) - 1
-        if way is None or (not last and net.way_length(way[1:-1]) > DETOUR):
-            if last:
-                msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {edge}"
-                raise NoRouteError(msg)
+        if way is None or net.way_length(way[1:-1]) > DETOUR:
             repairs.append(f"edge {edge} left out: no link from {route[-1]}")
             continue
         route.extend(way[1:])
         repairs.append(f"{' '.join(way[1:-1]) or edge} put in between {way[0]} and {edge}")
+    if len(edges) > 1 and edges[-1] not in net.next_edges(route[-1], vclass):
+        route, repair = _ended(net, route, edges[-1], vclass)
+        repairs.append(repair)
+    elif len(edges) > 1:
+        route.append(edges[-1])
     return tuple(route), tuple(repairs)
+
+
+def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list[str], str]:
+    """Lead a route to its last edge from the latest place where that is possible."""
+    for kept in range(len(route), 0, -1):
+        way = net.way(route[kept - 1], last, vclass)
+        if way is None:
+            continue
+        told = f"{' '.join(way[1:-1]) or last} put in between {way[0]} and {last}"
+        if kept < len(route):
+            told = f"{' '.join(route[kept:])} left out; {told}"
+        return [*route[:kept], *way[1:]], told
+    msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {last}"
+    raise NoRouteError(msg)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,16 +17,19 @@ if TYPE_CHECKING:
 
     from odscen.convert.lane_table import LaneTable
     from odscen.ids import LaneKey
-    from odscen.lanegraph.model import FloatArray, IntArray, LaneGraph, MapGraph
+    from odscen.lanegraph.model import BoolArray, FloatArray, IntArray, LaneGraph, MapGraph
 
 NORMAL = "normal"
 INTERNAL = "internal"
+
+SHORT = 1.0
+"""Lanes up to this length (m) may be missing in SUMO: routes lead over them all the same."""
 
 NOTHING = 1e-3
 """Metres that stand for no ground at all."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SumoMap:
     """Made once per map by :meth:`of`; many scenarios are realized on it.
 
@@ -45,6 +49,18 @@ class SumoMap:
     walk_places: Places
     net_offset: tuple[float, float]
     elevation: bool = False
+
+    @cached_property
+    def drivable(self) -> BoolArray:
+        """Lane-graph nodes that a way in SUMO can lead over, shape ``(N,)``.
+
+        Those of lanes that exist in SUMO, somewhere along them at least.
+        """
+        lanes = self.graph.lanes
+        known = np.zeros(len(lanes.lanes.keys), dtype=np.bool_)
+        known[lanes.lane[self.lane_places.lane >= 0]] = True
+        known |= lanes.lanes.lengths <= SHORT
+        return known[lanes.lane]
 
     @classmethod
     def of(cls, graph: MapGraph, table: LaneTable) -> SumoMap:

@@ -22,9 +22,6 @@ DEVIATION = 0.05
 REACH = 6.0
 """Metres before and behind a spawn where that holds too: half a bus."""
 
-SHORT = 5.0
-"""Lanes up to this length (m) may be missing in SUMO: routes lead over them all the same."""
-
 
 def usable_places(sumo_map: SumoMap) -> Usable:
     """Nodes that sampling may use for a run in SUMO.
@@ -41,9 +38,6 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
     exact = admitted & _near(sumo_map.lane_places)
     reach = int(np.ceil(REACH / lanes.spacing))
-    known = np.zeros(len(lanes.lanes.keys), dtype=np.bool_)
-    known[lanes.lane[sumo_map.lane_places.lane >= 0]] = True
-    known |= lanes.lanes.lengths <= SHORT
     walked = np.array(
         [
             not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
@@ -54,7 +48,7 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
     return Usable(
         spawnable=_all_around(exact, lanes, reach),
-        drivable=known[lanes.lane],
+        drivable=sumo_map.drivable,
         walkable=on_foot & ~walks.roadside[walks.lane],
     )
 
