@@ -140,6 +140,54 @@ def test_a_goal_that_cannot_be_reached_is_no_route() -> None:
         connected(chain(10, 10, 10, gaps=(1,)), ["e0", "e2"], "passenger")
 
 
+def test_a_path_into_a_dead_end_is_left_as_late_as_possible() -> None:
+    lanes = {f"{name}_0": NetLane(f"{name}_0", name, 0, 10.0) for name in ("a", "b", "dead", "z")}
+    links = (Link("a_0", "b_0"), Link("b_0", "dead_0"), Link("b_0", "z_0"))
+    edges, repairs = connected(RoadNet(lanes, links), ["a", "b", "dead", "z"], "passenger")
+    assert edges == ("a", "b", "z")
+    assert repairs == ("dead left out; z put in between b and z",)
+
+
+def test_a_front_beyond_its_lane_leaves_by_a_link_of_that_lane() -> None:
+    net = street_net()
+    other = NetLane("side_0", "side", 0, 40.0)
+    links = (
+        Link("in_1", "side_0"), Link("side_0", "out_1"),
+        *(link for link in net.links if link.source != "in_1"),
+    )  # fmt: skip
+    detour = RoadNet({**net.lanes, "side_0": other}, links)
+    places = lane_places(GRAPH.lanes)
+    places = replace(places, lanes=(*places.lanes, "side_0"), scale=np.ones(7))
+    planner = RoutePlanner(GRAPH.lanes, detour, places)
+    path = ROUTER.path(node_index(GRAPH, "1.0.-2.48"), node_index(GRAPH, "3.0.-2.20"))
+    route = planner.plan(path, length=4.5, vclass="passenger")
+    assert route.edges == ("side", "out")
+    assert route.depart_pos == pytest.approx(97.0 + 2.25 - 98.0)
+    assert route.repairs == ("leaves lane in_1 by side, not out",)
+
+
+def test_lateral_offsets_are_mirrored_for_vehicles_in_left_hand_traffic() -> None:
+    right, left = street_net(), street_net()
+    object.__setattr__(left, "lefthand", True)
+    path = ROUTER.path(node_index(GRAPH, "1.0.-2.10"), node_index(GRAPH, "3.0.-2.20"))
+    for net, expected in ((right, 0.3), (left, -0.3)):
+        planner = RoutePlanner(GRAPH.lanes, net, lane_places(GRAPH.lanes))
+        route = planner.plan(path, length=4.5, vclass="passenger", lateral_offset=0.3)
+        assert route.depart_pos_lat == expected
+
+
+def test_a_walk_from_an_inner_sidewalk_counts_from_the_one_that_is_walked() -> None:
+    lanes = [
+        NetLane("in_0", "in", 0, 98.0, width=2.0, allowed=frozenset({"pedestrian"})),
+        NetLane("in_1", "in", 1, 98.0, width=1.0, allowed=frozenset()),
+        NetLane("in_2", "in", 2, 98.0, width=3.0, allowed=frozenset({"pedestrian"})),
+    ]
+    net = RoadNet({lane.id: lane for lane in lanes}, ())
+    assert net.walked_lane("in") is lanes[0]
+    assert net.left_of(lanes[2], lanes[0]) == pytest.approx(1.0 + 1.0 + 1.5)
+    assert net.left_of(lanes[0], lanes[2]) == pytest.approx(-3.5)
+
+
 def test_the_shortest_way_is_by_length_not_by_number_of_edges() -> None:
     lanes = {name: NetLane(f"{name}_0", name, 0, x) for name, x in
              {"a": 1.0, "long": 100.0, "b": 10.0, "c": 10.0, "z": 1.0}.items()}  # fmt: skip
