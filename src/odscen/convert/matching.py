@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from odscen.convert.pieces import Piece, monotone
-from odscen.convert.sampling import STEP
 
 if TYPE_CHECKING:
     from odscen.convert.sampling import LaneSamples, ShapeSamples
@@ -30,6 +29,8 @@ SAME_DIRECTION = 0.7
 FLATTEN = 0.5
 """Share of heights that counts: decks are told apart, superelevation (SUMO has none) is not."""
 NEIGHBOURS = 10
+_AT_ONCE = 20_000
+"""Places: keeps the memory that finding neighbours takes below 20 MB."""
 
 _TIP = 0.5
 """Metres: shorter pieces at the ends of a SUMO lane may be mere touches of another lane."""
@@ -65,7 +66,7 @@ def match(
     count = len(places.owner)
     if not count or not len(lanes.owner):
         return Match(np.full(count, -1, dtype=np.intp), np.zeros(count), np.zeros(count))
-    nearest = _nearest(places, lanes, penalty, either_way=either_way)
+    nearest = _Finder(lanes, penalty, either_way=either_way).nearest(places.xyz, places.hdg)
     found = nearest >= 0
     base = np.maximum(nearest, 0)
     owner = lanes.owner[base]
@@ -87,43 +88,60 @@ def match(
     return Match(np.where(found, owner, -1), np.clip(s, low, high), deviation)
 
 
-def _nearest(
-    places: ShapeSamples, lanes: LaneSamples, penalty: FloatArray, *, either_way: bool
-) -> IndexArray:
-    """Index of the sample whose lane passes closest to each place, -1 for none."""
-    squeeze = np.array([1.0, 1.0, FLATTEN])
-    tree = cKDTree(lanes.xyz * squeeze)
-    neighbours = min(NEIGHBOURS, len(lanes.owner))
-    _, index = tree.query(
-        places.xyz * squeeze, k=neighbours, distance_upper_bound=REACH + 1.0, workers=1
-    )
-    index = np.asarray(index, dtype=np.intp).reshape(len(places.owner), neighbours)
-    missing = index >= len(lanes.owner)
-    index = np.where(missing, 0, index)
-    delta = places.xyz[:, None, :] - lanes.xyz[index]
-    cos, sin = np.cos(lanes.hdg[index]), np.sin(lanes.hdg[index])
-    across = np.abs(delta[..., 1] * cos - delta[..., 0] * sin)
-    beyond = _beyond(delta[..., 0] * cos + delta[..., 1] * sin, index, lanes)
-    agree = np.cos(places.hdg[:, None] - lanes.hdg[index])
-    if either_way:
-        agree = np.abs(agree)
-    cost = np.hypot(across, beyond) + FLATTEN * np.abs(delta[..., 2])
-    cost = np.where(missing | (agree < SAME_DIRECTION) | (across > REACH), np.inf, cost)
-    best = np.argmin(cost + penalty[lanes.owner[index]], axis=1)
-    rows = np.arange(len(best))
-    return np.where(np.isfinite(cost[rows, best]), index[rows, best], -1)
+class _Finder:
+    """Finds the samples whose lanes pass closest to places."""
 
+    def __init__(self, lanes: LaneSamples, penalty: FloatArray, *, either_way: bool) -> None:
+        self._lanes = lanes
+        self._penalty = penalty
+        self._either_way = either_way
+        self._squeeze = np.array([1.0, 1.0, FLATTEN])
+        self._tree = cKDTree(lanes.xyz * self._squeeze)
+        self._first = np.zeros(len(lanes.owner), dtype=np.bool_)
+        self._first[lanes.first[:-1]] = True
+        self._last = np.zeros(len(lanes.owner), dtype=np.bool_)
+        self._last[lanes.first[1:] - 1] = True
+        steps = np.diff(lanes.first) - 1
+        self._step = np.array([lanes.length(lane) for lane in range(len(steps))]) / steps
+        self._reach = REACH + float(self._step.max())
 
-def _beyond(along: FloatArray, index: IndexArray, lanes: LaneSamples) -> FloatArray:
-    """Metres that places, ``along`` metres ahead of samples ``index``, lie past the lane's ends."""
-    first = np.zeros(len(lanes.owner), dtype=np.bool_)
-    last = first.copy()
-    first[lanes.first[:-1]] = True
-    last[lanes.first[1:] - 1] = True
-    outside = (last[index] & (along > 0.0)) | (first[index] & (along < 0.0))
-    # Elsewhere a sample half a step further on is nearer; a little more allows for curves.
-    past: FloatArray = np.abs(along) - np.where(outside, 0.0, 0.6 * STEP)
-    return np.maximum(past, 0.0)
+    def nearest(self, xyz: FloatArray, hdg: FloatArray) -> IndexArray:
+        """Index of the best sample for each place, -1 for none."""
+        found = [
+            self._some(xyz[start : start + _AT_ONCE], hdg[start : start + _AT_ONCE])
+            for start in range(0, len(xyz), _AT_ONCE)
+        ]
+        return np.concatenate(found)
+
+    def _some(self, xyz: FloatArray, hdg: FloatArray) -> IndexArray:
+        lanes = self._lanes
+        neighbours = min(NEIGHBOURS, len(lanes.owner))
+        _, index = self._tree.query(
+            xyz * self._squeeze, k=neighbours, distance_upper_bound=self._reach, workers=1
+        )
+        index = np.asarray(index, dtype=np.intp).reshape(len(xyz), neighbours)
+        missing = index >= len(lanes.owner)
+        index = np.where(missing, 0, index)
+        delta = xyz[:, None, :] - lanes.xyz[index]
+        cos, sin = np.cos(lanes.hdg[index]), np.sin(lanes.hdg[index])
+        across = np.abs(delta[..., 1] * cos - delta[..., 0] * sin)
+        beyond = self._beyond(delta[..., 0] * cos + delta[..., 1] * sin, index)
+        agree = np.cos(hdg[:, None] - lanes.hdg[index])
+        if self._either_way:
+            agree = np.abs(agree)
+        cost = np.hypot(across, beyond) + FLATTEN * np.abs(delta[..., 2])
+        cost = np.where(missing | (agree < SAME_DIRECTION) | (across > REACH), np.inf, cost)
+        best = np.argmin(cost + self._penalty[lanes.owner[index]], axis=1)
+        rows = np.arange(len(best))
+        return np.where(np.isfinite(cost[rows, best]), index[rows, best], -1)
+
+    def _beyond(self, along: FloatArray, index: IndexArray) -> FloatArray:
+        """Metres that places, ``along`` metres ahead of samples, lie past the ends of the lane."""
+        outside = (self._last[index] & (along > 0.0)) | (self._first[index] & (along < 0.0))
+        # Elsewhere a sample half a step further on is nearer; a little more allows for curves.
+        step = self._step[self._lanes.owner[index]]
+        past: FloatArray = np.abs(along) - np.where(outside, 0.0, 0.6 * step)
+        return np.maximum(past, 0.0)
 
 
 def _along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:

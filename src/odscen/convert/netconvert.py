@@ -109,7 +109,7 @@ def run_netconvert(
         Seconds of computing time, and ten times as many by the clock (a busy machine is no fault of
         the map).
     memory_limit
-        Bytes of address space.
+        Bytes of data; netconvert itself takes some 0.2 GB of them before it has read anything.
 
     Raises
     ------
@@ -120,7 +120,6 @@ def run_netconvert(
     """
     output = xodr.with_suffix(".net.xml")
     output.unlink(missing_ok=True)
-    home = sumo_home()
     command = [
         str(netconvert_path()),
         *("--opendrive-files", xodr.name),
@@ -130,7 +129,7 @@ def run_netconvert(
     with subprocess.Popen(
         command,
         cwd=xodr.parent,
-        env={**os.environ, "SUMO_HOME": str(home)} if home else None,
+        env=_environment(),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -150,16 +149,27 @@ def run_netconvert(
     return NetconvertResult(_HEADER.sub(b"", output.read_bytes(), count=1), messages)
 
 
+def _environment() -> dict[str, str]:
+    """Environment of netconvert.
+
+    One thread, because the algebra library that comes with it sets aside memory for as many threads
+    as the machine has cores, which would make the limit depend on the machine.
+    """
+    home = sumo_home()
+    own = {"OMP_NUM_THREADS": "1", **({"SUMO_HOME": str(home)} if home else {})}
+    return {**os.environ, **own}
+
+
 def _limit(pid: int, time_limit: float, memory_limit: int) -> None:
     """Limit a running child; only Linux can, elsewhere the clock must do."""
     try:
-        from resource import RLIMIT_AS, RLIMIT_CORE, RLIMIT_CPU, prlimit
+        from resource import RLIMIT_CORE, RLIMIT_CPU, RLIMIT_DATA, prlimit
     except ImportError:
         return
     seconds = max(1, round(time_limit))
     # A child that has already ended needs no limit.
     with contextlib.suppress(ProcessLookupError):
-        prlimit(pid, RLIMIT_AS, (memory_limit, memory_limit))
+        prlimit(pid, RLIMIT_DATA, (memory_limit, memory_limit))
         prlimit(pid, RLIMIT_CPU, (seconds, seconds + 1))
         prlimit(pid, RLIMIT_CORE, (0, 0))
 

@@ -29,11 +29,11 @@ LEAST_SECONDS = 2.0
 SECONDS_PER_MEGABYTE = 8.0
 MOST_SECONDS = 60.0
 """Computing time of one netconvert run. Towns of 3 MB take 0.4 s; a small file that takes longer
-than two seconds is one that netconvert will not finish."""
+than two seconds is one that netconvert will not finish. Later rungs get half."""
 
 MEMORY = 768 << 20
 MEMORY_PER_MEGABYTE = 64 << 20
-"""Bytes of address space: towns of 3 MB take 0.2 GB."""
+"""Bytes of data; towns of 3 MB take less than 0.2 GB of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +81,14 @@ def _climb(
     """Try the rungs from best to plainest; say which were needed."""
     path = stage(workdir, {TYPEMAP_FILE: typemap().encode(), INPUT_FILE: prepared}) / INPUT_FILE
     megabytes = len(prepared) / 1e6
-    time_limit = min(MOST_SECONDS, LEAST_SECONDS + SECONDS_PER_MEGABYTE * megabytes)
+    full_time = min(MOST_SECONDS, LEAST_SECONDS + SECONDS_PER_MEGABYTE * megabytes)
+    time_limit = full_time
     memory = MEMORY + int(MEMORY_PER_MEGABYTE * megabytes)
     steps: list[Entry] = []
     failure: NetconvertError | None = None
     for rung in ladder(lefthand=lefthand):
         if failure is not None:
+            time_limit = max(0.5 * full_time, 1.0)
             reason = f"{rung.gives_up}, because {_first_line(failure)}"
             steps.append(Entry(Fate.LOST, "netconvert", reason))
         try:

@@ -23,8 +23,8 @@ IndexArray = NDArray[np.intp]
 STEP = 1.0
 """Metres between samples; curves of 6 m radius are then followed within 2 cm."""
 
-MOST_SAMPLES = 2_000_000
-"""Longer maps are sampled less densely: 2,000 km of lanes are, and files with absurd lengths."""
+MOST_SAMPLES = 300_000
+"""Maps with more than 300 km of lanes are sampled less densely, and so are absurd ones."""
 
 
 def _counts(lengths: FloatArray, step: float) -> IndexArray:

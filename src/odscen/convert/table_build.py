@@ -266,6 +266,8 @@ class _Builder:
         drawn = sum(float(self.drawn.length[self.row[lane]]) for lane in chain.via)
         longest = LONGEST_FACTOR * drawn + LONGEST_EXTRA
         way = shortest_way(start, end, self.successors, self.samples, longest=longest)
+        if way is None and start.lane == end.lane and abs(start.s - end.s) < STUB:
+            return []  # two SUMO lanes meet on one lane, with nothing between them
         if way is None:
             self.invented.add((before.lane, after.lane))
             return []
