@@ -36,7 +36,7 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     graph = sumo_map.graph
     lanes, walks = graph.lanes, graph.walks
     admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
-    exact = admitted & _near(sumo_map.lane_places)
+    exact = admitted & _near(sumo_map.lane_places) & ~_at_dead_end(sumo_map, sumo_map.lane_places)
     reach = int(np.ceil(REACH / lanes.spacing))
     walked = np.array(
         [
@@ -61,6 +61,14 @@ def _admitted(sumo_map: SumoMap, places: Places, vclass: str) -> BoolArray:
     """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
     allowed = np.array([lane.allows(vclass) for lane in _lanes(sumo_map, places)], dtype=np.bool_)
     return (places.lane >= 0) & allowed[places.lane]
+
+
+def _at_dead_end(sumo_map: SumoMap, places: Places) -> BoolArray:
+    """Nodes close to the end of a SUMO lane without links: a front could not reach over it."""
+    lanes = _lanes(sumo_map, places)
+    dead = np.array([not sumo_map.net.links_from.get(lane.id) for lane in lanes], dtype=np.bool_)
+    length = np.array([lane.length for lane in lanes])
+    return dead[places.lane] & (places.pos > length[places.lane] - REACH)
 
 
 def _near(places: Places) -> BoolArray:
