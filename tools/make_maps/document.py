@@ -3,33 +3,42 @@
 from __future__ import annotations
 
 import math
-import re
 import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tools.make_maps.builder import Builder
+if TYPE_CHECKING:
+    from tools.make_maps.builder import Builder
 
-GEO_REFERENCE = (
-    "+proj=tmerc +lat_0=48.0 +lon_0=11.0 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +no_defs"
-)
-NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?", re.IGNORECASE)
-TEXTS = {
-    "id",
-    "type",
-    "subtype",
-    "elementId",
-    "incomingRoad",
-    "connectingRoad",
-    "junction",
-    "name",
-    "version",
-}
-"""Attributes whose digits are names, not numbers."""
-
-OUTLINE = {"id": "0", "fillType": "asphalt", "outer": "true", "closed": "true", "laneType": "none"}
+GEO_REFERENCE = "+proj=tmerc +lat_0=48 +lon_0=11 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +no_defs"
+OUTLINE = {"id": "0", "fillType": "asphalt", "outer": "true", "closed": "true"}
 EMPTY = {"elevationProfile", "lateralProfile", "link"}
 """Elements that say nothing when they are empty."""
+
+DEFAULTS = {
+    "lane": {"level": "false"},
+    "road": {"rule": "RHT"},
+    "roadMark": {"weight": "standard"},
+    "object": {
+        "subtype": "None",
+        "dynamic": "no",
+        "pitch": "0",
+        "roll": "0",
+        "hdg": "0",
+        "height": "0.0",
+        "orientation": "none",
+    },
+    "signal": {"pitch": "0", "roll": "0", "hOffset": "0"},
+}
+"""Optional attributes that say nothing when they have these values."""
+
+LENGTHS = {"s", "sOffset", "x", "y", "length", "t", "u", "v", "width"}
+"""Attributes in metres, written to 0.01 mm."""
+POLYNOMIALS = {"a", "b", "c", "d", "curvature", "curvStart", "curvEnd"} | {
+    power + axis for power in "abcd" for axis in "UV"
+}
+"""Attributes written with eight digits."""
 
 
 def document(builder: Builder) -> ET.Element:
@@ -59,14 +68,14 @@ def _header(builder: Builder) -> ET.Element:
     header = ET.Element(
         "header",
         revMajor="1",
-        revMinor="5",
+        revMinor="7",
         name=builder.name,
         version="1.00",
         date="2026-01-01T00:00:00",
-        north=str(north),
-        south=str(south),
-        east=str(east),
-        west=str(west),
+        north=f"{north:.0f}",
+        south=f"{south:.0f}",
+        east=f"{east:.0f}",
+        west=f"{west:.0f}",
         vendor="odscen",
     )
     ET.SubElement(header, "geoReference").text = GEO_REFERENCE
@@ -74,43 +83,37 @@ def _header(builder: Builder) -> ET.Element:
 
 
 def _tidy_road(road: ET.Element) -> ET.Element:
-    """Put things where OpenDRIVE 1.5 and CARLA look for them, and leave out what says nothing."""
+    """Write what the library lacks and leave out what says nothing."""
     for item in road.iter("object"):
-        _tidy_object(item)
+        _outline(item)
     for parent in list(road.iter()):
         for child in list(parent):
-            if _says_nothing(child):
+            empty = not len(child) and not child.attrib and not child.text
+            if empty and child.tag in EMPTY:
                 parent.remove(child)
-    signals = road.find("signals")
-    if signals is not None:
+        for name, value in DEFAULTS.get(parent.tag, {}).items():
+            if parent.get(name) == value:
+                del parent.attrib[name]
+    for signals in road.iter("signals"):
+        # The schema wants signals before references.
         signals[:] = sorted(signals, key=lambda item: item.tag)
-        for signal in signals.iter("signal"):
-            if signal.get("country") == "OPENDRIVE":
-                signal.set("country", "OpenDRIVE")  # the library writes country codes in capitals
+    for signal in road.iter("signal"):
+        if signal.get("country") == "OPENDRIVE":
+            signal.set("country", "OpenDRIVE")  # the library writes countries in capitals
     return road
 
 
-def _tidy_object(item: ET.Element) -> None:
-    """CARLA reads an outline only if it is a child of the object itself."""
+def _outline(item: ET.Element) -> None:
+    """Move an outline to where CARLA reads it: 1.4's place, which later versions allow."""
     for group in item.findall("outlines"):
         item.remove(group)
         for outline in group.findall("outline"):
             outline.attrib.clear()
             outline.attrib.update(OUTLINE)
-            for number, corner in enumerate(outline):
-                corner.set("id", str(number))
             item.append(outline)
-    item.set("validLength", "0")
 
 
-def _says_nothing(element: ET.Element) -> bool:
-    if element.tag == "roadMark":
-        return element.get("type") == "none"
-    empty = not len(element) and not element.attrib and not element.text
-    return empty and element.tag in EMPTY
-
-
-NEGATED = {
+MIRRORED = {
     "geometry": ("x",),
     "arc": ("curvature",),
     "spiral": ("curvStart", "curvEnd"),
@@ -121,37 +124,32 @@ NEGATED = {
     "signal": ("t", "hOffset"),
     "signalReference": ("t",),
     "cornerLocal": ("v",),
-    "laneLink": ("from", "to"),
-    "validity": ("fromLane", "toLane"),
 }
-"""What changes sign in a mirror."""
+"""Attributes that change their sign when a map is mirrored at the y axis."""
 
 
 def mirrored(root: ET.Element) -> ET.Element:
     """Mirror a map at the y axis, so that its traffic keeps left."""
-    for element in root.iter():
-        for name in NEGATED.get(element.tag, ()):
-            if name in element.attrib:
-                element.set(name, str(-float(element.get(name, "0"))))
-        if element.tag == "road":
-            element.set("rule", "LHT")
-        elif element.tag == "geometry":
-            element.set("hdg", str(math.pi - float(element.get("hdg", "0"))))
-        elif element.tag == "laneSection":
-            _swap_sides(element)
-        elif element.tag == "validity":
-            _swap(element, "fromLane", "toLane")
-        elif element.tag == "header":
-            element.set("west", str(-float(element.get("west", "0"))))
-            element.set("east", str(-float(element.get("east", "0"))))
-            _swap(element, "west", "east")
+    for road in root.iter("road"):
+        road.set("rule", "LHT")
+    for geometry in root.iter("geometry"):
+        geometry.set("hdg", str(math.pi - float(geometry.get("hdg", "0"))))
+    negative = [
+        (e, name) for tag, names in MIRRORED.items() for e in root.iter(tag) for name in names
+    ]
+    for element, name in negative:
+        if name in element.attrib:
+            element.set(name, str(-float(element.get(name, "0"))))
+    for section in root.iter("laneSection"):
+        _swap_sides(section)
+    for link in root.iter("laneLink"):
+        link.attrib.update({name: str(-int(lane)) for name, lane in link.attrib.items()})
+    for tag, low, high in (("validity", "fromLane", "toLane"), ("header", "west", "east")):
+        for element in root.iter(tag):
+            first, last = (-int(element.get(name, "0")) for name in (high, low))
+            element.set(low, str(first))
+            element.set(high, str(last))
     return root
-
-
-def _swap(element: ET.Element, one: str, other: str) -> None:
-    first, second = element.attrib[one], element.attrib[other]
-    element.set(one, second)
-    element.set(other, first)
 
 
 def _swap_sides(section: ET.Element) -> None:
@@ -168,15 +166,25 @@ def _swap_sides(section: ET.Element) -> None:
 
 
 def text(root: ET.Element) -> str:
-    """Write the tree with numbers of seven digits, the same on every machine."""
+    """Write the tree with few digits, the same on every machine."""
     for element in root.iter():
         for name, value in element.attrib.items():
-            if name not in TEXTS and NUMBER.fullmatch(value):
-                element.set(name, _short(float(value)))
+            if name in LENGTHS or (name in POLYNOMIALS and element.tag != "control"):
+                element.set(name, _plain(f"{float(value):.5f}" if name in LENGTHS else value))
+            elif name == "hdg":
+                heading = math.remainder(float(value), 2.0 * math.pi)
+                element.set(name, _plain(f"{heading:.8f}"))
+            elif name in ("max", "value", "zOffset", "height", "inner", "outer", "z"):
+                element.set(name, _plain(value))
     ET.indent(root, "")
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _short(value: float) -> str:
-    rounded = f"{value:.7g}" if abs(value) > 1e-12 else "0"
-    return "0" if float(rounded) == 0 else rounded
+def _plain(value: str) -> str:
+    """Shortest form of at most eight digits; ``true`` and ``undefined`` stay."""
+    try:
+        number = float(value)
+    except ValueError:
+        return value
+    short = f"{number:.8g}"
+    return "0" if abs(number) < 1e-12 else short

@@ -1,107 +1,208 @@
-"""A motorway: on-ramp, weaving stretch, off-ramp, and an acceleration lane that ends."""
+"""A motorway with two interchanges and a weaving stretch between them.
+
+Each carriageway is a road of its own, one being the other turned around by 180 degrees. From west
+to east: an exit lane and an off-ramp, a bridge, an on-ramp that becomes the fourth lane of the
+weaving stretch, which leads to the next off-ramp, a bridge, an on-ramp and an entry lane that ends.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from scenariogeneration import xodr
 
+from tools.make_maps import furniture
 from tools.make_maps.builder import Builder
-from tools.make_maps.parts import End, LaneSpec, Pose, Profile, RoadRecord
+from tools.make_maps.crossing import crossing
+from tools.make_maps.geometry import Pose, shift
+from tools.make_maps.parts import BROKEN, SOLID, End, LaneSpec, Profile, RoadRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 WIDTH = 3.75
-LANES = (
-    LaneSpec("driving", WIDTH, "broken", "both", key="1"),
-    LaneSpec("driving", WIDTH, "broken", "both", key="2"),
-    LaneSpec("driving", WIDTH, "solid", "none", key="3"),
-)
+LANES = tuple(LaneSpec("driving", WIDTH, BROKEN, key=f"car {i}") for i in range(3))
+CLOSED = (*LANES[:2], replace(LANES[2], marks=SOLID))
+"""The three through lanes where there is no fourth beside them."""
 SHOULDER = LaneSpec("shoulder", 2.5, key="shoulder")
 VERGE = (LaneSpec("shoulder", 1.0, key="verge"),)
-EDGE = ((0.0, "solid", "none"),)
-MAIN = Profile((*LANES, SHOULDER), VERGE, EDGE)
-OPEN = replace(LANES[2], mark="broken", change="both")
-AUXILIARY = LaneSpec("driving", WIDTH, "solid", "none", key="4")
-WEAVE = Profile((*LANES[:2], OPEN, AUXILIARY, SHOULDER), VERGE, EDGE)
-ENTRY = replace(AUXILIARY, kind="entry")
-MERGE = Profile((*LANES[:2], OPEN, ENTRY, SHOULDER), VERGE, EDGE)
-TAPER = Profile((*LANES[:2], OPEN, replace(ENTRY, width_end=0.0), SHOULDER), VERGE, EDGE)
-RAMP = Profile((LaneSpec("driving", WIDTH, "solid", "none"), LaneSpec("shoulder", 1.5)), (), EDGE)
-LINK = 60.0
+MAIN = Profile((*CLOSED, SHOULDER), VERGE, SOLID)
+FOURTH = LaneSpec("driving", WIDTH, SOLID, key="fourth")
+WEAVE = Profile((*LANES, FOURTH, SHOULDER), VERGE, SOLID)
+EXIT = Profile((*LANES, replace(FOURTH, kind="exit"), SHOULDER), VERGE, SOLID)
+ENTRY = Profile((*LANES, replace(FOURTH, kind="entry"), SHOULDER), VERGE, SOLID)
+RAMP = Profile((FOURTH, SHOULDER), (), SOLID)
+COUNTRY = Profile(
+    (LaneSpec("driving", 3.5, SOLID, key="car 0"), LaneSpec("shoulder", 1.0, key="shoulder")),
+    (LaneSpec("driving", 3.5, SOLID, key="car 0"), LaneSpec("shoulder", 1.0, key="shoulder")),
+    BROKEN,
+)
+
+LENGTH = 2400.0
+FIRST, SECOND = 650.0, 1750.0
+"""x of the two bridges."""
+MEDIAN = 3.0
+"""Metres from the middle of the motorway to each carriageway's inner border."""
+ASIDE = 70.0
+"""Metres from the middle of the motorway to the junctions at the end of the ramps."""
+REACH = 18.0
+"""Metres from the middle of those junctions to the end of their arms."""
+RAMP_LENGTH = 280.0
+LINK = 40.0
 """Metres that a junction on the motorway takes."""
+SHOULDER_OPENS = 70.0
+"""Metres over which the shoulder beside a ramp comes and goes."""
+BRIDGE_HEIGHT = 6.5
 
 
 def motorway_weave(name: str) -> Builder:
-    """Two carriageways; the second is the first turned around."""
+    """Two carriageways, two bridges, four junctions where ramps meet the roads over the bridges."""
     builder = Builder(name)
-    _carriageway(builder, Pose(0.0, -6.0, 0.0))
-    _carriageway(builder, Pose(1500.0, 6.0, math.pi))
+    ramps: dict[tuple[int, int], tuple[End, End]] = {}
+    for side in (-1, 1):
+        for number, pair in enumerate(_carriageway(builder, side)):
+            ramps[number if side < 0 else 1 - number, side] = pair
+    for number, x in enumerate((FIRST, SECOND)):
+        bridge = builder.road(
+            Pose(x, REACH - ASIDE, math.pi / 2),
+            [xodr.Line(2 * (ASIDE - REACH))],
+            COUNTRY,
+            name=f"Bridge {number + 1}",
+            speed=70.0,
+            kind="rural",
+            heights=(BRIDGE_HEIGHT, BRIDGE_HEIGHT),
+        )
+        for side in (-1, 1):
+            _interchange(
+                builder, x, side, End(bridge, "start" if side < 0 else "end"), ramps[number, side]
+            )
     return builder
 
 
-def _carriageway(builder: Builder, start: Pose) -> None:
-    through = [(0, 0), (1, 1), (2, 2)]
-    first = _main(builder, start, 300.0, MAIN)
-    weave = _main(builder, first.end.ahead(LINK), 360.0, WEAVE, limit=100.0)
-    second = _main(builder, weave.end.ahead(LINK), 200.0, MAIN)
-    merge = _main(
-        builder,
-        second.end.ahead(LINK),
-        400.0,
-        MERGE,
-        sections=[(200.0, TAPER), (290.0, MAIN)],
-    )
-    on = _ramp(builder, weave.start, joining=True)
-    off = _ramp(builder, weave.end, joining=False)
-    late = _ramp(builder, merge.start, joining=True)
-    for before, after, extra in (
-        (first, weave, (End(on, "end"), End(weave, "start"), [(0, 3)])),
-        (weave, second, (End(weave, "end"), End(off, "start"), [(3, 0)])),
-        (second, merge, (End(late, "end"), End(merge, "start"), [(0, 3)])),
-    ):
-        ramp = extra[0] if extra[0].record not in (before, after) else extra[1]
-        junction = builder.new_junction([End(before, "end"), End(after, "start"), ramp])
-        builder.connect(
-            junction, End(before, "end"), End(after, "start"), through, speed=100.0, kind="motorway"
+def _frame(side: int, x: float, y: float) -> Pose:
+    """Place on a carriageway: x along it, y to the left of the motorway's middle."""
+    if side < 0:
+        return Pose(x, y, 0.0)
+    return Pose(LENGTH - x, -y, math.pi)
+
+
+def _carriageway(builder: Builder, side: int) -> list[tuple[End, End]]:
+    """Add a carriageway; off-ramp and on-ramp of its first and second interchange."""
+    off = [x - REACH - RAMP_LENGTH for x in (FIRST, SECOND)]
+    on = [x + REACH + RAMP_LENGTH for x in (FIRST, SECOND)]
+
+    def main(
+        start: float,
+        end: float,
+        profile: Profile,
+        limit: int,
+        sections: Sequence[tuple[float, Profile]] = (),
+    ) -> RoadRecord:
+        record = builder.road(
+            _frame(side, start, -MEDIAN),
+            [xodr.Line(end - start)],
+            profile,
+            name="Motorway west" if side > 0 else "Motorway east",
+            speed=limit,
+            kind="motorway",
+            sections=sections,
         )
-        builder.connect(junction, *extra, speed=80.0, kind="motorway")
+        furniture.speed_sign(builder, record.road, 10.0, -4 * WIDTH - 2.5, limit)
+        return record
+
+    opening = replace(
+        EXIT, right=(*LANES, replace(EXIT.right[3], width=0.0, width_end=WIDTH), SHOULDER)
+    )
+    closing = replace(ENTRY, right=(*LANES, replace(ENTRY.right[3], width_end=0.0), SHOULDER))
+    roads = [
+        main(0.0, off[0] - LINK, MAIN, 130, [(110.0, opening), (180.0, EXIT)]),
+        _between_ramps(main, off[0], on[0]),
+        main(on[0] + LINK, off[1] - LINK, WEAVE, 100),
+        _between_ramps(main, off[1], on[1]),
+        main(on[1] + LINK, LENGTH, ENTRY, 130, [(140.0, closing), (220.0, MAIN)]),
+    ]
+    ramps = []
+    for number in (0, 1):
+        leaves = _ramp(builder, side, off[number], leaving=True)
+        joins = _ramp(builder, side, on[number] - RAMP_LENGTH, leaving=False)
+        before, middle, after = roads[2 * number : 2 * number + 3]
+        _fork(builder, before, middle, End(leaves, "start"))
+        _fork(builder, middle, after, End(joins, "end"))
+        ramps.append((End(leaves, "end"), End(joins, "start")))
+    return ramps
 
 
-def _main(
-    builder: Builder,
-    start: Pose,
-    length: float,
-    profile: Profile,
-    *,
-    limit: float = 130.0,
-    sections: list[tuple[float, Profile]] | None = None,
-) -> RoadRecord:
-    return builder.road(
+def _between_ramps(main: Callable[..., RoadRecord], start: float, end: float) -> RoadRecord:
+    """Stretch from an off-ramp to an on-ramp, whose shoulder opens and closes beside them."""
+    opening = replace(SHOULDER, width=0.0, width_end=SHOULDER.width)
+    closing = replace(SHOULDER, width_end=0.0)
+    length = end - start
+    return main(
         start,
-        [xodr.Line(length)],
-        profile,
-        speed=limit,
-        kind="motorway",
-        sections=sections or (),
+        end,
+        replace(MAIN, right=(*CLOSED, opening)),
+        130,
+        [
+            (SHOULDER_OPENS, MAIN),
+            (length - SHOULDER_OPENS, replace(MAIN, right=(*CLOSED, closing))),
+        ],
     )
 
 
-def _ramp(builder: Builder, at: Pose, *, joining: bool) -> RoadRecord:
-    """One-lane ramp that starts or ends beside the fourth lane at ``at``."""
-    along = 1.0 if joining else -1.0
-    mouth = at.ahead(-along * LINK).left(-3 * WIDTH - 5.0)
-    mouth = Pose(mouth.x, mouth.y, at.h + along * math.radians(5.0))
-    if joining:
-        bend = [xodr.Arc(1 / 150.0, length=120.0), xodr.Line(80.0)]
-        start = _before(mouth, 80.0, 150.0, 120.0)
-        return builder.road(start, bend, RAMP, speed=80.0, kind="motorway")
-    bend = [xodr.Line(80.0), xodr.Arc(-1 / 150.0, length=120.0)]
-    return builder.road(mouth, bend, RAMP, speed=80.0, kind="motorway")
+def _ramp(builder: Builder, side: int, x: float, *, leaving: bool) -> RoadRecord:
+    """One-lane ramp between the place of the fourth lane and the road over the bridge."""
+    near, far = -MEDIAN - 3 * WIDTH, -ASIDE + WIDTH / 2
+    start = _frame(side, x, near if leaving else far)
+    record = builder.road(
+        start,
+        [shift(RAMP_LENGTH, far - near if leaving else near - far)],
+        RAMP,
+        name="Off-ramp" if leaving else "On-ramp",
+        speed=60.0,
+        kind="motorway",
+        heights=(0.0, BRIDGE_HEIGHT) if leaving else (BRIDGE_HEIGHT, 0.0),
+    )
+    furniture.speed_sign(builder, record.road, 30.0, -WIDTH - 3.0, 60)
+    return record
 
 
-def _before(end: Pose, line: float, radius: float, arc: float) -> Pose:
-    """Start of a left bend followed by a straight that leads to ``end``."""
-    bend_end = end.ahead(-line)
-    centre = bend_end.left(radius)
-    h = end.h - arc / radius
-    return Pose(centre.x + radius * math.sin(h), centre.y - radius * math.cos(h), h)
+def _fork(builder: Builder, before: RoadRecord, after: RoadRecord, ramp: End) -> None:
+    """Junction where a ramp leaves from, or comes into, the fourth lane."""
+    start, end = End(before, "end"), End(after, "start")
+    junction = builder.new_junction([start, end, ramp])
+    through = [(i, i) for i in range(3)]
+    builder.connect(junction, start, end, through, speed=130.0, kind="motorway")
+    lane, shoulder = ([(3, 0), (4, 1)], [(0, 3), (1, 4)])
+    if ramp.at_end:
+        builder.connect(junction, ramp, end, shoulder, speed=80.0, kind="motorway")
+        furniture.sign(builder, ramp, "205", "Yield", back=5.0)
+        builder.priorities[junction.id] = [(before.id, ramp.record.id)]
+    else:
+        builder.connect(junction, start, ramp, lane, speed=80.0, kind="motorway")
+
+
+def _interchange(
+    builder: Builder, x: float, side: int, bridge: End, ramps: tuple[End, End]
+) -> None:
+    """Junction of off-ramp, on-ramp, the road over the bridge, and the road on from it."""
+    outward = math.copysign(math.pi / 2, side)
+    outer = builder.road(
+        Pose(x, side * (ASIDE + REACH), outward),
+        [xodr.Line(160.0)],
+        COUNTRY,
+        name="Country road",
+        speed=70.0,
+        kind="rural",
+        heights=(BRIDGE_HEIGHT, 0.0),
+    )
+    crossing(
+        builder,
+        [bridge, ramps[0], End(outer, "start"), ramps[1]],
+        control="stop",
+        major=(0, 2),
+        crosswalks=False,
+        speed=50.0,
+        kind="rural",
+    )

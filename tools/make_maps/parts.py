@@ -1,4 +1,4 @@
-"""Roads and their cross-sections, written with ``scenariogeneration``'s elements.
+"""Cross-sections of roads, and the ends of roads as junctions see them.
 
 Everything is designed for right-hand traffic; :func:`tools.make_maps.document.mirrored` makes a
 left-hand map of a right-hand one.
@@ -6,105 +6,96 @@ left-hand map of a right-hand one.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
 from scenariogeneration import xodr
 
+from tools.make_maps.geometry import Pose, smooth
 
-class Pose(NamedTuple):
-    """Position in metres and heading in radians."""
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-    x: float
-    y: float
-    h: float
+CAR_LANES = {"driving", "entry", "exit"}
+"""Lane types of these maps on which cars drive."""
 
-    def ahead(self, distance: float) -> Pose:
-        """Return the pose ``distance`` metres further on a straight line."""
-        return Pose(
-            self.x + distance * math.cos(self.h), self.y + distance * math.sin(self.h), self.h
-        )
+MARK_WIDTH = 0.12
+CURB_HEIGHT = 0.12
 
-    def left(self, distance: float) -> Pose:
-        """Return the pose ``distance`` metres to the left."""
-        return Pose(
-            self.x - distance * math.sin(self.h), self.y + distance * math.cos(self.h), self.h
-        )
 
-    def back(self) -> Pose:
-        """Return the same place, looking the other way."""
-        return Pose(self.x, self.y, self.h + math.pi)
+class Mark(NamedTuple):
+    """A road mark from ``offset`` metres into its section on, and the lane changes it allows."""
+
+    offset: float
+    kind: str
+    change: str
+
+
+BROKEN = (Mark(0.0, "broken", "both"),)
+SOLID = (Mark(0.0, "solid", "none"),)
 
 
 @dataclass(frozen=True)
 class LaneSpec:
-    """A lane: type, width at its section's start and end, mark on its outer border.
+    """A lane: type, width at its section's start (and end), marks on its outer border.
 
     ``key`` ties lanes of successive sections of one road together.
     """
 
     kind: str
     width: float
-    mark: str = "none"
-    change: str = "none"
+    marks: tuple[Mark, ...] = ()
     width_end: float | None = None
     key: str = ""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Cross-section: lanes from the centre outwards, and the centre line's mark."""
+    """Cross-section: lanes from the centre outwards, the centre line's marks, the lane offset."""
 
     right: tuple[LaneSpec, ...]
     left: tuple[LaneSpec, ...] = ()
-    centre: tuple[tuple[float, str, str], ...] = ((0.0, "none", "none"),)
+    centre: tuple[Mark, ...] = ()
+    offset: float = 0.0
+    offset_end: float | None = None
 
     def lanes(self, side: int) -> tuple[LaneSpec, ...]:
         """Lanes of a side: 1 left, -1 right."""
         return self.left if side > 0 else self.right
 
 
-DRIVING = LaneSpec("driving", 3.25, "solid")
-INNER = LaneSpec("driving", 3.25, "broken", "both")
-BIKE = LaneSpec("biking", 1.75, "none")
-WALK = LaneSpec("sidewalk", 2.5, "none")
-
-
-def street(
-    inner: int = 0, inner_left: int | None = None, *, bikes: bool = False, width: float = 3.25
-) -> Profile:
-    """Two-way street with sidewalks; ``inner`` lanes more than one on the right (and left)."""
-    curb = (replace(BIKE), WALK) if bikes else (WALK,)
-
-    def side(more: int) -> tuple[LaneSpec, ...]:
-        return (
-            *[replace(INNER, width=width)] * more,
-            replace(DRIVING, width=width),
-            *curb,
-        )
-
-    wide = inner > 0
-    return Profile(
-        side(inner),
-        side(inner if inner_left is None else inner_left),
-        ((0.0, "solid_solid", "none") if wide else (0.0, "broken", "both"),),
+def street(lanes: int = 1, *, bikes: bool = False, width: float = 3.25) -> Profile:
+    """Two-way street with ``lanes`` lanes each way, bicycle lanes if wanted, and sidewalks."""
+    inner = tuple(
+        LaneSpec("driving", width, BROKEN, key=f"car {i}") for i in range(lanes - 1, 0, -1)
     )
+    outer = LaneSpec("driving", width, SOLID, key="car 0")
+    bike = (LaneSpec("biking", 1.75, key="bike"),) if bikes else ()
+    side = (*inner, outer, *bike, LaneSpec("sidewalk", 2.5, key="walk"))
+    return Profile(side, side, BROKEN if lanes == 1 else (Mark(0.0, "solid_solid", "none"),))
 
 
 @dataclass(eq=False)
 class RoadRecord:
-    """A road that has been made, and what its neighbours need to know of it."""
+    """A road that has been made, and what its neighbours need to know of it.
+
+    Attributes
+    ----------
+    sections
+        Start of each lane section and its cross-section.
+    start, end
+        Poses of the reference line.
+    heights
+        Height at start and end, metres.
+    """
 
     id: int
     road: xodr.Road
-    first: Profile
-    last: Profile
+    sections: tuple[tuple[float, Profile], ...]
     start: Pose
     end: Pose
     length: float
+    heights: tuple[float, float]
 
 
 class End(NamedTuple):
@@ -114,37 +105,83 @@ class End(NamedTuple):
     contact: str
 
     @property
+    def at_end(self) -> bool:
+        """Whether this is the end at the greatest s."""
+        return self.contact == "end"
+
+    @property
+    def section(self) -> xodr.LaneSection:
+        """Lane section at this end."""
+        return self.record.road.lanes.lanesections[-1 if self.at_end else 0]
+
+    @property
+    def section_length(self) -> float:
+        """Length of that section."""
+        starts = [s for s, _ in self.record.sections]
+        if self.at_end:
+            return self.record.length - starts[-1]
+        return [*starts, self.record.length][1]
+
+    @property
+    def profile(self) -> Profile:
+        """Cross-section at this end."""
+        return self.record.sections[-1 if self.at_end else 0][1]
+
+    @property
+    def offset(self) -> float:
+        """Lane offset at this end."""
+        profile = self.profile
+        grown = self.at_end and profile.offset_end is not None
+        return profile.offset_end or 0.0 if grown else profile.offset
+
+    @property
+    def height(self) -> float:
+        """Height at this end."""
+        return self.record.heights[1 if self.at_end else 0]
+
+    @property
     def approach(self) -> Pose:
-        """Pose of traffic that arrives at this end."""
-        return self.record.end if self.contact == "end" else self.record.start.back()
+        """Pose of the lanes' centre line, as traffic that arrives here looks."""
+        if self.at_end:
+            return self.record.end.left(self.offset)
+        return self.record.start.left(self.offset).back()
 
     @property
     def departure(self) -> Pose:
-        """Pose of traffic that leaves by this end."""
+        """The same as traffic that leaves looks."""
         return self.approach.back()
 
     def side(self, *, arriving: bool) -> int:
         """Sign of the ids of the lanes that arrive or leave here."""
-        return -1 if (self.contact == "end") == arriving else 1
+        return -1 if self.at_end == arriving else 1
 
     def lanes(self, *, arriving: bool) -> tuple[LaneSpec, ...]:
-        """Lanes that arrive or leave here, from the centre outwards."""
-        profile = self.record.last if self.contact == "end" else self.record.first
-        return profile.lanes(self.side(arriving=arriving))
+        """Lanes that arrive or leave here, from the centre outwards, as wide as they are here."""
+        return tuple(
+            replace(lane, width=lane.width_end, width_end=None)
+            if self.at_end and lane.width_end is not None
+            else lane
+            for lane in self.profile.lanes(self.side(arriving=arriving))
+        )
 
     def at(self, back: float) -> float:
-        """S of the place ``back`` metres before this end."""
-        return self.record.length - back if self.contact == "end" else back
+        """Return s of the place ``back`` metres before this end."""
+        return self.record.length - back if self.at_end else back
 
     @property
     def contact_point(self) -> xodr.ContactPoint:
         """The same in the library's terms."""
-        return xodr.ContactPoint.end if self.contact == "end" else xodr.ContactPoint.start
+        return xodr.ContactPoint.end if self.at_end else xodr.ContactPoint.start
+
+    @property
+    def orientation(self) -> xodr.Orientation:
+        """Orientation of what is meant for traffic that arrives here."""
+        return xodr.Orientation.positive if self.at_end else xodr.Orientation.negative
 
 
-def driving(lanes: Sequence[LaneSpec]) -> list[int]:
-    """Positions of the driving lanes among ``lanes``."""
-    return [i for i, lane in enumerate(lanes) if lane.kind == "driving"]
+def car_lanes(lanes: Sequence[LaneSpec]) -> list[int]:
+    """Positions of the lanes for cars among ``lanes``."""
+    return [i for i, lane in enumerate(lanes) if lane.kind in CAR_LANES]
 
 
 def inner_border(lanes: Sequence[LaneSpec], index: int) -> float:
@@ -158,88 +195,53 @@ def carriageway(lanes: Sequence[LaneSpec]) -> float:
 
 
 def lane_section(
-    s: float, length: float, profile: Profile, links: dict[int, dict[str, int]] | None = None
+    s: float, length: float, profile: Profile, links: dict[int, dict[str, int]]
 ) -> xodr.LaneSection:
     """Make a lane section; ``links`` gives predecessor and successor by lane id."""
     centre = xodr.Lane(xodr.LaneType.none)
-    for offset, kind, change in profile.centre:
-        centre.add_roadmark(_mark(kind, change, offset))
+    for mark in profile.centre:
+        centre.add_roadmark(road_mark(mark))
     section = xodr.LaneSection(s, centre)
     for sign in (1, -1):
         for index, spec in enumerate(profile.lanes(sign)):
             lane = _lane(spec, length)
             (section.add_left_lane if sign > 0 else section.add_right_lane)(lane)
-            for which, target in (links or {}).get(sign * (index + 1), {}).items():
+            for which, target in links.get(sign * (index + 1), {}).items():
                 lane.add_link(which, target)
     return section
 
 
 def _lane(spec: LaneSpec, length: float) -> xodr.Lane:
     end = spec.width if spec.width_end is None else spec.width_end
-    change = end - spec.width
-    lane = xodr.Lane(
-        getattr(xodr.LaneType, spec.kind),
-        a=spec.width,
-        c=3.0 * change / length**2,
-        d=-2.0 * change / length**3,
-    )
-    lane.add_roadmark(_mark(spec.mark, spec.change))
+    lane = xodr.Lane(getattr(xodr.LaneType, spec.kind), *smooth(spec.width, end, length))
+    for mark in spec.marks:
+        lane.add_roadmark(road_mark(mark))
     if spec.kind == "sidewalk":
-        lane.add_height(0.12)
+        lane.add_height(CURB_HEIGHT)
     return lane
 
 
-def _mark(kind: str, change: str, offset: float = 0.0) -> xodr.RoadMark:
+def road_mark(mark: Mark) -> xodr.RoadMark:
+    """The mark as an element."""
     return xodr.RoadMark(
-        getattr(xodr.RoadMarkType, kind),
-        width=0.12 if kind != "none" else 0.0,
-        soffset=offset,
+        getattr(xodr.RoadMarkType, mark.kind),
+        width=MARK_WIDTH,
+        soffset=mark.offset,
         color=xodr.RoadMarkColor.white,
-        laneChange=getattr(xodr.LaneChange, change),
+        laneChange=getattr(xodr.LaneChange, mark.change),
     )
 
 
-Piece = tuple[xodr.geometry._BaseGeometry, Pose]
-
-
-def plan(start: Pose, geometries: Sequence[object]) -> tuple[xodr.PlanView, Pose, float]:
-    """String geometries together from ``start``; also the end and the total length."""
-    view = xodr.PlanView()
-    pose, s = start, 0.0
-    for geometry in geometries:
-        x, y, h, length = geometry.get_end_data(*pose)  # type: ignore[attr-defined]
-        view.add_fixed_geometry(geometry, *pose, s)
-        pose, s = Pose(x, y, h), s + length
-    return view, pose, s
-
-
-def curve(start: Pose, end: Pose) -> tuple[list[object], float]:
-    """One smooth geometry from pose to pose; a line where that will do.
-
-    A cubic Bezier curve whose handles are those of a circle for the turn between the poses
-    (``4/3 tan(angle / 4)`` radii), as paramPoly3.
-    """
-    dx, dy = end.x - start.x, end.y - start.y
-    cos, sin = math.cos(start.h), math.sin(start.h)
-    u, v = dx * cos + dy * sin, dy * cos - dx * sin
-    turn = math.remainder(end.h - start.h, 2.0 * math.pi)
-    if abs(turn) < 1e-9 and abs(v) < 1e-9:
-        return [xodr.Line(u)], u
-    chord = math.hypot(u, v)
-    half = abs(turn) / 2.0
-    handle = chord / 3.0 if half < 1e-6 else chord * 2.0 / 3.0 * math.tan(half / 2) / math.sin(half)
-    points = np.array(
-        [
-            (0.0, 0.0),
-            (handle, 0.0),
-            (u - handle * math.cos(turn), v - handle * math.sin(turn)),
-            (u, v),
-        ]
-    )
-    p0, p1, p2, p3 = points
-    b, c, d = 3 * (p1 - p0), 3 * (p2 - 2 * p1 + p0), p3 - 3 * p2 + 3 * p1 - p0
-    p = np.linspace(0.0, 1.0, 2001)[:, None]
-    speed = np.hypot(*(b + 2 * c * p + 3 * d * p**2).T)
-    length = float(np.trapezoid(speed, dx=1.0 / 2000))
-    coefficients = (0.0, b[0], c[0], d[0], 0.0, b[1], c[1], d[1])
-    return [xodr.ParamPoly3(*map(float, coefficients), "normalized", length)], length
+def section_links(profiles: Sequence[Profile], index: int) -> dict[int, dict[str, int]]:
+    """Links between the lane sections of one road, by the lanes' keys."""
+    links: dict[int, dict[str, int]] = {}
+    for which, other in (("predecessor", index - 1), ("successor", index + 1)):
+        if not 0 <= other < len(profiles):
+            continue
+        for sign in (1, -1):
+            keys = [lane.key for lane in profiles[other].lanes(sign)]
+            for place, lane in enumerate(profiles[index].lanes(sign)):
+                if lane.key in keys:
+                    target = sign * (keys.index(lane.key) + 1)
+                    links.setdefault(sign * (place + 1), {})[which] = target
+    return links

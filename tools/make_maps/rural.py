@@ -1,94 +1,282 @@
-"""A country road over hills: bends of all kinds, elevation, superelevation, no-passing lines."""
+"""A country road over hills: spirals, arcs, paramPoly3, superelevation, no-passing lines."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scenariogeneration import xodr
 
+from tools.make_maps import furniture
 from tools.make_maps.builder import Builder
-from tools.make_maps.parts import End, LaneSpec, Pose, Profile, RoadRecord
+from tools.make_maps.crossing import crossing
+from tools.make_maps.geometry import Geometry, Pose, length_of, shift, smooth
+from tools.make_maps.parts import BROKEN, SOLID, End, LaneSpec, Mark, Profile, RoadRecord
 
-LANE = LaneSpec("driving", 3.5, "solid", "none")
-EDGE = LaneSpec("shoulder", 1.0)
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SIDE = (
+    LaneSpec("driving", 3.5, SOLID, key="car 0"),
+    LaneSpec("shoulder", 1.0, key="shoulder"),
+)
+TRACK = Profile(
+    (replace(SIDE[0], width=3.0), SIDE[1]), (replace(SIDE[0], width=3.0), SIDE[1]), BROKEN
+)
+LIMIT = 100
+"""km/h where nothing else is said."""
+NEAR_JUNCTION = 120.0
+"""Metres before a junction without overtaking, at 70 km/h."""
+SIGHT = 100.0
+"""Metres before a bend without overtaking for those who come towards it."""
+BANK = 0.05
+"""Slope across the road in bends of up to 200 m radius, less in wider ones."""
+REACH = 16.0
+"""Metres from the middle of a junction to the end of its arms."""
+
+
+class Straight(NamedTuple):
+    """Line of ``length`` metres."""
+
+    length: float
+
+
+class Bend(NamedTuple):
+    """Spiral, arc, spiral; ``radius`` is positive for a bend to the left."""
+
+    radius: float
+    arc: float
+    ease: float
+
+
+class Shift(NamedTuple):
+    """Move ``aside`` metres to the left over ``length`` metres, by a paramPoly3."""
+
+    length: float
+    aside: float
+
+
+Part = Straight | Bend | Shift
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Stretch of a road with a limit; in bends with superelevation."""
+
+    start: float
+    end: float
+    part: Part | None
+    limit: int
 
 
 def rural_hills(name: str) -> Builder:
-    """Three roads end to end, 2.7 km."""
+    """Three roads of together 4.3 km, two side roads."""
     builder = Builder(name)
-    first = _road(builder, Pose(0.0, 0.0, 0.3), [("s", 250), ("c", 180, 220, 60), ("s", 200)], 20.0)
-    second = _road(
+    west = _road(
         builder,
-        first.end,
-        [("s", 120), ("c", -140, 260, 70), ("p", 160, 25), ("c", 200, 180, 60), ("s", 150)],
-        first_height(first),
+        Pose(0.0, 0.0, 0.35),
+        (
+            Straight(260.0),
+            Bend(-230.0, 200.0, 70.0),
+            Straight(120.0),
+            Bend(170.0, 190.0, 60.0),
+            Shift(240.0, 30.0),
+            Bend(-320.0, 160.0, 80.0),
+            Straight(180.0),
+        ),
+        heights=(20.0, 26.0, 34.0, 30.0, 18.0, 14.0, 22.0, 27.0, 25.0),
+        junctions=(False, True),
     )
-    builder.link(End(first, "end"), End(second, "start"))
-    third = _road(
-        builder, second.end, [("s", 100), ("c", -110, 150, 50), ("s", 300)], first_height(second)
+    middle = _road(
+        builder,
+        west.end.ahead(2 * REACH),
+        (
+            Straight(170.0),
+            Bend(150.0, 210.0, 55.0),
+            Shift(200.0, -24.0),
+            Straight(90.0),
+            Bend(-95.0, 190.0, 45.0),
+            Bend(210.0, 170.0, 60.0),
+            Straight(170.0),
+        ),
+        heights=(25.0, 33.0, 45.0, 52.0, 49.0, 40.0, 34.0, 36.0, 36.0),
+        junctions=(True, True),
     )
-    builder.link(End(second, "end"), End(third, "start"))
+    east = _road(
+        builder,
+        middle.end.ahead(2 * REACH),
+        (
+            Straight(190.0),
+            Bend(-260.0, 260.0, 75.0),
+            Shift(260.0, 36.0),
+            Bend(190.0, 170.0, 60.0),
+            Straight(240.0),
+        ),
+        heights=(36.0, 30.0, 19.0, 12.0, 15.0, 22.0, 20.0),
+        junctions=(True, False),
+    )
+    _side_road(builder, west, middle, turn=-math.radians(80.0), control="stop")
+    _side_road(builder, middle, east, turn=math.radians(95.0), control="yield")
     return builder
 
 
-def first_height(record: RoadRecord) -> float:
-    """Height at the end of a road, which the next one starts with."""
-    return float(record.road.elevationprofile.eval_at_s(record.length))
+def _side_road(
+    builder: Builder, before: RoadRecord, after: RoadRecord, *, turn: float, control: str
+) -> None:
+    """Narrow road that leaves to the side between two roads."""
+    mouth = before.end.ahead(REACH).turned(turn).ahead(REACH)
+    radius = math.copysign(180.0, -turn)
+    geometries = [
+        xodr.Line(60.0),
+        xodr.Spiral(0.0, 1 / radius, length=40.0),
+        xodr.Arc(1 / radius, length=90.0),
+        xodr.Spiral(1 / radius, 0.0, length=40.0),
+        xodr.Line(60.0),
+    ]
+    height = before.heights[1]
+    track = builder.road(
+        mouth,
+        geometries,
+        TRACK,
+        name="Side road",
+        speed=50.0,
+        kind="rural",
+        heights=(height, height + 4.0),
+    )
+    crossing(
+        builder,
+        [End(before, "end"), End(track, "start"), End(after, "start")],
+        control=control,
+        major=(0, 2),
+        crosswalks=False,
+        speed=50.0,
+        kind="rural",
+    )
 
 
 def _road(
-    builder: Builder, start: Pose, parts: Sequence[tuple[str | float, ...]], height: float
+    builder: Builder,
+    start: Pose,
+    parts: Sequence[Part],
+    *,
+    heights: Sequence[float],
+    junctions: tuple[bool, bool],
 ) -> RoadRecord:
-    geometries: list[object] = []
-    marks: list[tuple[float, str, str]] = []
-    banks: list[tuple[float, float, float, float]] = []
-    s = 0.0
-    for kind, *values in parts:
-        marks.append((s, "solid", "none") if kind == "c" else (s, "broken", "both"))
-        if kind == "s":
-            made: list[object] = [xodr.Line(values[0])]
-        elif kind == "c":
-            radius, arc, ease = (float(v) for v in values)
-            k = 1.0 / radius
-            made = [
-                xodr.Spiral(0.0, k, length=ease),
-                xodr.Arc(k, length=arc),
-                xodr.Spiral(k, 0.0, length=ease),
-            ]
-            # Positive superelevation falls to the right: a left bend (k > 0) wants the other way.
-            banks.append((s, ease, arc, -math.copysign(0.04, k)))
-        else:
-            made = [_shift(float(values[0]), float(values[1]))]
-        geometries += made
-        s += sum(geometry.get_end_data(0.0, 0.0, 0.0)[3] for geometry in made)  # type: ignore[attr-defined]
-    profile = Profile((LANE, EDGE), (LANE, EDGE), tuple(marks))
-    record = builder.road(start, geometries, profile, speed=80.0, kind="rural")
-    _hills(record, height)
-    for begin, ease, arc, bank in banks:
-        _bank(record, begin, ease, arc, bank)
-    _limit_sign(builder, record)
+    """Add a road of ``parts``; ``heights`` at equal distances; ``junctions`` at start and end."""
+    made = [_geometries(part) for part in parts]
+    ends = list(accumulate(sum(map(length_of, pieces)) for pieces in made))
+    zones = [
+        Zone(begin, end, part, _limit(part))
+        for begin, end, part in zip([0.0, *ends], ends, parts, strict=False)
+    ]
+    centre = _centre_marks(zones, ends[-1], junctions)
+    record = builder.road(
+        start,
+        [piece for pieces in made for piece in pieces],
+        Profile(SIDE, SIDE, centre),
+        name="Hill Road",
+        speed=_limits(zones, junctions)[0][1],
+        kind="rural",
+    )
+    record.heights = (heights[0], heights[-1])
+    _heights(record, heights)
+    _banks(record, zones)
+    _speeds(builder, record, _limits(zones, junctions))
     return record
 
 
-def _shift(length: float, aside: float) -> xodr.ParamPoly3:
-    """Move ``aside`` metres to the left over ``length`` metres, heading the same at both ends."""
-    p = np.linspace(0.0, 1.0, 2001)
-    speed = np.hypot(length, aside * (6 * p - 6 * p**2))
-    arc = float(np.trapezoid(speed, dx=1.0 / 2000))
-    return xodr.ParamPoly3(0, length, 0, 0, 0, 0, 3 * aside, -2 * aside, "normalized", arc)
+def _geometries(part: Part) -> list[Geometry]:
+    if isinstance(part, Straight):
+        return [xodr.Line(part.length)]
+    if isinstance(part, Shift):
+        return [shift(part.length, part.aside)]
+    k = 1.0 / part.radius
+    return [
+        xodr.Spiral(0.0, k, length=part.ease),
+        xodr.Arc(k, length=part.arc),
+        xodr.Spiral(k, 0.0, length=part.ease),
+    ]
 
 
-def _hills(record: RoadRecord, height: float) -> None:
-    """Hermite pieces between knots about 150 m apart; flat at both ends, so that roads join."""
-    count = max(2, round(record.length / 150.0))
-    s = np.linspace(0.0, record.length, count + 1)
-    z = height + 9.0 * np.sin(s / 170.0 + record.id) - 9.0 * math.sin(record.id)
-    slope = 9.0 / 170.0 * np.cos(s / 170.0 + record.id)
+def _limit(part: Part) -> int:
+    """Limit that keeps the lateral acceleration in a bend under about 2.5 m/s2."""
+    if not isinstance(part, Bend):
+        return LIMIT
+    comfortable = math.sqrt(2.5 * abs(part.radius)) * 3.6
+    return min(LIMIT, int(comfortable // 10 * 10))
+
+
+def _limits(zones: Sequence[Zone], junctions: tuple[bool, bool]) -> list[tuple[float, int]]:
+    """Limits from each s on, without repetitions."""
+    length = zones[-1].end
+    steps = sorted({0.0, *(zone.start for zone in zones), NEAR_JUNCTION, length - NEAR_JUNCTION})
+    found: list[tuple[float, int]] = []
+    for s in steps:
+        limit = min(zone.limit for zone in zones if zone.start <= s < zone.end)
+        near = (junctions[0] and s < NEAR_JUNCTION) or (
+            junctions[1] and s >= length - NEAR_JUNCTION
+        )
+        limit = min(limit, 70) if near else limit
+        if not found or found[-1][1] != limit:
+            found.append((s, limit))
+    return found
+
+
+def _speeds(builder: Builder, record: RoadRecord, limits: Sequence[tuple[float, int]]) -> None:
+    """Limits as road types and as signs, for both directions."""
+    aside = sum(lane.width for lane in SIDE) + 0.8
+    furniture.speed_sign(builder, record.road, 15.0, -aside, limits[0][1])
+    furniture.speed_sign(builder, record.road, record.length - 15.0, aside, limits[-1][1])
+    for (_, before), (s, limit) in pairwise(limits):
+        record.road.add_type(xodr.RoadType.rural, s, speed=limit, speed_unit="km/h")
+        furniture.speed_sign(builder, record.road, s, -aside, limit)
+        furniture.speed_sign(builder, record.road, s, aside, before)
+
+
+def _centre_marks(
+    zones: Sequence[Zone], length: float, junctions: tuple[bool, bool]
+) -> tuple[Mark, ...]:
+    """Who may overtake where: nobody in bends, nobody towards a bend or a junction."""
+    forward: list[tuple[float, float]] = []
+    backward: list[tuple[float, float]] = []
+    for zone in zones:
+        if isinstance(zone.part, Bend):
+            forward.append((zone.start - SIGHT, zone.end))
+            backward.append((zone.start, zone.end + SIGHT))
+    if junctions[0]:
+        backward.append((0.0, NEAR_JUNCTION))
+    if junctions[1]:
+        forward.append((length - NEAR_JUNCTION, length))
+    steps = sorted({0.0, *(max(0.0, s) for pair in (*forward, *backward) for s in pair)})
+    marks: list[Mark] = []
+    for s in steps:
+        if s >= length - 1.0:
+            break
+        closed = tuple(
+            any(begin <= s < end for begin, end in stretches) for stretches in (forward, backward)
+        )
+        # Of the centre line's two strokes the left one is named first; ids grow to the left.
+        kind, change = {
+            (False, False): ("broken", "both"),
+            (True, False): ("broken_solid", "decrease"),
+            (False, True): ("solid_broken", "increase"),
+            (True, True): ("solid", "none"),
+        }[closed[0], closed[1]]
+        if not marks or marks[-1].kind != kind:
+            marks.append(Mark(s, kind, change))
+    return tuple(marks)
+
+
+def _heights(record: RoadRecord, heights: Sequence[float]) -> None:
+    """Hermite pieces through ``heights``, level at both ends, so that roads join."""
+    s = np.linspace(0.0, record.length, len(heights))
+    z = np.array(heights)
+    slope = np.gradient(z, s)
     slope[[0, -1]] = 0.0
-    for i in range(count):
-        d = s[i + 1] - s[i]
+    for i, d in enumerate(np.diff(s)):
         rise = (z[i + 1] - z[i]) / d
         record.road.add_elevation(
             float(s[i]),
@@ -99,32 +287,19 @@ def _hills(record: RoadRecord, height: float) -> None:
         )
 
 
-def _bank(record: RoadRecord, s: float, ease: float, arc: float, bank: float) -> None:
-    """Turn the cross-section over the first spiral, back over the second."""
-    rise = (3 * bank / ease**2, -2 * bank / ease**3)
-    if not record.road.lateralprofile.superelevations and s > 0:
-        record.road.add_superelevation(0.0, 0.0, 0.0, 0.0, 0.0)
-    record.road.add_superelevation(s, 0.0, 0.0, *rise)
-    record.road.add_superelevation(s + ease, bank, 0.0, 0.0, 0.0)
-    record.road.add_superelevation(s + ease + arc, bank, 0.0, -rise[0], -rise[1])
-    record.road.add_superelevation(s + 2 * ease + arc, 0.0, 0.0, 0.0, 0.0)
-
-
-def _limit_sign(builder: Builder, record: RoadRecord) -> None:
-    sign = xodr.Signal(
-        20.0,
-        -5.5,
-        "DEU",
-        "274",
-        "-1",
-        id=str(builder._id("signal")),
-        name="Speed limit",
-        value=80.0,
-        unit="km/h",
-        zOffset=2.0,
-        orientation=xodr.Orientation.positive,
-        height=0.6,
-        width=0.6,
-    )
-    sign.add_validity(-1, -1)
-    record.road.add_signal(sign)
+def _banks(record: RoadRecord, zones: Sequence[Zone]) -> None:
+    """Turn the cross-section over a bend's first spiral, back over the second."""
+    level = smooth(0.0, 0.0, 1.0)
+    banks = {0.0: level}
+    for zone in zones:
+        s, bend = zone.start, zone.part
+        if not isinstance(bend, Bend):
+            continue
+        # Positive superelevation falls to the right: a left bend wants the other way.
+        bank = -math.copysign(BANK * min(1.0, 200.0 / abs(bend.radius)), bend.radius)
+        banks[s] = smooth(0.0, bank, bend.ease)
+        banks[s + bend.ease] = (bank, 0.0, 0.0, 0.0)
+        banks[s + bend.ease + bend.arc] = smooth(bank, 0.0, bend.ease)
+        banks[zone.end] = level
+    for s, coefficients in sorted(banks.items()):
+        record.road.add_superelevation(s, *coefficients)
