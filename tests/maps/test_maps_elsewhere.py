@@ -9,6 +9,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+
 from odscen.convert.netconvert import netconvert_path
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyproj
 import pytest
+
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.model import DRIVABLE_TYPES
 from odscen.opendrive.objects import crosswalks, signal_kind, stop_lines
