@@ -78,6 +78,12 @@ def test_a_goal_inside_the_junction_is_reached_by_leaving_it() -> None:
     assert (route.arrival_lane, route.arrival_pos) == (None, 1.0)
 
 
+def test_a_front_inside_the_junction_that_the_goal_is_in_is_no_further_back() -> None:
+    route = plan("1.0.-2.48", "2.0.-2.9")
+    assert route.edges == (":9_0", "out")
+    assert front_x(route) == pytest.approx(97.0 + 2.25)
+
+
 def test_a_spawn_inside_the_junction_departs_there() -> None:
     route = plan("2.0.-2.3", "3.0.-2.9")
     assert route.edges == (":9_0", "out")

@@ -122,6 +122,8 @@ class RoutePlanner:
             If the SUMO network has no way along the path, or the class may not use it.
         """
         edges, repairs = connected(self._net, self._edges(path, vclass), vclass)
+        # The arrival first: it may add the edge that the front stands on the way to.
+        edges, arrival_lane, arrival_pos = self._arrival(edges, path, vclass, length)
         edges, start, pos = self._anchor(path, edges, vclass)
         ahead = length / 2.0 * self._places.scales[start.id]
         if pos + ahead > start.length + CLAMP and not self._next(start, edges):
@@ -131,7 +133,6 @@ class RoutePlanner:
         if not lane.allows(vclass):
             msg = f"lane {lane.id} of the SUMO network does not admit {vclass}"
             raise NoRouteError(msg)
-        edges, arrival_lane, arrival_pos = self._arrival(edges, path, vclass, length)
         if len(edges) == 1:  # there and back again is not meant: stop where it has just started
             arrival_pos = min(max(arrival_pos, front + 0.1), lane.length)
         lateral = self._net.pos_lat(lateral_offset)
