@@ -71,7 +71,9 @@ def sampled(name: str, *, seed: int = 1, fill: float = 0.4) -> Scenario:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_sampled_actors_start_in_their_places_and_arrive(name: str, tmp_path: Path) -> None:
-    prepared = prepare(sampled(name), built(name).sumo, net_file(name, tmp_path), shipped_assets())
+    prepared = prepare(
+        sampled(name), built(name).sumo, net_file(name, tmp_path), shipped_assets(), until=1800
+    )
     result = run_prepared(prepared, tmp_path / "run")
     assert result.status == "completed", result.summary["error"]
     actors = result.summary["actors"]
@@ -176,7 +178,7 @@ def test_usable_places_leave_most_of_a_map_and_nothing_unknown() -> None:
     usable = usable_places(where)
     assert usable.spawnable is not None
     assert usable.walkable is not None
-    assert usable.spawnable.mean() > 0.6
+    assert usable.spawnable.mean() > 0.4
     assert np.all(where.lane_places.lane[usable.spawnable] >= 0)
     assert np.all(where.lane_places.deviation[usable.spawnable] <= 0.05)
     assert usable.walkable.mean() > 0.6
