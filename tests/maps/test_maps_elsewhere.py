@@ -46,6 +46,16 @@ def test_ways_in_carla_end_only_at_the_borders_of_the_map(path, carla):
         assert (road.length - waypoint.s if forward else waypoint.s) < 2.1
 
 
+def test_ways_in_carla_do_not_end_in_the_large_town(carla):
+    pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
+    from tools.make_maps.__main__ import map_text
+
+    world = carla.Map("large_town", map_text("large_town"))
+    waypoints = world.generate_waypoints(5.0)
+    assert len(waypoints) > 10_000
+    assert all(waypoint.next(5.0) for waypoint in waypoints)
+
+
 @every_map
 def test_the_topology_in_carla_has_no_gaps(path, carla):
     """Every lane that a link of the topology leads to starts where the link before it ended."""

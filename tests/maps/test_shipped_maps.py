@@ -341,7 +341,7 @@ def test_traffic_keeps_to_its_side(name):
 
 def test_the_rural_road_uses_what_it_is_for():
     root = shipped("rural_hills").root
-    for tag in ("spiral", "arc", "paramPoly3", "superelevation"):
+    for tag in ("spiral", "arc", "paramPoly3", "superelevation", "laneOffset"):
         assert len(root.findall(f".//{tag}")) >= 3
     assert len({e.get("a") for e in root.iter("elevation")}) > 10
     assert {m.get("type") for m in root.findall(".//center/lane/roadMark")} == {

@@ -41,7 +41,8 @@ class Builder:
         self.controllers: list[tuple[int, str, list[str]]] = []
         self.junction_controllers: dict[int, list[int]] = {}
         self.priorities: dict[int, list[tuple[int, int]]] = {}
-        self._next = {"road": 0, "junction": 1000, "object": 0, "signal": 0, "controller": 0}
+        # CARLA confuses a junction with a road of the same id.
+        self._next = {"road": 0, "junction": 10000, "object": 0, "signal": 0, "controller": 0}
 
     def new_id(self, kind: str) -> int:
         """Return the next id for a road, junction, object, signal or controller."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from scenariogeneration import xodr
 
 from tools.make_maps.builder import Builder
 from tools.make_maps.crossing import crossing
 from tools.make_maps.geometry import Pose
-from tools.make_maps.parts import BROKEN, SOLID, End, LaneSpec, Mark, Profile, street
+from tools.make_maps.parts import BROKEN, SOLID, End, LaneSpec, Profile, street
 
 EAST, NORTH, WEST, SOUTH = (k * math.pi / 2 for k in range(4))
 COMPASS = {"east": EAST, "north": NORTH, "west": WEST, "south": SOUTH}
@@ -18,16 +17,13 @@ ORIGIN = Pose(0.0, 0.0, 0.0)
 
 POCKET = 3.25
 """Width of a left-turn lane."""
-POCKET_LENGTH = 50.0
-TAPER = 30.0
-"""Metres over which the left-turn lane opens."""
 
 
 def signal_crossing(name: str) -> Builder:
     """Four arms with lights, left-turn lanes, bicycle lanes, sidewalks and crosswalks."""
     builder = Builder(name)
     arms = [
-        _pocket_arm(builder, heading, reach=17.0, length=150.0, label=label)
+        _pocket_arm(builder, heading, reach=17.0, length=130.0, label=label)
         for label, heading in COMPASS.items()
     ]
     crossing(builder, arms, control="lights", name="Signal crossing")
@@ -82,28 +78,19 @@ def arm(
 def _pocket_arm(
     builder: Builder, heading: float, *, reach: float, length: float, label: str
 ) -> End:
-    """Make an arm with bicycle lanes, where a left-turn lane opens before the junction.
+    """Make an arm with bicycle lanes, and a left-turn lane for those who arrive.
 
-    Both sides of the road widen alike, so that lanes of opposite arms face each other. The lane
-    offset that this takes ends where the new lane is complete: CARLA adds it to the t of
-    crosswalks.
+    The reference line, between the two directions, is half a lane to the left, so that lanes of
+    opposite arms face each other. (CARLA adds a lane offset, which would do the same, to the t of
+    crosswalks.)
     """
-    plain = replace(street(bikes=True), offset=-POCKET / 2)
-    opening = LaneSpec("driving", 0.0, BROKEN, width_end=POCKET, key="pocket")
-    pocket = replace(opening, width=POCKET, width_end=None)
-    taper = Profile((opening, *plain.right), plain.left, SOLID, -POCKET / 2, 0.0)
-    wide = Profile((pocket, *plain.right), plain.left, SOLID)
-    solid_from = length - TAPER - POCKET_LENGTH - 40.0
-    plain = replace(plain, centre=(*BROKEN, Mark(solid_from, "solid", "none")))
-    far = Pose(0.0, 0.0, heading).ahead(reach + length)
+    plain = street(bikes=True)
+    pocket = LaneSpec("driving", POCKET, BROKEN, key="pocket")
+    far = Pose(0.0, 0.0, heading).ahead(reach + length).left(-POCKET / 2)
     record = builder.road(
-        far.back().left(POCKET / 2),
+        far.back(),
         [xodr.Line(length)],
-        plain,
+        Profile((pocket, *plain.right), plain.left, SOLID),
         name=f"{label.title()} Street",
-        sections=[
-            (length - POCKET_LENGTH - TAPER, taper),
-            (length - POCKET_LENGTH, wide),
-        ],
     )
     return End(record, "end")

@@ -55,6 +55,8 @@ LINK = 40.0
 SHOULDER_OPENS = 70.0
 """Metres over which the shoulder beside a ramp comes and goes."""
 BRIDGE_HEIGHT = 6.5
+SIGN_BESIDE = 0.8
+"""Metres from the outer border of the shoulder to a speed sign."""
 
 
 def motorway_weave(name: str) -> Builder:
@@ -109,7 +111,11 @@ def _carriageway(builder: Builder, side: int) -> list[tuple[End, End]]:
             kind="motorway",
             sections=sections,
         )
-        furniture.speed_sign(builder, record.road, 10.0, -4 * WIDTH - 2.5, limit)
+        # Where a ramp runs beside the road at first, the sign stands behind the place it leaves.
+        between = profile.right[-1].width == 0.0
+        edge = sum(lane.width for lane in (MAIN if between else profile).right)
+        s = SHOULDER_OPENS + 30.0 if between else 10.0
+        furniture.speed_sign(builder, record.road, s, -edge - SIGN_BESIDE, limit)
         return record
 
     opening = replace(
@@ -164,7 +170,8 @@ def _ramp(builder: Builder, side: int, x: float, *, leaving: bool) -> RoadRecord
         kind="motorway",
         heights=(0.0, BRIDGE_HEIGHT) if leaving else (BRIDGE_HEIGHT, 0.0),
     )
-    furniture.speed_sign(builder, record.road, 30.0, -WIDTH - 3.0, 60)
+    edge = sum(lane.width for lane in RAMP.right)
+    furniture.speed_sign(builder, record.road, 60.0, -edge - SIGN_BESIDE, 60)
     return record
 
 

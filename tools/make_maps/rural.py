@@ -34,6 +34,13 @@ SIGHT = 100.0
 """Metres before a bend without overtaking for those who come towards it."""
 BANK = 0.05
 """Slope across the road in bends of up to 200 m radius, less in wider ones."""
+POCKET = 3.25
+"""Width of the left-turn lane."""
+POCKET_LENGTH = 70.0
+TAPER = 35.0
+"""Metres over which the left-turn lane opens."""
+SIGN_ASIDE = 7.0
+"""Metres from the reference line to the signs, clear of the shoulder beside the left-turn lane."""
 REACH = 16.0
 """Metres from the middle of a junction to the end of its arms."""
 
@@ -73,7 +80,7 @@ class Zone:
 
 
 def rural_hills(name: str) -> Builder:
-    """Three roads of together 4.3 km, two side roads."""
+    """Three roads of together 4.7 km, two side roads."""
     builder = Builder(name)
     west = _road(
         builder,
@@ -104,6 +111,7 @@ def rural_hills(name: str) -> Builder:
         ),
         heights=(25.0, 33.0, 45.0, 52.0, 49.0, 40.0, 34.0, 36.0, 36.0),
         junctions=(True, True),
+        pocket=True,
     )
     east = _road(
         builder,
@@ -164,15 +172,33 @@ def _road(
     *,
     heights: Sequence[float],
     junctions: tuple[bool, bool],
+    pocket: bool = False,
 ) -> RoadRecord:
-    """Add a road of ``parts``; ``heights`` at equal distances; ``junctions`` at start and end."""
+    """Add a road.
+
+    Parameters
+    ----------
+    builder
+        The map so far.
+    start
+        Pose of the road's start.
+    parts
+        What the reference line is made of.
+    heights
+        At equal distances along the road.
+    junctions
+        Whether the road starts, and ends, at a junction.
+    pocket
+        Whether a left-turn lane opens before the end.
+    """
     made = [_geometries(part) for part in parts]
     ends = list(accumulate(sum(map(length_of, pieces)) for pieces in made))
     zones = [
         Zone(begin, end, part, _limit(part))
         for begin, end, part in zip([0.0, *ends], ends, parts, strict=False)
     ]
-    centre = _centre_marks(zones, ends[-1], junctions)
+    plain = ends[-1] - (TAPER + POCKET_LENGTH if pocket else 0.0)
+    centre = tuple(m for m in _centre_marks(zones, ends[-1], junctions) if m.offset < plain - 1.0)
     record = builder.road(
         start,
         [piece for pieces in made for piece in pieces],
@@ -180,12 +206,26 @@ def _road(
         name="Hill Road",
         speed=_limits(zones, junctions)[0][1],
         kind="rural",
+        sections=_pocket(plain) if pocket else (),
     )
     record.heights = (heights[0], heights[-1])
     _heights(record, heights)
     _banks(record, zones)
     _speeds(builder, record, _limits(zones, junctions))
     return record
+
+
+def _pocket(s: float) -> list[tuple[float, Profile]]:
+    """Lane sections of a left-turn lane that opens at s.
+
+    The lane offset moves the lanes left by half of the new lane's width: both sides widen alike.
+    """
+    opening = LaneSpec("driving", 0.0, BROKEN, width_end=POCKET, key="pocket")
+    lane = replace(opening, width=POCKET, width_end=None)
+    return [
+        (s, Profile((opening, *SIDE), SIDE, SOLID, 0.0, POCKET / 2)),
+        (s + TAPER, Profile((lane, *SIDE), SIDE, SOLID, POCKET / 2)),
+    ]
 
 
 def _geometries(part: Part) -> list[Geometry]:
@@ -227,13 +267,12 @@ def _limits(zones: Sequence[Zone], junctions: tuple[bool, bool]) -> list[tuple[f
 
 def _speeds(builder: Builder, record: RoadRecord, limits: Sequence[tuple[float, int]]) -> None:
     """Limits as road types and as signs, for both directions."""
-    aside = sum(lane.width for lane in SIDE) + 0.8
-    furniture.speed_sign(builder, record.road, 15.0, -aside, limits[0][1])
-    furniture.speed_sign(builder, record.road, record.length - 15.0, aside, limits[-1][1])
+    furniture.speed_sign(builder, record.road, 15.0, -SIGN_ASIDE, limits[0][1])
+    furniture.speed_sign(builder, record.road, record.length - 15.0, SIGN_ASIDE, limits[-1][1])
     for (_, before), (s, limit) in pairwise(limits):
         record.road.add_type(xodr.RoadType.rural, s, speed=limit, speed_unit="km/h")
-        furniture.speed_sign(builder, record.road, s, -aside, limit)
-        furniture.speed_sign(builder, record.road, s, aside, before)
+        furniture.speed_sign(builder, record.road, s, -SIGN_ASIDE, limit)
+        furniture.speed_sign(builder, record.road, s, SIGN_ASIDE, before)
 
 
 def _centre_marks(
