@@ -27,15 +27,14 @@ def test_show_gives_what_scripts_rely_on(workspace):
     assert done.code == 0
     assert info["name"] == "signal_crossing"
     assert len(info["sha256"]) == 64
-    assert info["opendrive"] == {"version": "1.5", "rule": "RHT"}
+    assert info["opendrive"] == {"version": "1.7", "rule": "RHT"}
     assert set(info["statistics"]) >= STATISTICS
     assert info["statistics"]["crosswalks"] == 4
-    assert info["statistics"]["traffic_lights"] == 4
+    assert info["statistics"]["traffic_lights"] == 8
     assert info["statistics"]["speed_limit_max"] == pytest.approx(50 / 3.6, abs=1e-3)
     assert info["graph"]["spacing"] == 2.0
     assert info["graph"]["nodes"] > 700
-    # Two approaches of 110 m with two lanes each: one change per node, but for the last ones.
-    assert 100 <= info["graph"]["right_edges"] <= info["graph"]["left_edges"] <= 110
+    assert info["graph"]["left_edges"] == info["graph"]["right_edges"] == 96
     assert set(info["sumo"]) >= {
         "net_file",
         "edges",
