@@ -2,6 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+QC := build/qc/ready
 
 .PHONY: demo test check format bench golden maps large-town check-maps clean
 
@@ -10,7 +11,7 @@ demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
 # Set-up plus the tests; the slow ones run with `make test PYTEST='-m slow'`.
-test: $(READY)
+test: $(READY) $(QC)
 	$(BIN)/python -m pytest $(or $(PYTEST),-m "not slow")
 
 check: $(READY)
@@ -39,11 +40,14 @@ maps: $(READY)
 large-town: $(READY)
 	$(BIN)/python -m tools.make_maps --only large_town -o build
 
-# ASAM's own checks on the shipped maps; they need NumPy 1, hence an environment of their own.
-check-maps: $(READY)
-	$(PYTHON) -m venv build/qc
-	build/qc/bin/pip install --quiet --disable-pip-version-check 'asam-qc-opendrive>=1.0'
+check-maps: $(QC)
 	build/qc/bin/python tools/check_maps.py maps/*.xodr
+
+# ASAM's own checks and schemas; they need NumPy 1, hence an environment of their own.
+$(QC):
+	$(PYTHON) -m venv build/qc
+	build/qc/bin/pip install --quiet --disable-pip-version-check 'asam-qc-opendrive>=1.0,<2'
+	touch $@
 
 $(READY): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "odscen needs Python 3.11 or newer; this is " + sys.version.split()[0])'

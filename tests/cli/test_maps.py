@@ -34,7 +34,8 @@ def test_show_gives_what_scripts_rely_on(workspace):
     assert info["statistics"]["speed_limit_max"] == pytest.approx(50 / 3.6, abs=1e-3)
     assert info["graph"]["spacing"] == 2.0
     assert info["graph"]["nodes"] > 700
-    assert info["graph"]["left_edges"] == info["graph"]["right_edges"] == 96
+    assert info["graph"]["left_edges"] == 209
+    assert info["graph"]["right_edges"] == 208
     assert set(info["sumo"]) >= {
         "net_file",
         "edges",

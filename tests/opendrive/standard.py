@@ -5,7 +5,6 @@ The schemas come with the package asam-qc-opendrive; the standard itself may not
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
 from lxml import etree
@@ -15,11 +14,12 @@ VERSIONS = ("1.4", "1.5", "1.6.1", "1.7.0", "1.8.0")
 
 
 def schema_folder() -> Path | None:
-    """Folder of the schemas, one folder per version, or ``None`` when they are not installed."""
-    found = importlib.util.find_spec("qc_opendrive")
-    if found is None or not found.submodule_search_locations:
-        return None
-    return Path(next(iter(found.submodule_search_locations))) / "schema"
+    """Folder of the schemas, one folder per version, or ``None`` when they are not installed.
+
+    They come with ``asam-qc-opendrive``, which ``make test`` installs in an environment of its own.
+    """
+    own = Path(__file__).parents[2] / "build" / "qc"
+    return next(own.glob("lib/python*/site-packages/qc_opendrive/schema"), None)
 
 
 def schema_rows(folder: Path) -> set[tuple[str, str]]:

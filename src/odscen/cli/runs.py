@@ -91,9 +91,8 @@ def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) 
     for result in results:
         for verdict in result.summary["expectations"]:
             if not verdict["passed"]:
-                log(
-                    f"{result.folder.name}: failed: {verdict['expectation']} (is {verdict['value']})"
-                )
+                has = f"{verdict['expectation']} (is {verdict['value']})"
+                log(f"{result.folder.name}: failed: {has}")
         if result.status == "failed":
             log(f"{result.folder.name}: {result.summary['error']}")
         else:
