@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.catalog.render import RenderOptions, render_drawing, svg_to_png
+from odscen.catalog.render import render_drawing
 from odscen.catalog.shapes import map_drawing
 from odscen.catalog.statistics import map_semantics, map_statistics
 from odscen.convert.network import build_network
-from odscen.errors import InputError
 from odscen.lanegraph.build import build_map_graph
 from odscen.lanegraph.files import to_graphml, to_npz_bytes
 from odscen.lanegraph.model import MapGraph, Relation
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from odscen.catalog.store import MapEntry
 
 FORMAT = "odscen-map"
 
@@ -137,32 +135,3 @@ def graph_counts(graph: MapGraph) -> dict[str, Any]:
         "pedestrian_nodes": len(graph.walks.s),
         "pedestrian_edges": len(graph.walks.source),
     }
-
-
-def draw_map(
-    entry: MapEntry, out: Path, *, width: int, with_graph: bool, with_segments: bool = False
-) -> None:
-    """Write a drawing of a map as SVG or PNG, by the ending of ``out``.
-
-    Raises
-    ------
-    InputError
-        If the ending is another.
-    MissingDependencyError
-        For PNG, if ``cairosvg`` is not installed.
-    """
-    if out.suffix.lower() not in (".svg", ".png"):
-        msg = f"a drawing is written as .svg or .png, not {out.suffix or 'without ending'}"
-        raise InputError(msg, file=str(out))
-    options = RenderOptions(graph=with_graph, segments=with_segments)
-    graph = entry.graph() if with_graph or with_segments else None
-    statistics = entry.statistics()
-    svg = render_drawing(entry.drawing(), statistics=statistics, graph=graph, options=options)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        if out.suffix.lower() == ".png":
-            out.write_bytes(svg_to_png(svg, width=width))
-        else:
-            out.write_text(svg, encoding="utf-8")
-    except OSError as error:
-        raise InputError(error.strerror or str(error), file=str(out)) from error

@@ -163,7 +163,7 @@ def render(
     as_json: JsonOption = False,
 ) -> None:
     """Draw a map as SVG or PNG."""
-    from odscen.catalog.build import draw_map
+    from odscen.catalog.sheet import draw_map
     from odscen.catalog.store import Workspace
 
     draw_map(Workspace.open(workspace).map(name), out, width=width, with_graph=graph)

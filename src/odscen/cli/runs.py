@@ -71,7 +71,7 @@ def run(
             time_limit=time_limit,
             progress=_follow(step, len(paths)),
         )
-    show_results(results, as_json=as_json, several=len(paths) > 1)
+    show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
     raise typer.Exit(max(result.exit_code for result in results))
 
 
