@@ -32,10 +32,7 @@ def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> No
     """Show versions, what is installed, what is missing and how to get it."""
     checks = [
         _check("python", platform.python_version(), needed=True),
-        *(
-            _package(name, needed=True, advice=f"pip install {name}")
-            for name in ("odscen", *NEEDED)
-        ),
+        *(_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
         *(_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
         _netconvert(),
         _workspace(workspace),

@@ -23,6 +23,10 @@ from odscen.errors import InputError, OdscenError
 if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry
 
+UNITS = dict.fromkeys(
+    ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"
+) | dict.fromkeys(("speed_limit_min", "speed_limit_max"), ", m/s")
+
 app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=True)
 
 
@@ -128,7 +132,8 @@ def show(
         values = entry.info[part]
         if part == "report":
             values = values["counts"]
-        print_table(part, ("", ""), [(key, _plain(value)) for key, value in values.items()])
+        rows = [(f"{key}{UNITS.get(key, '')}", _plain(value)) for key, value in values.items()]
+        print_table(part, (), rows)
     log(f"Drawing: {entry.path('preview')}")
 
 

@@ -56,14 +56,24 @@ def error_fields(error: OdscenError) -> dict[str, Any]:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Write a table to stdout; numbers are right-aligned."""
+    """Write a table to stdout; numbers are right-aligned. Without ``columns`` it has no head."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=title or None, title_justify="left")
-    for index, column in enumerate(columns):
+    table = Table(
+        title=title or None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        show_header=bool(columns),
+    )
+    for index in range(len(rows[0]) if rows else len(columns)):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
-        table.add_column(column, justify="right" if numeric else "left", overflow="fold")
+        name = columns[index] if columns else ""
+        table.add_column(
+            name, justify="right" if numeric else "left", no_wrap=index == 0, overflow="fold"
+        )
     for row in rows:
         table.add_row(*(_cell(value) for value in row))
     Console().print(table)

@@ -81,13 +81,13 @@ def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) 
         runs = [result.to_dict() for result in results]
         print_json({"runs": runs} if several else runs[0])
     else:
-        columns = ("run", "status", "planned", "inserted", "arrived", "teleported", "collided")
+        keys = ("planned", "inserted", "arrived", "teleported", "collided")
         rows = []
         for result in results:
             counts = result.summary["actors"]
             verdict = result.status if result.expectations_met else "expectation failed"
-            rows.append((result.folder.name, verdict, *(counts[key] for key in columns[2:])))
-        print_table("", columns, rows)
+            rows.append((result.folder.name, verdict, *(counts[key] for key in keys)))
+        print_table("", ("run", "status", *keys), rows)
     for result in results:
         for verdict in result.summary["expectations"]:
             if not verdict["passed"]:
