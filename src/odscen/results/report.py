@@ -140,7 +140,8 @@ def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
     if missed:
         return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
     if expectations:
-        return "good", f"{words}, all {len(expectations)} expectations met"
+        met = "expectation met" if len(expectations) == 1 else "all expectations met"
+        return "good", f"{words}, {met}"
     return ("good" if status == "completed" else "fair"), words
 
 
