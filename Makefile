@@ -10,9 +10,9 @@ QC := build/qc/ready
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
-# Set-up plus the tests; the slow ones run with `make test PYTEST='-m slow'`.
+# Set-up plus the tests.
 test: $(READY) $(QC)
-	$(BIN)/python -m pytest $(or $(PYTEST),-m "not slow")
+	$(BIN)/python -m pytest
 
 check: $(READY)
 	$(BIN)/ruff check .
