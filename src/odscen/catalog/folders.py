@@ -8,8 +8,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from odscen.errors import WorkspaceError
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+_ATTEMPTS = 20
 
 
 @contextmanager
@@ -24,9 +28,7 @@ def new_folder(final: Path) -> Iterator[Path]:
     folder.chmod(0o755)  # mkdtemp makes it private, which a finished map or run need not be
     try:
         yield folder
-        if final.exists():
-            discard(final)
-        folder.rename(final)
+        _put(folder, final)
     finally:
         with suppress(OSError):
             shutil.rmtree(folder)
@@ -35,5 +37,23 @@ def new_folder(final: Path) -> Iterator[Path]:
 def discard(folder: Path) -> None:
     """Take a folder out of sight in one step, then delete it."""
     grave = Path(tempfile.mkdtemp(prefix=".removed-", dir=folder.parent))
-    folder.rename(grave / folder.name)
-    shutil.rmtree(grave)
+    try:
+        folder.rename(grave / folder.name)
+    finally:
+        shutil.rmtree(grave)
+
+
+def _put(folder: Path, final: Path) -> None:
+    """Rename ``folder`` to ``final``; the last of several processes that do so at a time wins."""
+    for _ in range(_ATTEMPTS):
+        with suppress(FileNotFoundError):
+            discard(final)
+        try:
+            folder.rename(final)
+        except OSError:
+            if not final.exists():  # not that another process was faster
+                raise
+        else:
+            return
+    msg = f"{final} is written by other processes all the time"
+    raise WorkspaceError(msg)

@@ -263,7 +263,9 @@ class Workspace:
                 builder=BUILDER,
                 progress=progress or (lambda _what, _share: None),
             )
-        return _read_entry(final)
+            # Read here: another process that adds the same map may replace ours at any time.
+            info = _read_entry(folder).info
+        return MapEntry(name, final, info)
 
     def remove_map(self, name: str) -> None:
         """Remove a map; scenarios made on it stay, and say that the map is missing."""

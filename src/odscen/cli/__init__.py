@@ -15,7 +15,7 @@ from odscen.cli.assets import app as assets
 from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
-from odscen.cli.output import report_error
+from odscen.cli.output import report_error, report_usage
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
 from odscen.errors import OdscenError
@@ -60,3 +60,9 @@ def main() -> None:
     except OdscenError as error:
         report_error(error)
         sys.exit(error.exit_code)
+    except SystemExit as stop:
+        # Typer has told people what is wrong with the call; scripts want it as JSON too.
+        told = getattr(stop.__context__, "format_message", None)
+        if told is not None:
+            report_usage(told())
+        raise

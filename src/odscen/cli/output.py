@@ -45,6 +45,12 @@ def report_error(error: OdscenError) -> None:
         print_json({"error": error_fields(error)})
 
 
+def report_usage(message: str) -> None:
+    """Write what is wrong with the command line as JSON to stdout, if it asked for JSON."""
+    if "--json" in sys.argv[1:]:
+        print_json({"error": {"type": "UsageError", "message": message}})
+
+
 def error_fields(error: OdscenError) -> dict[str, Any]:
     """An error as data: its type, its message, and the file and element if it has them."""
     places = {key: getattr(error, key, None) for key in ("file", "element")}

@@ -71,6 +71,9 @@ def run_worker(
             stderr=log,
             text=True,
             encoding="utf-8",
+            # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
+            # a failed run, and the folder of a run that was called off would appear.
+            start_new_session=True,
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)

@@ -1,0 +1,60 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from tests.cli.conftest import SHIPPED, odscen
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("maps", "add"),
+        ("maps", "nope"),
+        ("generate", "--count", "-1"),
+        ("run", "x", "--jobs", "many"),
+    ],
+)
+def test_a_wrong_call_is_one_json_object_too(arguments):
+    done = odscen(*arguments, "--json")
+    assert done.code == 2
+    assert done.json["error"]["type"] == "UsageError"
+    assert done.json["error"]["message"]
+
+
+def test_the_same_map_can_be_added_several_times_at_once(tmp_path):
+    def add(_number):
+        return odscen("maps", "add", SHIPPED / "roundabout.xodr", "--json", "--workspace", tmp_path)
+
+    with ThreadPoolExecutor(4) as pool:
+        finished = list(pool.map(add, range(4)))
+    assert [done.code for done in finished] == [0] * 4, [done.err for done in finished]
+    assert [path.name for path in (tmp_path / "maps").iterdir()] == ["roundabout"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
+def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
+    w = ("--workspace", workspace)
+    odscen("generate", "--map", "signal_crossing", "--fill", "0.3", "--out", tmp_path / "s", *w)
+    runs = tmp_path / "r"
+    command = [sys.executable, "-m", "odscen", "run", tmp_path / "s", "--out", runs, *w]
+    # Steps of a hundredth of a second: the run takes long enough to be met in its middle.
+    with subprocess.Popen(
+        [*command, "--step-length", "0.01", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        while process.poll() is None and not list(runs.glob(".building-*/trajectories.parquet")):
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert "Traceback" not in err
+    assert list(runs.iterdir()) == []
