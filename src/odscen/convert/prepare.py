@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from lxml import etree
 
 from odscen.convert.report import Entry, Fate
+from odscen.convert.rewrites import flat_access, plain_ids
 from odscen.errors import OpenDriveError
 from odscen.opendrive.model import DRIVABLE_TYPES
 
@@ -40,7 +41,14 @@ def prepare_for_netconvert(xodr: bytes) -> tuple[bytes, tuple[Entry, ...]]:
     except etree.XMLSyntaxError as error:
         msg = f"not XML: {error}"
         raise OpenDriveError(msg) from error
-    notes = [*_speeds(root), *_signals(root), *_straight_curves(root), *_direct_junctions(root)]
+    notes = [
+        *plain_ids(root),
+        *flat_access(root),
+        *_speeds(root),
+        *_signals(root),
+        *_straight_curves(root),
+        *_direct_junctions(root),
+    ]
     if not notes:
         return xodr, ()
     return etree.tostring(root, encoding="utf-8", xml_declaration=True), tuple(notes)
