@@ -18,19 +18,39 @@ from odscen.errors import NotFoundError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+Age = Literal["adult", "child"]
 TimeOfDay = Literal["day", "sunset", "night"]
 
 
 @dataclass(frozen=True, slots=True)
 class Blueprint:
-    """A model of road user; ``special_type`` is ``emergency``, ``taxi`` or empty."""
+    """A model of road user.
+
+    Attributes
+    ----------
+    base_type
+        What a CARLA server says, which is nothing for walkers and for two cars: choose by
+        ``category``.
+    special_type
+        ``electric``, ``emergency``, ``taxi`` or empty.
+    generation
+        Of the vehicle's artwork, ``None`` for pedestrians.
+    age
+        ``None`` for vehicles, and for pedestrians that CARLA's documentation does not list.
+    body
+        Bounding box, metres.
+    dimensions_source
+        Key of the file's ``sources`` where the body comes from; ``typical`` if nobody measured it.
+    """
 
     id: str
     category: Category
     base_type: str
     special_type: str
     generation: int | None
+    age: Age | None
     body: Body
+    dimensions_source: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,5 +133,7 @@ def _blueprint(row: Mapping[str, Any]) -> Blueprint:
         base_type=row["base_type"],
         special_type=row["special_type"],
         generation=row.get("generation"),
+        age=row.get("age"),
         body=Body(row["length"], row["width"], row["height"]),
+        dimensions_source=row["dimensions_source"],
     )
