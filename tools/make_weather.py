@@ -41,7 +41,7 @@ AIR = {
     "rayleigh_scattering_scale": 0.0331,
 }
 OURS: dict[str, dict[str, float]] = {
-    "fog": {"cloudiness": 60.0, "fog_density": 60.0, "fog_distance": 10.0, "wetness": 20.0},
+    "fog": {"cloudiness": 60.0, "fog_density": 85.0, "fog_distance": 10.0, "wetness": 20.0},
     "dust": {"cloudiness": 40.0, "dust_storm": 80.0, "wind_intensity": 80.0, "fog_density": 10.0},
 }
 TIMES = {"Noon": "day", "Sunset": "sunset", "Night": "night"}

@@ -126,3 +126,10 @@ def test_every_preset_sets_every_parameter_of_carla():
     assert len(names) == 14
     for preset in shipped_assets().presets.values():
         assert set(preset.parameters) == names, preset.name
+
+
+def test_the_fog_that_makes_carlas_nights_dark_does_not_slow_traffic_down():
+    assets = shipped_assets()
+    assert assets.preset("HardRainNight").parameters["fog_density"] == 100
+    assert assets.weather("HardRainNight")["fog_density"] == 0
+    assert assets.weather("FogNight")["fog_density"] == 85

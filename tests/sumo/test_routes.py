@@ -234,3 +234,20 @@ def test_a_walk_where_nothing_is_to_walk_on_is_refused() -> None:
     path = WALKS.path(0, 5)
     with pytest.raises(NoRouteError, match="nothing to walk on at the spawn"):
         WalkPlanner(GRAPH.walks, NET, nothing).plan(path, length=0.4, lateral_offset=0.0)
+
+
+def test_a_way_through_a_junction_may_have_two_internal_lanes() -> None:
+    lanes = {
+        "a_0": NetLane("a_0", "a", 0, 10.0),
+        ":j_1_0": NetLane(":j_1_0", ":j_1", 0, 4.0, internal=True),
+        ":j_2_0": NetLane(":j_2_0", ":j_2", 0, 6.0, internal=True),
+        "b_0": NetLane("b_0", "b", 0, 10.0),
+    }
+    links = (
+        Link("a_0", "b_0", ":j_1_0"),
+        Link(":j_1_0", "b_0", ":j_2_0"),
+        Link(":j_2_0", "b_0"),
+    )
+    passage = RoadNet(lanes, links).passage("a_0", "b")
+    assert passage is not None
+    assert [lane.id for lane in passage] == [":j_1_0", ":j_2_0", "b_0"]

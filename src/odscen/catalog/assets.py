@@ -102,9 +102,16 @@ class Assets:
         return found.body if found else None
 
     def weather(self, preset: str) -> Mapping[str, float] | None:
-        """Parameters of a weather preset, ``None`` if there is no such preset."""
+        """Parameters of a preset as they act on driving, ``None`` if there is no such preset.
+
+        CARLA's night presets have dense fog to look dark; it hides nothing from drivers there.
+        """
         found = self.presets.get(preset)
-        return found.parameters if found else None
+        if found is None:
+            return None
+        if found.time_of_day == "night" and found.kind not in ("fog", "dust"):
+            return {**found.parameters, "fog_density": 0.0}
+        return found.parameters
 
 
 def parse_assets(blueprints: str, weather: str) -> Assets:

@@ -35,7 +35,7 @@ KINDS: dict[Category, Kind] = {
     Category.CAR: Kind("passenger", 55.56, 2.6, 4.5, 9.0, "passenger"),
     Category.VAN: Kind("delivery", 55.56, 2.6, 4.5, 9.0, "delivery"),
     Category.TRUCK: Kind("truck", 36.11, 1.3, 4.0, 7.0, "truck"),
-    Category.BUS: Kind("bus", 23.61, 1.2, 4.0, 7.0, "bus"),
+    Category.BUS: Kind("bus", 27.78, 1.2, 4.0, 7.0, "bus"),
     Category.MOTORCYCLE: Kind("motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle"),
     Category.BICYCLE: Kind("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle"),
     Category.PEDESTRIAN: Kind("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian"),

@@ -205,8 +205,9 @@ class RoadNet:
         lane = self.lanes[internal]
         while lane.internal:
             onwards = self.links_from.get(lane.id, ())
-            if not onwards or lane in passed:
+            following = self.lanes[onwards[0].via or onwards[0].target] if onwards else None
+            if following is None or following in passed:
                 return ()
-            lane = self.lanes[onwards[0].via or onwards[0].target]
+            lane = following
             passed.append(lane)
         return tuple(passed)
