@@ -199,7 +199,7 @@ class RoutePlanner:
         if way is None:
             msg = f"the SUMO network has no way for {vclass} from {lane.id} to edge {edges[0]}"
             raise NoRouteError(msg)
-        return (lane.edge, *(passed.edge for passed in leaving[:-1]), *way, *edges[1:])
+        return (lane.edge, *way, *edges[1:])
 
     def _leaving(self, lane: NetLane) -> tuple[NetLane, ...]:
         leaving = self._net.leaving(lane.id)
@@ -220,7 +220,8 @@ class RoutePlanner:
             ground = (pos - lane.length) / self._places.scales[lane.id]
             lane = passage[0]
             pos = ground * self._places.scales[lane.id]
-            inside = tuple(passed.edge for passed in passage[:-1])
+            # SUMO takes one internal edge at most, as the first: it knows what follows by itself.
+            inside = (lane.edge,) if lane.internal else ()
             edges = (*inside, *edges[edges.index(passage[-1].edge) :])
         return edges, lane, max(pos, 0.0)
 
