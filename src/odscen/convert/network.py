@@ -11,6 +11,7 @@ from odscen.convert.netconvert import read_map, run_netconvert, stage
 from odscen.convert.prepare import prepare_for_netconvert
 from odscen.convert.recipe import TYPEMAP_FILE, ladder, typemap
 from odscen.convert.report import ConversionReport, Entry, Fate
+from odscen.convert.shapes import exact_net, rewrite_shapes
 from odscen.convert.table_build import build_lane_table
 from odscen.errors import NetconvertError, in_file
 from odscen.opendrive.topology import lane_successors
@@ -68,11 +69,14 @@ def build_network(odr: OpenDrive, table: RoadTable, xodr: Path, workdir: Path) -
     converted, steps = _climb(prepared, workdir, lefthand=odr.rule == "LHT")
     net = Net.parse(converted.net_xml)
     successors = lane_successors(odr)
+    drawn = build_lane_table(net, odr, table, successors)
+    net = exact_net(net, drawn.table, table)
     built = build_lane_table(net, odr, table, successors)
+    net_xml = rewrite_shapes(converted.net_xml, net)
     found = findings(odr, table, built)
     notes = [Entry(Fate.REPAIRED, *_split(note)) for note in odr.notes]
     report = ConversionReport.of([*notes, *repairs, *steps, *found.entries], found.figures)
-    return SumoNetwork(converted.net_xml, built.table, report)
+    return SumoNetwork(net_xml, built.table, report)
 
 
 def _climb(
