@@ -72,13 +72,17 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
         title_justify="left",
         box=SIMPLE_HEAD,
         pad_edge=False,
+        collapse_padding=True,
         show_header=bool(columns),
     )
     for index in range(len(rows[0]) if rows else len(columns)):
         numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
         name = columns[index] if columns else ""
         table.add_column(
-            name, justify="right" if numeric else "left", no_wrap=index == 0, overflow="fold"
+            name,
+            justify="right" if numeric else "left",
+            no_wrap=index == 0 or numeric,
+            overflow="fold",
         )
     for row in rows:
         table.add_row(*(_cell(value) for value in row))

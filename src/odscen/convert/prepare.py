@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from lxml import etree
 
 from odscen.convert.report import Entry, Fate
-from odscen.convert.rewrites import flat_access, plain_ids
+from odscen.convert.rewrites import flat_access, no_includes, plain_ids, widths_from_borders
 from odscen.errors import OpenDriveError
 from odscen.opendrive.model import DRIVABLE_TYPES
 
@@ -44,6 +44,8 @@ def prepare_for_netconvert(xodr: bytes) -> tuple[bytes, tuple[Entry, ...]]:
     notes = [
         *plain_ids(root),
         *flat_access(root),
+        *no_includes(root),
+        *widths_from_borders(root),
         *_speeds(root),
         *_signals(root),
         *_straight_curves(root),

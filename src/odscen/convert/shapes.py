@@ -9,6 +9,7 @@ Why this way: ``docs/decisions/0002-exact-lane-shapes.md``.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -103,7 +104,7 @@ def rewrite_shapes(net_xml: bytes, net: Net) -> bytes:
 
 
 def _text(lane: NetLane, offset: tuple[float, float]) -> str:
-    points = lane.shape + [*offset, 0.0]
+    points = lane.shape + np.array([*offset, 0.0])
     if not lane.shape[:, 2].any():
         return " ".join([f"{x:.4f},{y:.4f}" for x, y, _ in points.tolist()])
     return " ".join([f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()])
@@ -148,9 +149,7 @@ def _traced(net: Net, table: LaneTable, roads: RoadTable) -> dict[SumoLaneId, Fl
             parts.append(_cut(lanes[row], position, lanes[row].length))
         shapes.append(_distinct(np.concatenate(parts)))
     kept = _thinned(shapes)
-    return {
-        lanes[row].id: shape for row, shape in zip(rows, kept, strict=True) if len(shape) > 1
-    }
+    return {lanes[row].id: shape for row, shape in zip(rows, kept, strict=True) if len(shape) > 1}
 
 
 def _pieces_by_lane(table: LaneTable) -> dict[int, list[Piece]]:
@@ -163,9 +162,7 @@ def _pieces_by_lane(table: LaneTable) -> dict[int, list[Piece]]:
         taken = own.setdefault(piece.sumo, [])
         low, high = float(piece.pos[0]), float(piece.pos[-1])
         slack = 0.1 * (high - low)
-        if all(
-            other.pos[-1] <= low + slack or other.pos[0] >= high - slack for other in taken
-        ):
+        if all(other.pos[-1] <= low + slack or other.pos[0] >= high - slack for other in taken):
             taken.append(piece)
             taken.sort(key=lambda one: float(one.pos[0]))
     return own
@@ -230,7 +227,7 @@ def _thinned(shapes: Sequence[FloatArray]) -> list[FloatArray]:
         if not new.any():
             break
         keep |= new
-    return [points[a:b][keep[a:b]] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [points[a:b][keep[a:b]] for a, b in pairwise(bounds)]
 
 
 def _beside(delta: FloatArray, chord: FloatArray) -> FloatArray:
@@ -280,7 +277,8 @@ def _led_to(shape: FloatArray, end: FloatArray, which: int, *, exact: bool) -> F
     if not exact:
         arc = _arc(shape)
         share = arc / arc[-1] if arc[-1] > 0 else np.linspace(0.0, 1.0, len(arc))
-        return shape + (share if which else 1.0 - share)[:, None] * gap
+        sheared: FloatArray = shape + (share if which else 1.0 - share)[:, None] * gap
+        return sheared
     if distance > _MOVED_END:
         parts = (shape, end[None]) if which else (end[None], shape)
         return np.vstack(parts)
