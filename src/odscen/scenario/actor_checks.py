@@ -83,6 +83,10 @@ class Subject:
         return repr(self.one.id)
 
 
+NOT_ACTED_ON = ("crosses_anywhere", "ignores_red")
+"""Settings of the document that no run acts on so far (requirement R45)."""
+
+
 def actor_problems(
     scenario: Scenario, region: Region, index: int, assets: Assets | None = None
 ) -> Iterator[Problem]:
@@ -104,6 +108,13 @@ def actor_problems(
             f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
             f"{scenario.simulation.duration:g} s; depart earlier or run longer",
         )
+    for setting in NOT_ACTED_ON:
+        if getattr(actor, setting):
+            yield warning(
+                "not_acted_on",
+                f"{subject.where}.{setting}",
+                f"{setting} has no effect yet: {subject.name} keeps to crossings and lights",
+            )
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:
