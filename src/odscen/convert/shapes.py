@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
@@ -117,14 +117,6 @@ def _rounded(shape: FloatArray, *, flat: bool) -> FloatArray:
     return result
 
 
-class _Part(NamedTuple):
-    """A stretch of a SUMO lane: of an OpenDRIVE lane, or (``piece`` is ``None``) as it was."""
-
-    sumo: int
-    piece: Piece | None
-    points: FloatArray
-
-
 def _traced(net: Net, table: LaneTable, roads: RoadTable) -> dict[SumoLaneId, FloatArray]:
     """Shapes of the lanes that the table relates, in driving direction."""
     lanes = list(net.lanes.values())
@@ -193,8 +185,8 @@ def _cut(lane: NetLane, low: float, high: float) -> FloatArray:
 
 
 def _arc(shape: FloatArray) -> FloatArray:
-    """Length up to each vertex, metres, in the plane (as SUMO positions run)."""
-    steps = np.hypot(*np.diff(shape[:, :2], axis=0).T)
+    """Length up to each vertex, metres, in space, as SUMO measures it."""
+    steps = np.sqrt((np.diff(shape, axis=0) ** 2).sum(axis=1))
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
