@@ -29,3 +29,15 @@ class LaneKey(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.road}.{self.section}.{self.lane}"
+
+
+class Roadside(NamedTuple):
+    """The walk beside a lane (see :mod:`odscen.lanegraph.pedestrians`); the lane as in `LaneKey`.
+
+    ``beside`` is always true: it tells the walk from the lane, as tuples are compared by content.
+    """
+
+    road: RoadId
+    section: int
+    lane: int
+    beside: bool = True

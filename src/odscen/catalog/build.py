@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,35 +68,24 @@ def build_map(
     ------
     OpenDriveError
         If the map cannot be read.
-    NetconvertError
-        If netconvert fails on it.
     """
     start = time.perf_counter()
     progress("reading the map", 0.0)
     odr = parse(content, file=file)
     table = RoadTable.of(odr)
-    xodr = folder / FILES["xodr"]
-    xodr.write_bytes(content)
-    work = folder / "work"
-    work.mkdir()
-    # netconvert is a process of its own: the graph and the drawing are made while it runs.
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        converting = pool.submit(build_network, odr, table, xodr, work)
-        progress("building the lane graph", 0.1)
-        graph = build_map_graph(odr, name=name, sha256=sha256, spacing=spacing, table=table)
-        (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
-        (folder / FILES["graph"]).write_bytes(to_graphml(graph))
-        progress("drawing the map", 0.4)
-        drawing = map_drawing(odr, table, name=name)
-        statistics = map_statistics(odr, table, graph)
-        preview = render_drawing(drawing, statistics=statistics)
-        (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
-        (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
-        progress("making the SUMO network", 0.6)
-        network = converting.result()
-    for left in work.iterdir():
-        left.unlink()
-    work.rmdir()
+    (folder / FILES["xodr"]).write_bytes(content)
+    progress("building the lane graph", 0.1)
+    graph = build_map_graph(odr, name=name, sha256=sha256, spacing=spacing, table=table)
+    (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
+    (folder / FILES["graph"]).write_bytes(to_graphml(graph))
+    progress("making the SUMO network", 0.4)
+    network = build_network(odr, table, graph.walks)
+    progress("drawing the map", 0.8)
+    drawing = map_drawing(odr, table, name=name)
+    statistics = map_statistics(odr, table, graph)
+    preview = render_drawing(drawing, statistics=statistics)
+    (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
+    (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
     (folder / FILES["net"]).write_bytes(network.net_xml)
     (folder / FILES["lane_table"]).write_text(network.table.to_json(), encoding="utf-8")
     header = odr.header

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table import LaneTable
     from odscen.lanegraph.model import MapGraph
 
-BUILDER = "1"
+BUILDER = "2"
 """Raised whenever what a map folder contains changes; older folders are then rebuilt."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"

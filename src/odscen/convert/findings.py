@@ -1,4 +1,4 @@
-"""What the conversion report says after the network is there."""
+"""What the conversion report says: what became of lanes, connections, crosswalks and signals."""
 
 from __future__ import annotations
 
@@ -6,24 +6,28 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.convert.access import BICYCLE_TYPES, is_used
 from odscen.convert.report import Entry, Fate
-from odscen.convert.table_build import BICYCLE_TYPES
-from odscen.opendrive.model import DRIVABLE_TYPES, WALKABLE_TYPES
+from odscen.ids import LaneKey
+from odscen.opendrive.model import DRIVABLE_TYPES
+from odscen.opendrive.objects import is_crosswalk, signal_kind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from odscen.convert.crosswalks import PlacedCrosswalk
     from odscen.convert.lane_table import LaneTable
-    from odscen.convert.table_build import BuiltTable
+    from odscen.convert.net import Net
+    from odscen.convert.signals import Ruled
+    from odscen.convert.ways import Ways
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
-FAR = 0.25
-"""Metres between the lane centres that make an entry."""
 
-_USED = DRIVABLE_TYPES | WALKABLE_TYPES | BICYCLE_TYPES
+VARYING = 0.25
+"""Metres that a lane's width may differ from its SUMO lane's without an entry."""
 
 
 class Findings(NamedTuple):
@@ -33,110 +37,142 @@ class Findings(NamedTuple):
     figures: Mapping[str, float]
 
 
-def findings(odr: OpenDrive, table: RoadTable, built: BuiltTable) -> Findings:
-    """Compare the network with the map: lanes, connections, crosswalks, signals."""
-    lanes = list(_lanes(odr, table, built.table))
-    connections = list(_connections(built))
-    furniture, counts = _furniture(odr, built.table)
+def findings(
+    odr: OpenDrive,
+    table: RoadTable,
+    net: Net,
+    lanes: LaneTable,
+    found: Ways,
+    ruled: Ruled,
+    crosswalks: Sequence[PlacedCrosswalk],
+) -> Findings:
+    """Say what became of each element."""
+    entries = [
+        *_lanes(odr, table, lanes),
+        *_varying(table, lanes),
+        *(Entry(Fate.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
+        *_crosswalks(odr, crosswalks),
+        *_signals(odr, net, ruled),
+    ]
+    lengths = _lengths(odr, table, lanes)
     figures = {
-        **_lengths(odr, table, built.table),
-        "connections": float(built.wanted),
-        "connections_missing": float(len(built.missing)),
-        "connections_invented": float(len(built.invented)),
-        **counts,
+        **lengths,
+        "connections": float(len(found.ways)),
+        "connections_lost": float(len(found.lost)),
+        "crosswalks": float(len(crosswalks)),
+        "crossings": float(net.counts()["crossings"]),
+        "traffic_lights": float(len(net.lights)),
+        "signals": float(sum(len(road.signals) for road in odr.roads.values())),
+        "signals_unplaced": float(len(ruled.unplaced)),
+        "roundabouts": float(len(net.roundabouts)),
     }
-    return Findings(tuple(lanes + connections + furniture), figures)
+    return Findings((*_kept(lengths, found), *entries), figures)
+
+
+def _kept(lengths: Mapping[str, float], found: Ways) -> Iterator[Entry]:
+    """One line for each kind of thing of which there are thousands."""
+    for name, length in lengths.items():
+        if name.endswith("_length") and length > 0.0:
+            covered = lengths[name.replace("_length", "_covered")]
+            kind, where = name.removesuffix("_length").split("_")
+            reason = f"{covered:.0f} of {length:.0f} m of {kind} lanes lie on their centre lines"
+            yield Entry(Fate.KEPT, "junctions" if where == "junction" else "roads", reason)
+    if found.ways:
+        yield Entry(Fate.KEPT, "map", f"{len(found.ways)} connections between lanes")
 
 
 def _place(road: str, section: int, lane: int) -> str:
     return f"road {road} > laneSection {section} > lane {lane}"
 
 
-def _covered(lanes: LaneTable) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Metres of s of each lane of the table that have a SUMO lane."""
-    covered = np.zeros(len(lanes.lane_keys))
+def _covered(lanes: LaneTable) -> dict[object, float]:
+    """Metres of s of each lane that have a SUMO lane."""
+    covered: dict[object, float] = {}
     for span in lanes.spans:
-        covered[span.lane] += span.high - span.low
+        key = lanes.lane_keys[span.lane]
+        covered[key] = covered.get(key, 0.0) + span.high - span.low
     return covered
 
 
 def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Entry]:
     covered = _covered(lanes)
-    worst = np.zeros(len(lanes.lane_keys))
-    for span in lanes.spans:
-        piece = lanes.pieces[span.piece]
-        worst[span.lane] = max(worst[span.lane], float(piece.deviation.max()))
-    for row, key in enumerate(lanes.lane_keys):
-        at = table.lane_index[key]
-        if table.lane_type[at] in WALKABLE_TYPES and odr.roads[key.road].junction is not None:
-            continue  # persons cross junctions on walking areas, which have no lanes
-        length = float(table.lane_s1[at] - table.lane_s0[at])
-        gap = length - float(covered[row])
-        if gap > WORTH_TELLING:
-            reason = f"{gap:.2f} of {length:.2f} m have no SUMO lane"
-            yield Entry(Fate.LOST, _place(*key), reason)
-        elif worst[row] > FAR:
-            reason = f"SUMO's lane lies up to {worst[row]:.2f} m beside the lane's centre"
-            yield Entry(Fate.GUESSED, _place(*key), reason)
-    for at, key in enumerate(table.lane_keys):
-        if table.lane_type[at] not in _USED and table.lane_type[at] not in ("none", ""):
-            reason = f"lanes of type {table.lane_type[at]} are closed to everybody in SUMO"
+    for row, key in enumerate(table.lane_keys):
+        kind = table.lane_type[row]
+        if is_used(kind):
+            length = float(table.lane_s1[row] - table.lane_s0[row])
+            gap = length - covered.get(key, 0.0)
+            if gap > WORTH_TELLING:
+                where = "" if odr.roads[key.road].junction is None else " of a connecting road"
+                reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
+                yield Entry(Fate.LOST, _place(*key), reason)
+        elif kind not in ("none", ""):
+            reason = f"lanes of type {kind} are open to nobody and left out"
             yield Entry(Fate.LOST, f"road {key.road}", reason)
-
-
-def _connections(built: BuiltTable) -> Iterator[Entry]:
-    for one, other in built.missing:
-        reason = f"no connection to {_place(*other)} in SUMO"
-        yield Entry(Fate.LOST, _place(*one), reason)
-    for one, other in built.invented:
-        reason = f"SUMO connects it to {_place(*other)}, the map does not"
-        yield Entry(Fate.GUESSED, _place(*one), reason)
 
 
 def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, float]:
     covered = _covered(lanes)
     figures: dict[str, float] = {}
-    for row, key in enumerate(lanes.lane_keys):
-        at = table.lane_index[key]
-        if table.lane_type[at] in DRIVABLE_TYPES:
-            kind = "driving"
-        else:
-            kind = "walking" if table.lane_type[at] in WALKABLE_TYPES else "biking"
+    for row, key in enumerate(table.lane_keys):
+        lane_type = table.lane_type[row]
+        if not is_used(lane_type):
+            continue
+        kind = "driving" if lane_type in DRIVABLE_TYPES else "walking"
+        kind = "biking" if lane_type in BICYCLE_TYPES else kind
         where = "road" if odr.roads[key.road].junction is None else "junction"
-        name = f"{kind}_{where}"
-        length = float(table.lane_s1[at] - table.lane_s0[at])
-        figures[f"{name}_length"] = figures.get(f"{name}_length", 0.0) + length
-        figures[f"{name}_covered"] = figures.get(f"{name}_covered", 0.0) + float(covered[row])
+        length = float(table.lane_s1[row] - table.lane_s0[row])
+        for name, value in (("length", length), ("covered", covered.get(key, 0.0))):
+            name = f"{kind}_{where}_{name}"
+            figures[name] = figures.get(name, 0.0) + value
     return {name: round(value, 2) for name, value in sorted(figures.items())}
 
 
-def _furniture(odr: OpenDrive, lanes: LaneTable) -> tuple[list[Entry], dict[str, float]]:
-    entries: list[Entry] = []
-    crosswalks = sum(
-        thing.type == "crosswalk" for road in odr.roads.values() for thing in road.objects
-    )
-    crossings = lanes.counts["crossings"]
-    if crosswalks or crossings:
+def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[Entry]:
+    """SUMO lanes have one width; tell of lanes that differ from it."""
+    sumo = lanes.lane_list
+    for piece in lanes.pieces:
+        key = lanes.lane_keys[piece.lane]
+        width = sumo[piece.sumo].width
+        if not isinstance(key, LaneKey) or lanes.edges[sumo[piece.sumo].edge].function != "normal":
+            continue
+        row = table.lane_index[key]
+        if table.lane_type[row] not in DRIVABLE_TYPES:
+            continue
+        s = np.linspace(piece.s[0], piece.s[-1], 9)
+        true = table.lane_width(np.full(9, row), s)
+        low, high = float(true.min()), float(true.max())
+        if high - width > VARYING or width - low > VARYING:
+            reason = f"its width varies from {low:.2f} to {high:.2f} m, SUMO's is {width:.2f} m"
+            yield Entry(Fate.GUESSED, _place(*key), reason)
+
+
+def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[Entry]:
+    kept = {(one.crosswalk.road, one.crosswalk.object_id) for one in placed}
+    for road in odr.roads.values():
+        for thing in road.objects:
+            if not is_crosswalk(thing):
+                continue
+            element = f"road {road.id} > object {thing.id}"
+            if (road.id, thing.id) in kept:
+                yield Entry(Fate.KEPT, element, "crosswalk, as a crossing of its place and width")
+            else:
+                yield Entry(Fate.LOST, element, "crosswalk without any size")
+
+
+def _signals(odr: OpenDrive, net: Net, ruled: Ruled) -> Iterator[Entry]:
+    unplaced = dict(ruled.unplaced)
+    for road in odr.roads.values():
+        for signal in road.signals:
+            element = f"road {road.id} > signal {signal.id}"
+            kind = signal_kind(signal)
+            if element in unplaced:
+                yield Entry(Fate.LOST, element, unplaced[element])
+            elif kind in ("traffic_light", "stop", "yield"):
+                word = kind.replace("_", " ")
+                yield Entry(Fate.KEPT, element, f"{word}, as right of way in SUMO")
+    if net.lights:
         reason = (
-            f"{crossings} crossings were guessed from where sidewalks meet; the map has "
-            f"{crosswalks} crosswalks, whose places are not yet carried over"
+            f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "
+            "timing; no two movements that meet have green together"
         )
-        entries.append(Entry(Fate.GUESSED, "map", reason))
-    signals = [(road.id, signal) for road in odr.roads.values() for signal in road.signals]
-    dynamic = [signal for _, signal in signals if signal.dynamic]
-    if dynamic:
-        reason = (
-            f"{len(dynamic)} dynamic signals became {lanes.counts['tl_logics']} traffic lights "
-            "with programs of netconvert's own: OpenDRIVE has no timing"
-        )
-        entries.append(Entry(Fate.GUESSED, "map", reason))
-    static = len(signals) - len(dynamic)
-    if static:
-        reason = f"{static} static signals (stop, yield, speed) are not in the network"
-        entries.append(Entry(Fate.LOST, "map", reason))
-    return entries, {
-        "crosswalks": float(crosswalks),
-        "crossings": float(crossings),
-        "dynamic_signals": float(len(dynamic)),
-        "static_signals": float(static),
-    }
+        yield Entry(Fate.GUESSED, "map", reason)

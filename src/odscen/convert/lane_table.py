@@ -21,13 +21,13 @@ from odscen.errors import GraphFormatError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.ids import LaneKey, SumoEdgeId, SumoLaneId
+    from odscen.ids import LaneKey, Roadside, SumoEdgeId, SumoLaneId
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
-VERSION = 1
+VERSION = 2
 
 
 class SumoPlace(NamedTuple):
@@ -47,7 +47,7 @@ class SumoPlace(NamedTuple):
 class XodrPlace(NamedTuple):
     """A place on an OpenDRIVE lane; ``s`` and ``deviation`` in metres."""
 
-    lane: LaneKey
+    lane: LaneKey | Roadside
     s: float
     deviation: float
 
@@ -125,7 +125,7 @@ class LaneTable:
     Attributes
     ----------
     lane_keys
-        OpenDRIVE lanes, drivable, walkable and for bicycles.
+        OpenDRIVE lanes, drivable, walkable and for bicycles, and walks beside lanes.
     lanes
         All SUMO lanes by id, in the order of the file.
     edges
@@ -146,7 +146,7 @@ class LaneTable:
         Whether the network has heights.
     """
 
-    lane_keys: tuple[LaneKey, ...]
+    lane_keys: tuple[LaneKey | Roadside, ...]
     lanes: dict[SumoLaneId, SumoLane]
     edges: dict[SumoEdgeId, SumoEdge]
     links: tuple[SumoLink, ...]
@@ -160,7 +160,7 @@ class LaneTable:
 
     # Crossing over
 
-    def to_sumo(self, lane: LaneKey, s: float) -> SumoPlace | None:
+    def to_sumo(self, lane: LaneKey | Roadside, s: float) -> SumoPlace | None:
         """Find the SUMO place of road coordinate ``s`` on an OpenDRIVE lane, if there is one."""
         places = self.sumo_places((lane,), np.zeros(1, dtype=np.int32), np.array([s]))
         if places.lane[0] < 0:
@@ -187,7 +187,7 @@ class LaneTable:
         return XodrPlace(key, float(places.s[0]), float(places.deviation[0]))
 
     def sumo_places(
-        self, lane_keys: Sequence[LaneKey], lane: NDArray[np.integer[Any]], s: FloatArray
+        self, lane_keys: Sequence[LaneKey | Roadside], lane: NDArray[np.integer[Any]], s: FloatArray
     ) -> SumoPlaces:
         """Find SUMO places for many nodes.
 
@@ -261,7 +261,7 @@ class LaneTable:
         return {lane: row for row, lane in enumerate(self.lanes)}
 
     @cached_property
-    def key_row(self) -> dict[LaneKey, int]:
+    def key_row(self) -> dict[LaneKey | Roadside, int]:
         """Row of each OpenDRIVE lane."""
         return {key: row for row, key in enumerate(self.lane_keys)}
 

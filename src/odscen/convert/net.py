@@ -1,20 +1,21 @@
-"""A SUMO network read from its ``.net.xml``, with shapes moved into the OpenDRIVE frame.
+"""A SUMO network as it is written to ``.net.xml``.
 
-Source: sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html. Only what odscen needs is read; ids are
-kept as they are and never taken apart.
+Source: sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html. Lengths in metres, speeds in m/s, shapes
+in the OpenDRIVE frame: :attr:`Net.offset` is added when the file is written.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from lxml import etree
 from numpy.typing import NDArray
 
-from odscen.errors import NetconvertError
-from odscen.ids import SumoEdgeId, SumoLaneId
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from odscen.ids import SumoEdgeId, SumoLaneId
 
 FloatArray = NDArray[np.float64]
 
@@ -23,14 +24,11 @@ INTERNAL = "internal"
 CROSSING = "crossing"
 WALKING_AREA = "walkingarea"
 
+DIGITS = 4
+"""Decimals of lengths and positions in the file."""
 
-VCLASSES = frozenset(
-    {"private", "emergency", "authority", "army", "vip", "pedestrian", "passenger", "hov", "taxi"}
-    | {"bus", "coach", "delivery", "truck", "trailer", "motorcycle", "moped", "bicycle", "evehicle"}
-    | {"tram", "rail_urban", "rail", "rail_electric", "rail_fast", "ship", "container", "cable_car"}
-    | {"subway", "aircraft", "wheelchair", "scooter", "drone", "custom1", "custom2"}
-)
-"""SUMO's vehicle classes (sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html)."""
+VERSION = "1.20"
+"""Version of the network format."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,235 +40,270 @@ class NetLane:
     index
         0 is the outermost lane (the rightmost in right-hand traffic).
     length
-        ``length`` of the file, metres: what SUMO's positions run to, whatever the shape measures.
+        What SUMO's positions run to: one length for all lanes of an edge.
     allowed
-        Vehicle classes that may use the lane; ``None`` for all.
+        Vehicle classes that may use the lane.
     shape
-        Shape ``(K, 3)``, metres, OpenDRIVE frame (``netOffset`` taken away); z is 0 in flat nets.
+        Shape ``(K, 3)``; of walking areas and junctions the outline.
+    change_left, change_right
+        Whether road marks permit leaving the lane to that side.
+    xodr
+        OpenDRIVE lanes as ``road_lane``, for ``origId``.
     """
 
     id: SumoLaneId
-    edge: SumoEdgeId
     index: int
     length: float
     speed: float
     width: float
-    allowed: frozenset[str] | None
+    allowed: frozenset[str]
     shape: FloatArray
+    type: str = ""
+    change_left: bool = True
+    change_right: bool = True
+    xodr: tuple[str, ...] = ()
 
-    def allows(self, vclass: str) -> bool:
-        """Whether vehicles of a class may use the lane."""
-        return self.allowed is None or vclass in self.allowed
 
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class NetEdge:
-    """One ``<edge>``; ``function`` is normal, internal, crossing, walkingarea or connector."""
+    """One ``<edge>``; inner ones have neither ``start`` nor ``end`` (junctions)."""
 
     id: SumoEdgeId
     function: str
-    from_junction: str
-    to_junction: str
-    lanes: tuple[SumoLaneId, ...]
+    lanes: tuple[NetLane, ...]
+    start: str = ""
+    end: str = ""
+    name: str = ""
+    priority: int = 1
     crosses: tuple[SumoEdgeId, ...] = ()
 
-
-class NetConnection(NamedTuple):
-    """One ``<connection>``; ``via`` is the internal lane, ``tl`` the traffic light, or empty."""
-
-    from_lane: SumoLaneId
-    to_lane: SumoLaneId
-    via: SumoLaneId
-    tl: str
-    link_index: int
-    direction: str
+    @property
+    def length(self) -> float:
+        """Length of its lanes."""
+        return self.lanes[0].length
 
 
-class NetJunction(NamedTuple):
-    """One ``<junction>`` that is not internal."""
+@dataclass(frozen=True, slots=True)
+class NetLink:
+    """One ``<connection>`` between lanes given by edge and index."""
+
+    source: SumoEdgeId
+    target: SumoEdgeId
+    source_lane: int = 0
+    target_lane: int = 0
+    via: SumoLaneId | None = None
+    direction: str = "s"
+    state: str = "M"
+    light: str = ""
+    light_index: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Right of way of one link: which links it yields to and which it meets, by index."""
+
+    yields_to: frozenset[int]
+    foes: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetJunction:
+    """One ``<junction>``; ``outline`` has shape ``(K, 3)``.
+
+    The order of ``incoming`` and of the links that leave them is the order of ``inner`` and
+    ``requests``: SUMO counts on it.
+    """
 
     id: str
     type: str
-    x: float
-    y: float
+    place: tuple[float, float, float]
+    outline: FloatArray
+    incoming: tuple[SumoLaneId, ...] = ()
+    inner: tuple[SumoLaneId, ...] = ()
+    requests: tuple[Request, ...] = ()
+    xodr: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """One ``<phase>``: seconds, and a letter for each link of the light.
+
+    ``least`` and ``most`` bound a phase that vehicles may prolong; equal to ``duration`` otherwise.
+    """
+
+    duration: float
+    state: str
+    name: str = ""
+    least: float = 0.0
+    most: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficLight:
+    """One ``<tlLogic>``; ``signals`` are the OpenDRIVE signals behind each link."""
+
+    id: str
+    phases: tuple[Phase, ...]
+    type: str = "static"
+    offset: float = 0.0
+    program: str = "0"
+    signals: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """A SUMO network.
+    """A whole network, in the order in which it is written."""
 
-    Attributes
-    ----------
-    net_offset
-        SUMO position minus OpenDRIVE position, metres.
-    boundary
-        ``convBoundary``: x_min, y_min, x_max, y_max in SUMO's frame, metres.
-    tl_logics
-        Ids of the traffic-light programs.
-    """
-
-    net_offset: tuple[float, float]
-    boundary: tuple[float, float, float, float]
+    offset: tuple[float, float]
     lefthand: bool
-    edges: dict[SumoEdgeId, NetEdge]
-    lanes: dict[SumoLaneId, NetLane]
-    connections: tuple[NetConnection, ...]
-    junctions: dict[str, NetJunction]
-    tl_logics: tuple[str, ...]
+    edges: tuple[NetEdge, ...]
+    links: tuple[NetLink, ...]
+    junctions: tuple[NetJunction, ...]
+    lights: tuple[TrafficLight, ...] = ()
+    roundabouts: tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...] = ()
+    flat: bool = field(default=False)
 
-    @classmethod
-    def parse(cls, content: bytes) -> Net:
-        """Read a ``.net.xml``.
-
-        Raises
-        ------
-        NetconvertError
-            If it is not a complete SUMO network.
-        """
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
-        try:
-            root = etree.fromstring(content, parser)
-            return _read(root)
-        except (etree.XMLSyntaxError, LookupError, ValueError) as error:
-            msg = f"netconvert's network cannot be read: {type(error).__name__}: {error}"
-            raise NetconvertError(msg) from error
+    @property
+    def boundary(self) -> tuple[float, float, float, float]:
+        """x_min, y_min, x_max, y_max of all lanes in SUMO's frame."""
+        shapes = [lane.shape[:, :2] for edge in self.edges for lane in edge.lanes]
+        if not shapes:
+            return 0.0, 0.0, 0.0, 0.0
+        points = np.concatenate(shapes) + np.array(self.offset)
+        low, high = points.min(axis=0), points.max(axis=0)
+        x0, y0, x1, y1 = (round(float(v), DIGITS) for v in (*low, *high))
+        return x0, y0, x1, y1
 
     def counts(self) -> dict[str, int]:
         """Numbers for the catalogue; edges and lanes are those outside junctions."""
-        functions = [edge.function for edge in self.edges.values()]
+        functions = [edge.function for edge in self.edges]
         return {
             "edges": functions.count(NORMAL),
-            "lanes": sum(
-                len(edge.lanes) for edge in self.edges.values() if edge.function == NORMAL
-            ),
+            "lanes": sum(len(edge.lanes) for edge in self.edges if edge.function == NORMAL),
             "junctions": len(self.junctions),
-            "tl_logics": len(self.tl_logics),
+            "tl_logics": len(self.lights),
             "crossings": functions.count(CROSSING),
             "walking_areas": functions.count(WALKING_AREA),
         }
 
+    def to_xml(self) -> bytes:
+        """Text of ``net.net.xml``; the same network gives the same bytes."""
+        x0, y0, x1, y1 = self.boundary
+        offset = f"{self.offset[0]:.2f},{self.offset[1]:.2f}"
+        lines = [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            f'<net version="{VERSION}" junctionCornerDetail="5"'
+            + (' lefthand="true"' if self.lefthand else "")
+            + (' walkingareas="true"' if self.counts()["walking_areas"] else "")
+            + ' limitTurnSpeed="5.50">',
+            f'    <location netOffset="{offset}" convBoundary="{x0},{y0},{x1},{y1}"'
+            ' origBoundary="-10000000000.00,-10000000000.00,10000000000.00,10000000000.00"'
+            ' projParameter="!"/>',
+        ]
+        inner = [edge for edge in self.edges if edge.function != NORMAL]
+        outer = [edge for edge in self.edges if edge.function == NORMAL]
+        for edge in (*inner, *outer):
+            lines += self._edge(edge)
+        for light in self.lights:
+            lines += _light(light)
+        for junction in self.junctions:
+            lines += self._junction(junction)
+        lines += [_link(link) for link in self.links]
+        for nodes, edges in self.roundabouts:
+            lines.append(f'    <roundabout nodes="{" ".join(nodes)}" edges="{" ".join(edges)}"/>')
+        lines += ["</net>", ""]
+        return "\n".join(lines).encode()
 
-def _read(root: etree._Element) -> Net:
-    location = root.find("location")
-    if location is None:
-        msg = "<location> is missing"
-        raise ValueError(msg)
-    offset = [float(value) for value in _text(location, "netOffset").split(",")]
-    bounds = [float(value) for value in _text(location, "convBoundary").split(",")]
-    edges, lanes = _edges(root, (offset[0], offset[1]))
-    junctions = [
-        NetJunction(_text(e, "id"), _text(e, "type"), float(_text(e, "x")), float(_text(e, "y")))
-        for e in root.iterfind("junction")
-        if e.get("type") != INTERNAL
-    ]
-    return Net(
-        net_offset=(offset[0], offset[1]),
-        boundary=(bounds[0], bounds[1], bounds[2], bounds[3]),
-        lefthand=root.get("lefthand") == "true",
-        edges=edges,
-        lanes=lanes,
-        connections=tuple(_connections(root, edges)),
-        junctions={junction.id: junction for junction in junctions},
-        tl_logics=tuple(dict.fromkeys(_text(e, "id") for e in root.iterfind("tlLogic"))),
+    def _edge(self, edge: NetEdge) -> Iterator[str]:
+        ends = f' from="{edge.start}" to="{edge.end}"' if edge.function == NORMAL else ""
+        kind = f' function="{edge.function}"' if edge.function != NORMAL else ""
+        rank = f' priority="{edge.priority}"' if edge.function == NORMAL else ""
+        name = f' name="{_quoted(edge.name)}"' if edge.name else ""
+        crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
+        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}>'
+        for lane in edge.lanes:
+            change = "" if lane.change_left else ' changeLeft="emergency"'
+            change += "" if lane.change_right else ' changeRight="emergency"'
+            kind = f' type="{lane.type}"' if lane.type else ""
+            text = (
+                f'        <lane id="{lane.id}" index="{lane.index}"'
+                f' allow="{" ".join(sorted(lane.allowed))}"{change} speed="{lane.speed:.2f}"'
+                f' length="{lane.length:.{DIGITS}f}" width="{lane.width:.2f}"{kind}'
+                f' shape="{self._shape(lane.shape)}"'
+            )
+            if lane.xodr:
+                yield text + ">"
+                yield f'            <param key="origId" value="{_quoted(" ".join(lane.xodr))}"/>'
+                yield "        </lane>"
+            else:
+                yield text + "/>"
+        yield "    </edge>"
+
+    def _junction(self, junction: NetJunction) -> Iterator[str]:
+        x, y = junction.place[0] + self.offset[0], junction.place[1] + self.offset[1]
+        z = "" if self.flat else f' z="{junction.place[2]:.{DIGITS}f}"'
+        text = (
+            f'    <junction id="{junction.id}" type="{junction.type}" x="{x:.{DIGITS}f}"'
+            f' y="{y:.{DIGITS}f}"{z} incLanes="{" ".join(junction.incoming)}"'
+            f' intLanes="{" ".join(junction.inner)}" shape="{self._shape(junction.outline)}"'
+        )
+        if not junction.requests and not junction.xodr:
+            yield text + "/>"
+            return
+        yield text + ">"
+        count = len(junction.requests)
+        for index, request in enumerate(junction.requests):
+            yield (
+                f'        <request index="{index}" response="{_bits(request.yields_to, count)}"'
+                f' foes="{_bits(request.foes, count)}" cont="0"/>'
+            )
+        if junction.xodr:
+            yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'
+        yield "    </junction>"
+
+    def _shape(self, shape: FloatArray) -> str:
+        points = shape + np.array([*self.offset, 0.0])
+        if self.flat:
+            return " ".join([f"{x:.4f},{y:.4f}" for x, y, _ in points.tolist()])
+        return " ".join([f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()])
+
+
+def _link(link: NetLink) -> str:
+    via = f' via="{link.via}"' if link.via else ""
+    light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
+    return (
+        f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
+        f' toLane="{link.target_lane}"{via}{light} dir="{link.direction}" state="{link.state}"/>'
     )
 
 
-def _text(element: etree._Element, name: str) -> str:
-    value = element.get(name)
-    if value is None:
-        msg = f"attribute {name} of <{element.tag}> is missing"
-        raise KeyError(msg)
-    return value
+def _light(light: TrafficLight) -> Iterator[str]:
+    yield (
+        f'    <tlLogic id="{light.id}" type="{light.type}" programID="{light.program}"'
+        f' offset="{light.offset:g}">'
+    )
+    for phase in light.phases:
+        bounds = ""
+        if light.type == "actuated" and phase.most > phase.least:
+            bounds = f' minDur="{phase.least:g}" maxDur="{phase.most:g}"'
+        name = f' name="{_quoted(phase.name)}"' if phase.name else ""
+        yield f'        <phase duration="{phase.duration:g}" state="{phase.state}"{bounds}{name}/>'
+    for index, signals in enumerate(light.signals):
+        if signals:
+            value = _quoted(" ".join(signals))
+            yield f'        <param key="linkSignalID:{index}" value="{value}"/>'
+    yield "    </tlLogic>"
 
 
-def _allowed(allow: str | None, disallow: str | None) -> frozenset[str] | None:
-    """Vehicle classes by the attributes ``allow`` and ``disallow``; without both everybody."""
-    if allow is not None:
-        classes = frozenset(allow.split())
-        return None if "all" in classes else classes
-    if disallow is not None:
-        classes = frozenset(disallow.split())
-        return frozenset() if "all" in classes else VCLASSES - classes
-    return None
+def _bits(indices: Iterable[int], count: int) -> str:
+    """Indices as SUMO writes them: the last letter is link 0."""
+    letters = ["0"] * count
+    for index in indices:
+        letters[count - 1 - index] = "1"
+    return "".join(letters)
 
 
-def _edges(
-    root: etree._Element, offset: tuple[float, float]
-) -> tuple[dict[SumoEdgeId, NetEdge], dict[SumoLaneId, NetLane]]:
-    edges: dict[SumoEdgeId, NetEdge] = {}
-    elements: list[tuple[SumoEdgeId, etree._Element]] = []
-    for element in root.iterfind("edge"):
-        edge_id = SumoEdgeId(_text(element, "id"))
-        own = element.findall("lane")
-        elements.extend((edge_id, lane) for lane in own)
-        edges[edge_id] = NetEdge(
-            edge_id,
-            element.get("function", NORMAL),
-            element.get("from", ""),
-            element.get("to", ""),
-            tuple(SumoLaneId(_text(lane, "id")) for lane in own),
-            tuple(SumoEdgeId(crossed) for crossed in element.get("crossingEdges", "").split()),
-        )
-    shapes = _shapes([_text(lane, "shape") for _, lane in elements], offset)
-    permissions: dict[tuple[str | None, str | None], frozenset[str] | None] = {}
-    lanes: dict[SumoLaneId, NetLane] = {}
-    for (edge_id, lane), shape in zip(elements, shapes, strict=True):
-        given = (lane.get("allow"), lane.get("disallow"))
-        if given not in permissions:
-            permissions[given] = _allowed(*given)
-        lane_id = SumoLaneId(_text(lane, "id"))
-        lanes[lane_id] = NetLane(
-            lane_id,
-            edge_id,
-            int(_text(lane, "index")),
-            float(_text(lane, "length")),
-            float(_text(lane, "speed")),
-            float(lane.get("width", "3.2")),
-            permissions[given],
-            shape,
-        )
-    return edges, lanes
-
-
-def _shapes(texts: list[str], offset: tuple[float, float]) -> list[FloatArray]:
-    """Shapes from their texts, all numbers in one go: a town has some 100,000 of them."""
-    texts = [_even(text) for text in texts]
-    counts = [text.count(" ") + 1 for text in texts]
-    widths = [text.count(",") // count + 1 for text, count in zip(texts, counts, strict=True)]
-    numbers = np.fromstring(" ".join(texts).replace(",", " "), sep=" ", dtype=np.float64)
-    if not np.isfinite(numbers).all():
-        msg = "a lane's shape is not finite"
-        raise ValueError(msg)
-    shapes: list[FloatArray] = []
-    start = 0
-    for count, width in zip(counts, widths, strict=True):
-        shape = np.zeros((count, 3))
-        shape[:, :width] = numbers[start : start + count * width].reshape(count, width)
-        shape[:, :2] -= offset
-        shapes.append(shape)
-        start += count * width
-    return shapes
-
-
-def _even(text: str) -> str:
-    """Write out heights of zero, which SUMO leaves out even within a shape."""
-    if text.count(",") % (text.count(" ") + 1) == 0:
-        return text
-    return " ".join(f"{p},0" if p.count(",") == 1 else p for p in text.split(" "))
-
-
-def _connections(root: etree._Element, edges: dict[SumoEdgeId, NetEdge]) -> list[NetConnection]:
-    def lane(edge: str, index: str) -> SumoLaneId:
-        return edges[SumoEdgeId(edge)].lanes[int(index)]
-
-    return [
-        NetConnection(
-            lane(_text(e, "from"), _text(e, "fromLane")),
-            lane(_text(e, "to"), _text(e, "toLane")),
-            SumoLaneId(e.get("via", "")),
-            e.get("tl", ""),
-            int(e.get("linkIndex", "-1")),
-            e.get("dir", ""),
-        )
-        for e in root.iterfind("connection")
-    ]
+def _quoted(text: str) -> str:
+    for sign, entity in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
+        text = text.replace(sign, entity)
+    return "".join(c if c.isprintable() else " " for c in text)

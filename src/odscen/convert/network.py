@@ -1,40 +1,60 @@
-"""From a road model to a SUMO network, the lane table and the conversion report."""
+"""From a road model to a SUMO network, the lane table and the conversion report.
+
+The network is written by odscen itself, lane by lane from the road model; why not by netconvert:
+``docs/decisions/0003-writing-the-network.md``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.convert.access import speed as lane_speed
+from odscen.convert.courses import evaluate
+from odscen.convert.crosswalks import place_crosswalks
+from odscen.convert.edges import plan_edges
 from odscen.convert.findings import findings
-from odscen.convert.net import Net
-from odscen.convert.netconvert import read_map, run_netconvert, stage
-from odscen.convert.prepare import prepare_for_netconvert
-from odscen.convert.recipe import TYPEMAP_FILE, ladder, typemap
+from odscen.convert.junctions import Passage, Surroundings, build_junction, outline
+from odscen.convert.net import NORMAL, Net, NetEdge, NetJunction, NetLane
+from odscen.convert.nodes import find_nodes, plain_ids
 from odscen.convert.report import ConversionReport, Entry, Fate
-from odscen.convert.shapes import exact_net, rewrite_shapes
-from odscen.convert.table_build import build_lane_table
-from odscen.errors import NetconvertError, in_file
+from odscen.convert.right_of_way import Movement, wrapped
+from odscen.convert.rings import find_rings
+from odscen.convert.signals import rule
+from odscen.convert.table_build import build_table
+from odscen.convert.walks import build_walks
+from odscen.convert.ways import find_ways
+from odscen.ids import SumoEdgeId, SumoLaneId
 from odscen.opendrive.topology import lane_successors
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Sequence
 
+    from odscen.convert.courses import Course, Line
+    from odscen.convert.junctions import BuiltJunction
     from odscen.convert.lane_table import LaneTable
-    from odscen.convert.netconvert import NetconvertResult
+    from odscen.convert.nodes import Nodes
+    from odscen.convert.signals import Ruled
+    from odscen.convert.walks import WalkNet
+    from odscen.convert.ways import Way, Ways
+    from odscen.lanegraph.model import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive
 
-INPUT_FILE = "input.xodr"
+FloatArray = NDArray[np.float64]
 
-LEAST_SECONDS = 2.0
-SECONDS_PER_MEGABYTE = 8.0
-MOST_SECONDS = 60.0
-"""Computing time of one netconvert run. Towns of 3 MB take 0.4 s; a small file that takes longer
-than two seconds is one that netconvert will not finish. Later rungs get half."""
+LEAST_LENGTH = 0.1
+"""Metres of a lane, at least, as SUMO wants it."""
 
-MEMORY = 768 << 20
-MEMORY_PER_MEGABYTE = 64 << 20
-"""Bytes of data; towns of 3 MB take less than 0.2 GB of it."""
+SIDEWAYS = 5.5
+"""m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""
+
+LEAST_TURN_SPEED = 2.0
+"""m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,72 +66,281 @@ class SumoNetwork:
     report: ConversionReport
 
 
-def build_network(odr: OpenDrive, table: RoadTable, xodr: Path, workdir: Path) -> SumoNetwork:
-    """Convert a map with netconvert and relate the two.
+def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> SumoNetwork:
+    """Make the SUMO network of a map.
 
     Parameters
     ----------
     odr, table
-        The road model of the file ``xodr``, and its evaluation.
-    workdir
-        An existing folder to work in; what is left in it is of no use afterwards.
-
-    Raises
-    ------
-    NetconvertError
-        If netconvert fails on every rung of the ladder; ends with its words on the last.
-    MissingDependencyError
-        If netconvert is not installed.
+        The road model and its evaluation.
+    walks
+        The pedestrian graph of the map.
     """
-    content = read_map(xodr)
-    with in_file(xodr.name):
-        prepared, repairs = prepare_for_netconvert(content)
-    converted, steps = _climb(prepared, workdir, lefthand=odr.rule == "LHT")
-    net = Net.parse(converted.net_xml)
+    lefthand = _keeps_left(table)
     successors = lane_successors(odr)
-    drawn = build_lane_table(net, odr, table, successors)
-    net = exact_net(net, drawn.table, table)
-    built = build_lane_table(net, odr, table, successors)
-    net_xml = rewrite_shapes(converted.net_xml, net)
-    found = findings(odr, table, built)
+    crosswalks, gaps = place_crosswalks(odr, table)
+    plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
+    found = find_ways(odr, table, successors, plans)
+    nodes = find_nodes(odr, table, found, gaps, crosswalks)
+    on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
+    builder = _Builder(odr, table, found, nodes, on_foot, lefthand=lefthand)
+    net = builder.net()
+    lanes = build_table(net, table, builder.laid(), on_foot)
+    entries, figures = findings(odr, table, net, lanes, found, builder.ruled, crosswalks)
     notes = [Entry(Fate.REPAIRED, *_split(note)) for note in odr.notes]
-    report = ConversionReport.of([*notes, *repairs, *steps, *found.entries], found.figures)
-    return SumoNetwork(net_xml, built.table, report)
-
-
-def _climb(
-    prepared: bytes, workdir: Path, *, lefthand: bool
-) -> tuple[NetconvertResult, list[Entry]]:
-    """Try the rungs from best to plainest; say which were needed."""
-    path = stage(workdir, {TYPEMAP_FILE: typemap().encode(), INPUT_FILE: prepared}) / INPUT_FILE
-    megabytes = len(prepared) / 1e6
-    full_time = min(MOST_SECONDS, LEAST_SECONDS + SECONDS_PER_MEGABYTE * megabytes)
-    time_limit = full_time
-    memory = MEMORY + int(MEMORY_PER_MEGABYTE * megabytes)
-    steps: list[Entry] = []
-    failure: NetconvertError | None = None
-    for rung in ladder(lefthand=lefthand):
-        if failure is not None:
-            time_limit = max(0.5 * full_time, 1.0)
-            reason = f"{rung.gives_up}, because {_first_line(failure)}"
-            steps.append(Entry(Fate.LOST, "netconvert", reason))
-        try:
-            result = run_netconvert(path, rung.options, time_limit=time_limit, memory_limit=memory)
-        except NetconvertError as error:
-            failure = error
-            continue
-        said = [Entry(Fate.GUESSED, "netconvert", text) for text in result.messages]
-        return result, steps + said
-    assert failure is not None
-    raise failure
-
-
-def _first_line(error: NetconvertError) -> str:
-    lines = [line for line in str(error).splitlines() if line.strip()]
-    return "; ".join(lines[:2])
+    report = ConversionReport.of([*notes, *entries], figures)
+    return SumoNetwork(net.to_xml(), lanes, report)
 
 
 def _split(note: str) -> tuple[str, str]:
     """Divide a note of the parser into element and reason."""
     element, mark, reason = note.partition(": ")
     return (element, reason) if mark else ("map", note)
+
+
+def _keeps_left(table: RoadTable) -> bool:
+    """Whether most of the roads, by length, keep left: SUMO's networks know only one side."""
+    if not len(table.road_length):
+        return False
+    return float(table.road_length[~table.road_rht].sum()) > float(table.road_length.sum()) / 2.0
+
+
+class _Builder:
+    """Puts the parts together; the order of everything follows from the order of the file."""
+
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        found: Ways,
+        nodes: Nodes,
+        walks: WalkNet,
+        *,
+        lefthand: bool,
+    ) -> None:
+        self._odr = odr
+        self._table = table
+        self._edges = found.edges
+        self._ways = found.ways
+        self._nodes = nodes
+        self._walks = walks
+        self._lefthand = lefthand
+        courses = [lane.course for edge in self._edges for lane in edge.lanes]
+        lines = evaluate([*courses, *(way.course for way in self._ways)], table)
+        self._lane_lines: list[list[Line]] = []
+        start = 0
+        for edge in self._edges:
+            self._lane_lines.append(lines[start : start + len(edge.lanes)])
+            start += len(edge.lanes)
+        self._way_lines = lines[start:]
+        self._ids = self._edge_ids()
+        self._net_edges = [self._edge(number) for number in range(len(self._edges))]
+        self._by_node: dict[str, list[int]] = {}
+        for number, way in enumerate(self._ways):
+            self._by_node.setdefault(nodes.ends[way.source], []).append(number)
+        self._rings = find_rings(
+            self._edges, self._ways, self._lane_lines, self._way_lines, lefthand=lefthand
+        )
+        self._ring_edges = {edge for ring in self._rings for edge in ring}
+        self._controllers = {
+            signal: controller.id
+            for controller in odr.controllers.values()
+            for signal, _ in controller.controls
+        }
+        self.ruled = self._rule()
+        self._via: dict[int, NetLane] = {}
+
+    def laid(self) -> list[tuple[NetLane, Line, Course]]:
+        """SUMO lanes with the lines and the courses that they are laid on."""
+        found = []
+        for number, edge in enumerate(self._edges):
+            for index, lane in enumerate(edge.lanes):
+                line = self._lane_lines[number][index]
+                found.append((self._net_edges[number].lanes[index], line, lane.course))
+        for number, lane in sorted(self._via.items()):
+            found.append((lane, self._way_lines[number], self._ways[number].course))
+        return found
+
+    def net(self) -> Net:
+        """Assemble everything."""
+        built = [self._junction(name) for name in self._names()]
+        walks = self._walks
+        shapes = [lane.shape for edge in self._net_edges for lane in edge.lanes]
+        shapes += [walk.line.shape for walk in walks.lanes]
+        points = np.concatenate(shapes) if shapes else np.zeros((1, 3))
+        low = points.min(axis=0)
+        inner = [edge for part in built for edge in part.inner]
+        return Net(
+            offset=(-math.floor(float(low[0])) + 0.0, -math.floor(float(low[1])) + 0.0),
+            lefthand=self._lefthand,
+            edges=(*inner, *walks.areas, *self._net_edges, *(walk.edge for walk in walks.lanes)),
+            links=(*(link for part in built for link in part.links), *walks.links),
+            junctions=(*(part.junction for part in built), *self._walk_junctions()),
+            lights=tuple(part.light for part in built if part.light),
+            roundabouts=self._roundabouts(),
+            flat=not points[:, 2].any(),
+        )
+
+    def _names(self) -> list[str]:
+        nodes = self._nodes
+        return list(dict.fromkeys((*nodes.starts, *nodes.ends, *nodes.crosswalks)))
+
+    # Junctions
+
+    def _junction(self, name: str) -> BuiltJunction:
+        numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._ways[n][:4])
+        crossings = self._walks.crossings.get(name, ())
+        ends = [n for n, node in enumerate(self._nodes.ends) if node == name]
+        built = build_junction(
+            name, [self._passage(n) for n in numbers], crossings, self._around(name, ends)
+        )
+        for number, lane in zip(numbers, built.lanes, strict=True):
+            self._via[number] = lane
+        return built
+
+    def _around(self, name: str, ends: Sequence[int]) -> Surroundings:
+        starts = [n for n, node in enumerate(self._nodes.starts) if node == name]
+        lanes = [
+            (lane.shape, lane.width, is_end)
+            for edges, is_end in ((ends, True), (starts, False))
+            for edge in edges
+            for lane in self._net_edges[edge].lanes
+        ]
+        crossings = self._walks.crossings.get(name, ())
+        lanes += [(c.walkway.axis, c.walkway.width, which) for c in crossings for which in (True, False)]
+        shape = outline(lanes)
+        walked = [
+            walk.edge.lanes[0].id for walk in self._walks.lanes if walk.edge.end == name
+        ]
+        incoming = [lane.id for edge in ends for lane in self._net_edges[edge].lanes]
+        x, y, z = (float(value) for value in shape.mean(axis=0))
+        junctions = self._nodes.xodr.get(name, ())
+        return Surroundings(
+            (x, y, z),
+            shape,
+            (*incoming, *walked),
+            frozenset(
+                (str(priority.high), str(priority.low))
+                for junction in junctions
+                for priority in self._odr.junctions[junction].priorities
+            ),
+            self._controllers,
+            self._lefthand,
+            " ".join(junctions),
+        )
+
+    def _passage(self, number: int) -> Passage:
+        way, line = self._ways[number], self._way_lines[number]
+        source = self._net_edges[way.source].lanes[way.source_lane]
+        target = self._net_edges[way.target].lanes[way.target_lane]
+        before = self._lane_lines[way.source][way.source_lane]
+        after = self._lane_lines[way.target][way.target_lane]
+        table = self._table
+        roads = [table.road_ids[table.lane_road[stretch.row]] for stretch in way.course]
+        movement = Movement(
+            source=(self._ids[way.source], way.source_lane),
+            target=(self._ids[way.target], way.target_lane),
+            shape=line.shape,
+            width=min(source.width, target.width),
+            heading_in=before.headings()[1],
+            heading_out=after.headings()[0],
+            speed=source.speed,
+            sign=self.ruled.signs[number],
+            ring=way.source in self._ring_edges,
+            roads=frozenset(str(road) for road in roads),
+        )
+        return Passage(
+            movement,
+            line.length,
+            self._speed(way, line, min(source.speed, target.speed)),
+            source.allowed & target.allowed,
+            source.type,
+            self._origins(way.course),
+            self.ruled.lights[number],
+        )
+
+    def _speed(self, way: Way, line: Line, around: float) -> float:
+        """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
+        table = self._table
+        rows = np.array([stretch.row for stretch in way.course])
+        middle = np.array([(stretch.start + stretch.end) / 2.0 for stretch in way.course])
+        limits = table.speed_limit(rows, middle)
+        own = [
+            lane_speed(float(limit), table.lane_type[row], "")
+            for limit, row in zip(limits, rows, strict=True)
+            if not math.isnan(limit)
+        ]
+        speed = min(own) if own else around
+        turn = abs(wrapped(line.headings()[1] - line.headings()[0]))
+        if turn > 0.1:
+            speed = min(speed, math.sqrt(SIDEWAYS * line.length / turn))
+        return round(max(speed, LEAST_TURN_SPEED), 2)
+
+    # Edges
+
+    def _edge_ids(self) -> list[SumoEdgeId]:
+        wanted = [
+            f"{self._table.road_ids[edge.road]}.{edge.stretch}.{'f' if edge.forward else 'b'}"
+            for edge in self._edges
+        ]
+        taken = plain_ids(wanted)
+        return [SumoEdgeId(taken[name]) for name in wanted]
+
+    def _edge(self, number: int) -> NetEdge:
+        plan, lines = self._edges[number], self._lane_lines[number]
+        length = max(float(np.mean([line.length for line in lines])), LEAST_LENGTH)
+        edge = self._ids[number]
+        lanes = tuple(
+            NetLane(
+                SumoLaneId(f"{edge}_{index}"),
+                index,
+                round(length, 4),
+                lane.speed,
+                round(max(line.widths[1], 0.5), 2),
+                lane.allowed,
+                line.shape,
+                lane.type,
+                lane.change_left,
+                lane.change_right,
+                self._origins(lane.course),
+            )
+            for index, (lane, line) in enumerate(zip(plan.lanes, lines, strict=True))
+        )
+        road = self._odr.roads[self._table.road_ids[plan.road]]
+        start, end = self._nodes.starts[number], self._nodes.ends[number]
+        return NetEdge(edge, NORMAL, lanes, start, end, road.name)
+
+    def _origins(self, course: Course) -> tuple[str, ...]:
+        keys = [self._table.lane_keys[stretch.row] for stretch in course]
+        return tuple(dict.fromkeys(f"{key.road}_{key.lane}" for key in keys))
+
+    def _roundabouts(self) -> tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...]:
+        return tuple(
+            (
+                tuple(dict.fromkeys(self._nodes.ends[edge] for edge in ring)),
+                tuple(self._ids[edge] for edge in ring),
+            )
+            for ring in self._rings
+        )
+
+    # Signals
+
+    def _rule(self) -> Ruled:
+        crossed = set(self._nodes.crosswalks)
+
+        def is_junction(edge: int) -> bool:
+            node = self._nodes.ends[edge]
+            return node in self._nodes.xodr or node in crossed
+
+        return rule(self._odr, self._table, self._edges, self._ways, is_junction)
+
+    # Persons
+
+    def _walk_junctions(self) -> list[NetJunction]:
+        known = {name: [] for name in (j.id for j in self._walks.junctions)}
+        for walk in self._walks.lanes:
+            if walk.edge.end in known:
+                known[walk.edge.end].append(walk.edge.lanes[0].id)
+        return [replace(j, incoming=tuple(known[j.id])) for j in self._walks.junctions]
+
+

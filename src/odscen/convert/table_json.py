@@ -8,7 +8,7 @@ import numpy as np
 
 from odscen.convert.lane_table import VERSION, LaneTable, SumoEdge, SumoLane, SumoLink
 from odscen.convert.pieces import Piece
-from odscen.ids import LaneKey, RoadId, SumoEdgeId, SumoLaneId
+from odscen.ids import LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
 
 _DIGITS = 4
 
@@ -70,7 +70,8 @@ def from_data(data: dict[str, Any]) -> LaneTable:
     lanes = _lanes(data["lanes"], lane_ids, edge_ids, data["classes"])
     return LaneTable(
         lane_keys=tuple(
-            LaneKey(RoadId(road), section, lane) for road, section, lane in data["lane_keys"]
+            Roadside(RoadId(road), section, lane) if beside else LaneKey(RoadId(road), section, lane)
+            for road, section, lane, *beside in data["lane_keys"]
         ),
         lanes=lanes,
         edges=_edges(data["edges"], edge_ids, lanes),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.ids import Roadside
 from odscen.lanegraph.model import Relation
 from odscen.sumo.network import Link, NetLane, RoadNet
 from odscen.sumo.routes import Places
@@ -67,14 +68,16 @@ class SumoMap:
         """Bring graph and lane table together."""
         lanes, walks = graph.lanes, graph.walks
         net = _road_net(table)
+        walk_keys = [
+            Roadside(*key) if beside else key
+            for key, beside in zip(walks.lane_keys, walks.roadside, strict=True)
+        ]
         places = _places(table, lanes.lanes.keys, lanes.lane, lanes.s, lanes.x, lanes.y)
         return cls(
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
-            walk_places=_all_scaled(
-                _places(table, walks.lane_keys, walks.lane, walks.s, walks.x, walks.y)
-            ),
+            walk_places=_all_scaled(_places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)),
             net_offset=table.net_offset,
             elevation=table.elevation,
         )
@@ -82,7 +85,7 @@ class SumoMap:
 
 def _places(
     table: LaneTable,
-    keys: Sequence[LaneKey],
+    keys: Sequence[LaneKey | Roadside],
     lane: IntArray,
     s: FloatArray,
     x: FloatArray,

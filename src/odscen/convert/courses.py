@@ -1,0 +1,172 @@
+"""Courses: what SUMO lanes are laid on, stretch by stretch of OpenDRIVE lanes.
+
+A course becomes the shape of a SUMO lane, and the pieces of the lane table, in one pass for all
+lanes of a map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.opendrive.lanes import RoadTable
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+CHORD_ERROR = 0.01
+"""Metres between a lane's centre line and its shape, at most."""
+
+DENSE = 0.5
+"""Metres between the places from which the vertices of a shape are chosen."""
+
+MOST_PLACES = 2_000_000
+"""Maps with more than 1,000 km of lanes are sampled less densely."""
+
+_LEAST = 1e-3
+"""Metres between vertices."""
+
+
+class Stretch(NamedTuple):
+    """Part of an OpenDRIVE lane (a row of the road table) in the direction that it is gone along.
+
+    ``at`` says where across the lane: 0.5 is its centre, 1 its outer border; ``beside`` adds metres
+    outwards from there.
+    """
+
+    row: int
+    start: float
+    end: float
+    at: float = 0.5
+    beside: float = 0.0
+
+    @property
+    def extent(self) -> float:
+        """Metres of s."""
+        return abs(self.end - self.start)
+
+
+Course = tuple[Stretch, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A course evaluated.
+
+    Attributes
+    ----------
+    shape
+        Shape ``(K, 3)``: vertices within :data:`CHORD_ERROR` of the lanes' centres.
+    length
+        Metres along ``shape``.
+    arc, s
+        For each stretch of the course: metres along the line at its sampled places, and their road
+        coordinates.
+    widths
+        Smallest, median and largest width of the lanes, metres.
+    """
+
+    shape: FloatArray
+    length: float
+    arc: tuple[FloatArray, ...]
+    s: tuple[FloatArray, ...]
+    widths: tuple[float, float, float]
+
+    def headings(self) -> tuple[float, float]:
+        """Direction at both ends, radians."""
+        first, last = self.shape[1] - self.shape[0], self.shape[-1] - self.shape[-2]
+        return float(np.arctan2(first[1], first[0])), float(np.arctan2(last[1], last[0]))
+
+
+def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
+    """Evaluate courses; each must be longer than a millimetre."""
+    if not courses:
+        return []
+    flat = [stretch for course in courses for stretch in course]
+    rows = np.array([stretch.row for stretch in flat], dtype=np.int64)
+    start = np.array([stretch.start for stretch in flat])
+    end = np.array([stretch.end for stretch in flat])
+    step = max(DENSE, float(np.abs(end - start).sum()) / MOST_PLACES)
+    counts = np.maximum(1, np.ceil(np.abs(end - start) / step)).astype(np.intp) + 1
+    first = np.concatenate(([0], np.cumsum(counts))).astype(np.intp)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    share = (np.arange(first[-1]) - first[owner]) / (counts[owner] - 1)
+    s = start[owner] + share * (end - start)[owner]
+    found = table.lane_points(rows[owner], s, at=np.array([x.at for x in flat])[owner])
+    out = np.array([x.beside for x in flat])[owner] * np.sign(table.lane_id[rows[owner]])
+    x, y = found.x - out * np.sin(found.hdg), found.y + out * np.cos(found.hdg)
+    points = np.column_stack((x, y, found.z))
+    of_course = np.concatenate(([0], np.cumsum([len(course) for course in courses])))
+    bounds = first[of_course]
+    shapes = thinned([_distinct(points[a:b]) for a, b in pairwise(bounds)])
+    lines: list[Line] = []
+    for number, shape in enumerate(shapes):
+        a, b = bounds[number], bounds[number + 1]
+        steps = np.sqrt((np.diff(points[a:b], axis=0) ** 2).sum(axis=1))
+        arc = np.concatenate(([0.0], np.cumsum(steps)))
+        length = drawn_length(shape)
+        arc *= length / max(arc[-1], 1e-9)
+        cuts = first[of_course[number] + 1 : of_course[number + 1]] - a
+        width = found.width[a:b]
+        lines.append(
+            Line(
+                shape,
+                length,
+                tuple(np.split(arc, cuts)),
+                tuple(np.split(s[a:b], cuts)),
+                (float(width.min()), float(np.median(width)), float(width.max())),
+            )
+        )
+    return lines
+
+
+def drawn_length(shape: FloatArray) -> float:
+    """Length of a shape in space, as SUMO measures it."""
+    return float(np.sqrt((np.diff(shape, axis=0) ** 2).sum(axis=1)).sum())
+
+
+def _distinct(shape: FloatArray) -> FloatArray:
+    """Drop vertices on top of the one before; first and last stay."""
+    steps = np.hypot(*np.diff(shape[:, :2], axis=0).T)
+    keep = np.concatenate(([True], steps > _LEAST))
+    if not keep[-1]:
+        keep[np.flatnonzero(keep)[-1]] = False
+        keep[0] = keep[-1] = True
+    return shape[keep]
+
+
+def thinned(shapes: Sequence[FloatArray]) -> list[FloatArray]:
+    """Leave out vertices within :data:`CHORD_ERROR` of the chord (Douglas-Peucker, all at once)."""
+    counts = np.array([len(shape) for shape in shapes])
+    bounds = np.concatenate(([0], np.cumsum(counts)))
+    points = np.concatenate(list(shapes))
+    keep = np.zeros(len(points), dtype=np.bool_)
+    keep[bounds[:-1]] = keep[bounds[1:] - 1] = True
+    while True:
+        kept = np.flatnonzero(keep)
+        span = np.cumsum(keep) - 1
+        start = points[kept[span]]
+        chord = points[kept[np.minimum(span + 1, len(kept) - 1)]] - start
+        error = _beside(points - start, chord)
+        error[keep] = 0.0
+        worst = np.maximum.reduceat(error, kept)
+        new = (error > CHORD_ERROR) & (error >= worst[span])
+        if not new.any():
+            break
+        keep |= new
+    return [points[a:b][keep[a:b]] for a, b in pairwise(bounds)]
+
+
+def _beside(delta: FloatArray, chord: FloatArray) -> FloatArray:
+    """Distance of points ``delta`` from the stretch from the origin to ``chord``."""
+    square = np.maximum(np.einsum("ij,ij->i", chord, chord), 1e-12)
+    share = np.clip(np.einsum("ij,ij->i", delta, chord) / square, 0.0, 1.0)
+    distance: FloatArray = np.linalg.norm(delta - share[:, None] * chord, axis=1)
+    return distance

@@ -1,0 +1,106 @@
+"""Crosswalks and the lanes under them: what they take from roads, and which junction they join."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+
+from odscen.convert.access import allowed
+from odscen.convert.courses import DENSE
+from odscen.convert.edges import Gap
+from odscen.opendrive.objects import crosswalks
+
+if TYPE_CHECKING:
+    from odscen.ids import RoadId
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.model import OpenDrive, Road
+    from odscen.opendrive.objects import Crosswalk
+
+MARGIN = 1.0
+"""Metres before a crosswalk where vehicles stop."""
+
+TO_JUNCTION = 12.0
+"""Metres between crosswalk and junction: with less, the crosswalk belongs to the junction."""
+
+BETWEEN = 8.0
+"""Metres between crosswalks on one road: with less, no edge lies between them."""
+
+LEVEL = 2.5
+"""Metres of height between a crosswalk and lanes of other levels."""
+
+
+class PlacedCrosswalk(NamedTuple):
+    """A crosswalk, the roads outside junctions that it lies on (and where), and connecting roads."""
+
+    crosswalk: Crosswalk
+    roads: tuple[tuple[RoadId, float], ...]
+    connecting: tuple[RoadId, ...]
+
+
+def place_crosswalks(
+    odr: OpenDrive, table: RoadTable
+) -> tuple[tuple[PlacedCrosswalk, ...], dict[RoadId, tuple[Gap, ...]]]:
+    """Find the lanes under each crosswalk.
+
+    Returns
+    -------
+    tuple
+        The crosswalks in the order of the file, and by road the parts that they take from it.
+    """
+    things = crosswalks(odr, table)
+    if not things:
+        return (), {}
+    usable = [bool(allowed(kind, "")) for kind in table.lane_type]
+    rows = np.flatnonzero(np.array(usable) & (table.lane_s1 - table.lane_s0 > 1e-3))
+    extent = (table.lane_s1 - table.lane_s0)[rows]
+    counts = np.maximum(1, np.ceil(extent / DENSE)).astype(np.intp) + 1
+    first = np.concatenate(([0], np.cumsum(counts)))
+    owner = np.repeat(np.arange(len(rows)), counts)
+    share = (np.arange(first[-1]) - first[owner]) / (counts[owner] - 1)
+    s = table.lane_s0[rows][owner] + share * extent[owner]
+    points = table.lane_points(rows[owner], s)
+    tree = shapely.STRtree(shapely.points(points.x, points.y))
+    placed: list[PlacedCrosswalk] = []
+    taken: dict[RoadId, list[Gap]] = {}
+    for thing in things:
+        area = shapely.Polygon(thing.polygon).buffer(DENSE / 2.0)
+        inside = np.sort(tree.query(area, predicate="intersects"))
+        inside = inside[np.abs(points.z[inside] - thing.z) < LEVEL]
+        roads = table.lane_road[rows[owner[inside]]]
+        outside: list[tuple[RoadId, float]] = []
+        connecting: list[RoadId] = []
+        for row in np.unique(roads).tolist():
+            road = table.road_ids[row]
+            if odr.roads[road].junction is not None:
+                connecting.append(road)
+                continue
+            under = s[inside[roads == row]]
+            gap = Gap(float(under.min()) - MARGIN, float(under.max()) + MARGIN)
+            taken.setdefault(road, []).append(gap)
+            outside.append((road, float(under.min() + under.max()) / 2.0))
+        placed.append(PlacedCrosswalk(thing, tuple(outside), tuple(connecting)))
+    gaps = {road: _merged(odr.roads[road], sorted(own)) for road, own in taken.items()}
+    return tuple(placed), gaps
+
+
+def _merged(road: Road, gaps: list[Gap]) -> tuple[Gap, ...]:
+    """Gaps of a road, widened to junctions that are near, and joined if they are close."""
+    found: list[Gap] = []
+    for gap in gaps:
+        start, end = gap
+        if start < TO_JUNCTION:
+            start = 0.0 if _at_junction(road, "start") else max(start, 0.0)
+        if road.length - end < TO_JUNCTION:
+            end = road.length if _at_junction(road, "end") else min(end, road.length)
+        if found and start - found[-1].end < BETWEEN:
+            found[-1] = Gap(found[-1].start, max(found[-1].end, end))
+        else:
+            found.append(Gap(start, end))
+    return tuple(found)
+
+
+def _at_junction(road: Road, end: str) -> bool:
+    link = road.predecessor if end == "start" else road.successor
+    return link is not None and link.element_type == "junction"

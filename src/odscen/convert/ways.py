@@ -1,0 +1,233 @@
+"""Ways: how one leaves an edge and enters the next, and the nodes in which that happens.
+
+A way runs over the connecting lanes of a junction, over what crosswalks take from a road, and over
+stretches too short for an edge; SUMO gets one internal lane for each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.convert.access import allowed
+from odscen.convert.courses import Course, Stretch
+from odscen.convert.edges import LEAST_EDGE
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Iterator, Mapping, Sequence
+
+    from odscen.convert.edges import EdgePlan
+    from odscen.ids import LaneKey
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.model import OpenDrive
+
+LONGEST_WAY = 400
+"""Lanes in one way; more is a circle in a file that links a junction to itself."""
+
+MOST_WAYS = 2_000
+"""Ways from one lane; a file with more has junctions that only consist of junctions."""
+
+
+class Way(NamedTuple):
+    """From a lane of an edge to a lane of another one (positions in the plans), over ``course``."""
+
+    source: int
+    source_lane: int
+    target: int
+    target_lane: int
+    course: Course
+
+
+class Lost(NamedTuple):
+    """A way that has no place in the network, and why."""
+
+    lane: LaneKey
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """All ways, the edges with their ends trimmed, and what was lost."""
+
+    edges: tuple[EdgePlan, ...]
+    ways: tuple[Way, ...]
+    lost: tuple[Lost, ...]
+
+
+class _Visit(NamedTuple):
+    """A lane of an edge on a row of the table: between which s, and whether the edge begins there."""
+
+    entry: float
+    leave: float
+    edge: int
+    lane: int
+    first: bool
+
+
+def find_ways(
+    odr: OpenDrive,
+    table: RoadTable,
+    successors: Mapping[LaneKey, Sequence[LaneKey]],
+    edges: Sequence[EdgePlan],
+) -> Ways:
+    """Follow the lanes of all edges to where the next edges begin.
+
+    Where several ways lead from one lane to the same other lane, the shortest is taken.
+    """
+    finder = _Finder(odr, table, successors, edges)
+    found: list[Way] = []
+    for number, edge in enumerate(edges):
+        for index in range(len(edge.lanes)):
+            found += finder.ways_from(number, index)
+    plans, ways = _with_room(edges, found)
+    return Ways(plans, ways, tuple(finder.lost))
+
+
+class _Finder:
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        successors: Mapping[LaneKey, Sequence[LaneKey]],
+        edges: Sequence[EdgePlan],
+    ) -> None:
+        self._odr = odr
+        self._table = table
+        self._successors = successors
+        self._edges = edges
+        self.lost: list[Lost] = []
+        self._visits: dict[int, list[_Visit]] = {}
+        for number, edge in enumerate(edges):
+            for index, lane in enumerate(edge.lanes):
+                for position, stretch in enumerate(lane.course):
+                    visit = _Visit(stretch.start, stretch.end, number, index, position == 0)
+                    self._visits.setdefault(stretch.row, []).append(visit)
+        for row, visits in self._visits.items():
+            visits.sort(key=lambda v: v.entry if table.lane_forward[row] else -v.entry)
+
+    def ways_from(self, edge: int, lane: int) -> list[Way]:
+        """All ways from the end of a lane, the shortest to each other lane."""
+        last = self._edges[edge].lanes[lane].course[-1]
+        best: dict[tuple[int, int], Course] = {}
+        count = 0
+        for target, course in self._onwards(last.row, last.end, ()):
+            count += 1
+            if count > MOST_WAYS:
+                break
+            known = best.get(target)
+            if known is None or _extent(course) < _extent(known):
+                best[target] = course
+            if known is not None:
+                self._note(last.row, target)
+        return [Way(edge, lane, *target, course) for target, course in best.items()]
+
+    def _note(self, row: int, target: tuple[int, int]) -> None:
+        there = self._edges[target[0]].lanes[target[1]].course[0].row
+        other = self._table.lane_keys[there]
+        reason = f"of several ways to lane {other} only the shortest is in the network"
+        self.lost.append(Lost(self._table.lane_keys[row], reason))
+
+    def _onwards(
+        self, row: int, s: float, course: Course
+    ) -> Iterator[tuple[tuple[int, int], Course]]:
+        """Follow a lane from s; yields each edge lane reached and the way to it."""
+        todo: list[tuple[int, float, Course]] = [(row, s, course)]
+        while todo:
+            row, s, course = todo.pop()
+            ahead = bool(self._table.lane_forward[row])
+            sign = 1.0 if ahead else -1.0
+            end = float(self._table.lane_s1[row] if ahead else self._table.lane_s0[row])
+            visit = next(
+                (v for v in self._visits.get(row, ()) if sign * (v.entry - s) >= -1e-6), None
+            )
+            if visit is not None and visit.first:
+                yield (visit.edge, visit.lane), _extended(course, Stretch(row, s, visit.entry))
+                continue
+            if visit is not None or len(course) > LONGEST_WAY:
+                continue
+            course = _extended(course, Stretch(row, s, end))
+            following = [
+                self._table.lane_index[key]
+                for key in self._successors[self._table.lane_keys[row]]
+                if self._open(key)
+            ]
+            for other in reversed(following):
+                if any(stretch.row == other for stretch in course):
+                    continue
+                forward = bool(self._table.lane_forward[other])
+                start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
+                todo.append((other, float(start), course))
+
+    def _open(self, key: LaneKey) -> bool:
+        return bool(allowed(self._table.lane_type[self._table.lane_index[key]], ""))
+
+
+def _extended(course: Course, stretch: Stretch) -> Course:
+    return (*course, stretch) if stretch.extent > 1e-6 else course
+
+
+def _extent(course: Course) -> float:
+    return sum(stretch.extent for stretch in course)
+
+
+def _with_room(
+    edges: Sequence[EdgePlan], ways: Sequence[Way]
+) -> tuple[tuple[EdgePlan, ...], tuple[Way, ...]]:
+    """Give ways of no length the last decimetre of the edge before: internal lanes need one."""
+    short = {way.source for way in ways if _extent(way.course) < LEAST_EDGE}
+    plans = list(edges)
+    rests: dict[tuple[int, int], Stretch] = {}
+    for number in sorted(short):
+        plan = plans[number]
+        lanes = []
+        for index, lane in enumerate(plan.lanes):
+            last = lane.course[-1]
+            room = min(LEAST_EDGE, last.extent / 3.0)
+            cut = last.end - room if last.end > last.start else last.end + room
+            rests[number, index] = Stretch(last.row, cut, last.end)
+            lanes.append(
+                replace(lane, course=(*lane.course[:-1], Stretch(last.row, last.start, cut)))
+            )
+        plans[number] = replace(plan, lanes=tuple(lanes))
+    longer = [
+        way._replace(course=_joined(rests[way.source, way.source_lane], way.course))
+        if way.source in short
+        else way
+        for way in ways
+    ]
+    return tuple(plans), tuple(longer)
+
+
+def _joined(first: Stretch, course: Course) -> Course:
+    if course and course[0].row == first.row:
+        return (Stretch(first.row, first.start, course[0].end), *course[1:])
+    return (first, *course)
+
+
+class Groups:
+    """Things that belong together (union-find); the first one seen stands for its group."""
+
+    def __init__(self) -> None:
+        self._parent: dict[Hashable, Hashable] = {}
+        self._order: dict[Hashable, int] = {}
+
+    def find(self, item: Hashable) -> Hashable:
+        """Representative of an item's group; new items are groups of their own."""
+        if item not in self._parent:
+            self._parent[item] = item
+            self._order[item] = len(self._order)
+        root = item
+        while self._parent[root] != root:
+            root = self._parent[root]
+        while self._parent[item] != root:
+            self._parent[item], item = root, self._parent[item]
+        return root
+
+    def join(self, one: Hashable, other: Hashable) -> None:
+        """Make two groups one."""
+        first, second = self.find(one), self.find(other)
+        if first == second:
+            return
+        if self._order[second] < self._order[first]:
+            first, second = second, first
+        self._parent[second] = first
