@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 MARGIN = 1.0
 """Metres before a crosswalk where vehicles stop."""
 
+SHARE = 0.2
+"""Share of a road's length that the margin is at most: short roads stay."""
+
 TO_JUNCTION = 12.0
 """Metres between crosswalk and junction: with less, the crosswalk belongs to the junction."""
 
@@ -77,7 +80,8 @@ def place_crosswalks(
                 connecting.append(road)
                 continue
             under = s[inside[roads == row]]
-            gap = Gap(float(under.min()) - MARGIN, float(under.max()) + MARGIN)
+            margin = min(MARGIN, SHARE * odr.roads[road].length)
+            gap = Gap(float(under.min()) - margin, float(under.max()) + margin)
             taken.setdefault(road, []).append(gap)
             outside.append((road, float(under.min() + under.max()) / 2.0))
         placed.append(PlacedCrosswalk(thing, tuple(outside), tuple(connecting)))
@@ -89,11 +93,12 @@ def _merged(road: Road, gaps: list[Gap]) -> tuple[Gap, ...]:
     """Gaps of a road, widened to junctions that are near, and joined if they are close."""
     found: list[Gap] = []
     for gap in gaps:
-        start, end = gap
-        if start < TO_JUNCTION:
-            start = 0.0 if _at_junction(road, "start") else max(start, 0.0)
-        if road.length - end < TO_JUNCTION:
-            end = road.length if _at_junction(road, "end") else min(end, road.length)
+        start, end = max(gap.start, 0.0), min(gap.end, road.length)
+        before, behind = start, road.length - end
+        if before < min(TO_JUNCTION, behind) and _at_junction(road, "start"):
+            start = 0.0
+        if behind < min(TO_JUNCTION, before) and _at_junction(road, "end"):
+            end = road.length
         if found and start - found[-1].end < BETWEEN:
             found[-1] = Gap(found[-1].start, max(found[-1].end, end))
         else:

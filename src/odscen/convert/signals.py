@@ -51,7 +51,12 @@ class Acting(NamedTuple):
         )
 
     def faces(self, *, growing: bool) -> bool:
-        """Whether it faces traffic that runs with growing s, or else against it."""
+        """Whether it faces traffic that runs with growing s, or else against it.
+
+        Where a validity names lanes, these decide: tools write the orientation of the pole.
+        """
+        if self.validities:
+            return True
         return {"+": growing, "-": not growing}.get(self.orientation, True)
 
 
