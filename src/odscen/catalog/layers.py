@@ -7,7 +7,7 @@ repaint the map for a dark background.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from odscen.catalog.drawing import BRIDGE
 from odscen.catalog.markup import Markup, element, join, number, path_data
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.catalog.drawing import Bounds, Lines, MapDrawing, Symbol
     from odscen.lanegraph.model import MapGraph
 
@@ -280,6 +282,38 @@ def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
     if symbol.text:
         use += symbol_text(symbol.text, size=40 if len(symbol.text) < 3 else 31, fill="#1d2126")
     return element("g", use, transform=f"{place} scale({scale})")
+
+
+class PlaceMarks(NamedTuple):
+    """Places of one kind to be circled on a map; ``xy`` is ``(N, 2)``, metres, OpenDRIVE frame."""
+
+    name: str
+    color: str
+    xy: FloatArray
+
+
+def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
+    """Circles of ``radius`` metres around places, in the colours of their kinds.
+
+    Rings lie on a light rim, so that they show on every surface; the middle stays clear.
+    """
+    rings = [svg_circles(kind.xy, radius) for kind in marks]
+    width = radius * 100.0
+    parts = [element("path", d="".join(rings), stroke="#ffffff", stroke_width=0.62 * width)]
+    parts += [
+        element("path", d=ring, class_="m-place", stroke=kind.color, stroke_width=0.36 * width)
+        for kind, ring in zip(marks, rings, strict=True)
+    ]
+    return element("g", *parts, class_="m-places", fill="none")
+
+
+def svg_circles(xy: FloatArray, radius: float) -> str:
+    """``d`` of circles around places, all in metres."""
+    r = max(1, round(radius * 100.0))
+    places = np.rint(xy * (100.0, -100.0)).astype(np.int64).tolist()
+    return "".join(
+        f"M{x - r} {y}a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0 {-2 * r} 0" for x, y in places
+    )
 
 
 def graph_layers(
