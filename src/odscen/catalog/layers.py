@@ -295,25 +295,34 @@ class PlaceMarks(NamedTuple):
 def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
     """Circles of ``radius`` metres around places, in the colours of their kinds.
 
-    Rings lie on a light rim, so that they show on every surface; the middle stays clear.
+    Rings lie on a light rim, so that they show on every surface; the middle stays clear. Places of
+    one kind that lie within one ring share it.
     """
-    rings = [svg_circles(kind.xy, radius) for kind in marks]
-    width = radius * 100.0
-    parts = [element("path", d="".join(rings), stroke="#ffffff", stroke_width=0.62 * width)]
-    parts += [
-        element("path", d=ring, class_="m-place", stroke=kind.color, stroke_width=0.36 * width)
-        for kind, ring in zip(marks, rings, strict=True)
-    ]
+    rings = [_circles(_spread(kind.xy, radius), radius) for kind in marks]
+    rim, line = round(radius * 48.0), round(radius * 28.0)
+    parts = []
+    for kind, ring in zip(marks, rings, strict=True):
+        parts.append(element("path", d=ring, class_="m-place-rim", stroke="#fff", stroke_width=rim))
+        parts.append(
+            element("path", d=ring, class_="m-place", stroke=kind.color, stroke_width=line)
+        )
     return element("g", *parts, class_="m-places", fill="none")
 
 
-def svg_circles(xy: FloatArray, radius: float) -> str:
-    """``d`` of circles around places, all in metres."""
+def _spread(xy: FloatArray, radius: float) -> FloatArray:
+    """Places no two of which lie within ``radius``; every other lies within it of one of them."""
+    kept: list[FloatArray] = []
+    for place in xy:
+        if all(np.hypot(*(place - other)) > radius for other in kept):
+            kept.append(place)
+    return np.array(kept)
+
+
+def _circles(xy: FloatArray, radius: float) -> str:
     r = max(1, round(radius * 100.0))
     places = np.rint(xy * (100.0, -100.0)).astype(np.int64).tolist()
-    return "".join(
-        f"M{x - r} {y}a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0 {-2 * r} 0" for x, y in places
-    )
+    half = f"a{r} {r} 0 1 0"
+    return "".join(f"M{x - r} {y}{half} {2 * r} 0{half} {-2 * r} 0z" for x, y in places)
 
 
 def graph_layers(

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry
     from odscen.convert.verify_result import Fidelity
 
-_NOWHERE = np.empty((0, 2))
-
 
 class _Place(Protocol):
     @property
@@ -74,9 +72,9 @@ def _departures(fidelity: Fidelity) -> list[PlaceMarks]:
         ("Unsafe green", "#0b8f4d", fidelity.unsafe_pairs),
     )
     return [
-        # Several findings at one place are one circle.
-        PlaceMarks(name, color, np.unique([(p.x, p.y) for p in places] or _NOWHERE, axis=0))
+        PlaceMarks(name, color, np.array([(place.x, place.y) for place in places]))
         for name, color, places in kinds
+        if places
     ]
 
 

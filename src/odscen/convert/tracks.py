@@ -26,7 +26,10 @@ _SLACK = 0.55 * STEP
 
 _COS = np.cos(np.radians(45.0))
 _CHUNK = 4000
-_PIECE_MIN = 1e-6
+_ROUNDING = 1e-3
+
+PIECE_MIN = 1e-6
+"""Lines shorter than this, in metres, have no direction and no pieces."""
 
 
 class Pieces(NamedTuple):
@@ -103,9 +106,9 @@ class Polylines:
         return Pieces(points[:, :2], ahead, length, line, points[:, 2])
 
     def cut(self, step: float) -> Pieces:
-        """Cut every line into equal pieces of at most ``step`` metres."""
-        count = np.ceil(self.lengths / step).astype(np.int64)
-        count[self.lengths < _PIECE_MIN] = 0
+        """Cut every line into equal pieces of ``step`` metres at most, but for rounding."""
+        count = np.maximum(1, np.ceil(self.lengths / step - _ROUNDING).astype(np.int64))
+        count[self.lengths < PIECE_MIN] = 0
         line = np.repeat(np.arange(len(count)), count)
         number = np.arange(len(line)) - offsets(count)[line]
         length = self.lengths[line] / count[line]

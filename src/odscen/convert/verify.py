@@ -7,6 +7,7 @@ nothing of the conversion is. What the map says is taken from the road model
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,13 @@ import shapely
 
 from odscen.convert.tracks import STEP, Finder, Polylines
 from odscen.convert.verify_net import read_net
-from odscen.convert.verify_relations import is_between_roads, lane_relations, passed_over, sumo_ends
+from odscen.convert.verify_relations import (
+    is_between_roads,
+    lane_relations,
+    passed_over,
+    sumo_ends,
+    ways_over_short_lanes,
+)
 from odscen.convert.verify_result import (
     CROSSWALK_SHARE,
     MAX_P99,
@@ -37,7 +44,7 @@ if TYPE_CHECKING:
 
     from odscen.convert.tracks import FloatArray, IntArray
     from odscen.convert.verify_net import SumoLane, SumoNet
-    from odscen.convert.verify_relations import RoadLane
+    from odscen.convert.verify_relations import Pair, RoadLane
     from odscen.opendrive.lanes import BoolArray, RoadTable
     from odscen.opendrive.model import OpenDrive
 
@@ -217,15 +224,21 @@ def _relations(
     lanes = {lane.id: lane for lane in net.driving("normal")}
     lane_of = [(key.road, key.lane) for key in keys]
     ends = sumo_ends(list(lanes.values()), outer, lane_of)
-    held = passed_over(list(lanes.values()), outer, lane_of)
+    lengths: dict[RoadLane, float] = defaultdict(float)
+    for lane, length in zip(lane_of, drivable.lines.lengths.tolist(), strict=True):
+        lengths[lane] += length
+    ways = ways_over_short_lanes(stated, lengths) | {pair: {pair} for pair in stated}
+    held: set[Pair] = set()
+    for pair in passed_over(list(lanes.values()), outer, lane_of):
+        held |= ways.get(pair, set())
     invented = []
     for link in net.links:
         if link.source not in lanes or link.target not in lanes:
             continue
         sources, targets = ends[link.source].end, ends[link.target].start
         pairs = [(a, b) for a in sources for b in targets]
-        found = [pair for pair in pairs if pair in stated]
-        held.update(found)
+        found = [pair for pair in pairs if pair in ways]
+        held.update(*(ways[pair] for pair in found))
         # Within one side of a road SUMO may well divide and join edges as it needs.
         if not found and (not pairs or all(is_between_roads(*pair) for pair in pairs)):
             names = f"{link.source} to {link.target}"

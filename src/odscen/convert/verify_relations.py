@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.convert.tracks import Polylines
+from odscen.convert.tracks import PIECE_MIN, Polylines
 from odscen.opendrive.topology import lane_successors
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from odscen.convert.tracks import Finder, FloatArray
     from odscen.convert.verify_net import SumoLane
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 RoadLane = tuple["RoadId", int]
 """Road and lane id; sections do not matter for relations between roads."""
+
+Pair = tuple[RoadLane, RoadLane]
 
 _END = 1.0
 """Metres at the end of a SUMO lane that say which lane of the map it comes from or leads to."""
@@ -31,9 +33,7 @@ _ALIKE = 0.05
 """Lanes of the map whose distances differ by less, in metres, are told apart otherwise or not."""
 
 
-def lane_relations(
-    odr: OpenDrive, drivable: Sequence[LaneKey]
-) -> dict[tuple[RoadLane, RoadLane], LaneKey]:
+def lane_relations(odr: OpenDrive, drivable: Sequence[LaneKey]) -> dict[Pair, LaneKey]:
     """Relations between drivable lanes outside junctions, through any connecting lanes.
 
     Only those between different roads, or different sides of one.
@@ -45,7 +45,7 @@ def lane_relations(
     """
     successors = lane_successors(odr)
     allowed = set(drivable)
-    found: dict[tuple[RoadLane, RoadLane], LaneKey] = {}
+    found: dict[Pair, LaneKey] = {}
     for start in drivable:
         if odr.roads[start.road].junction is not None:
             continue
@@ -60,6 +60,38 @@ def lane_relations(
                 elif is_between_roads((start.road, start.lane), (key.road, key.lane)):
                     found.setdefault(((start.road, start.lane), (key.road, key.lane)), start)
     return found
+
+
+def ways_over_short_lanes(
+    stated: Collection[Pair], lengths: Mapping[RoadLane, float]
+) -> dict[Pair, set[Pair]]:
+    """Relations that follow each other over lanes shorter than a metre, by their outer lanes.
+
+    Nothing ever stands on so short a lane: SUMO may lead across it at once.
+
+    Parameters
+    ----------
+    stated
+        As :func:`lane_relations` gives them.
+    lengths
+        Length of each drivable lane outside junctions, metres.
+    """
+    following: dict[RoadLane, list[RoadLane]] = defaultdict(list)
+    for source, target in stated:
+        following[source].append(target)
+    ways: dict[Pair, set[Pair]] = defaultdict(set)
+    for source, target in stated:
+        todo: list[tuple[Pair, ...]] = [((source, target),)]
+        while todo:
+            chain = todo.pop()
+            last = chain[-1][1]
+            if lengths[last] >= _END or any(last == passed for passed, _ in chain):
+                continue
+            for further in following[last]:
+                longer = (*chain, (last, further))
+                ways[source, further].update(longer)
+                todo.append(longer)
+    return ways
 
 
 def is_between_roads(source: RoadLane, target: RoadLane) -> bool:
@@ -101,9 +133,7 @@ def sumo_ends(
     }
 
 
-def passed_over(
-    lanes: Sequence[SumoLane], outer: Finder, lane_of: Sequence[RoadLane]
-) -> set[tuple[RoadLane, RoadLane]]:
+def passed_over(lanes: Sequence[SumoLane], outer: Finder, lane_of: Sequence[RoadLane]) -> set[Pair]:
     """Pairs of lanes of the map that follow each other along one SUMO lane.
 
     Where a road ends without a junction, SUMO may have its node a little before or behind, or none.
@@ -124,7 +154,7 @@ def _scores(
     """Mean distance of the places of each line from the lanes of the map near it."""
     count = along.shape[1]
     line = np.repeat(np.arange(len(along)), count)
-    kept = np.flatnonzero(lines.lengths[line] > 1e-6)
+    kept = np.flatnonzero(lines.lengths[line] >= PIECE_MIN)
     places = lines.at(line[kept], along.ravel()[kept], np.ones(len(kept)))
     place, piece, apart = outer.around(places, _APART, directed=True)
     nearest: dict[tuple[int, RoadLane], float] = {}
