@@ -173,6 +173,20 @@ def test_junctions_with_lights_are_compared_by_place():
     assert (invented.opendrive, invented.invented) == (0, ("j",))
 
 
+def test_a_map_without_drivable_lanes_and_a_network_without_any_can_be_compared():
+    odr = network(road("1", section(lane(-1, kind="sidewalk"))))
+    empty = b'<net><location netOffset="0,0"/></net>'
+    fidelity = verify(empty, odr, RoadTable.of(odr))
+    assert (fidelity.coverage.length, fidelity.coverage.share) == (0.0, 1.0)
+    assert broken(fidelity) == {"sidewalks covered, share"}
+    assert broken(verify(empty, MAP, TABLE)) == {
+        "drivable lanes covered, share",
+        "relations missing",
+        "sidewalks covered, share",
+        "crosswalks lost",
+    }
+
+
 def test_traffic_on_the_wrong_side_is_told():
     assert broken(found(replace(HandNet(), left_hand=True))) == {"wrong side of the road"}
 
@@ -194,6 +208,8 @@ def test_the_result_becomes_json():
         b"<net/>",
         bytes(HandNet()).replace(b"shape=", b"form="),
         b"<net><location/></net>",
+        bytes(HandNet()).replace(b'via=":j_0_0"', b'via="gone"'),
+        bytes(HandNet()).replace(b'netOffset="100.00', b'netOffset="nan'),
     ],
 )
 def test_what_is_no_network_is_refused(content):

@@ -311,10 +311,10 @@ def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
 
 def _spread(xy: FloatArray, radius: float) -> FloatArray:
     """Places no two of which lie within ``radius``; every other lies within it of one of them."""
-    kept: list[FloatArray] = []
-    for place in xy:
-        if all(np.hypot(*(place - other)) > radius for other in kept):
-            kept.append(place)
+    left, kept = xy, []
+    while len(left):
+        kept.append(left[0])
+        left = left[np.hypot(*(left - left[0]).T) > radius]
     return np.array(kept)
 
 

@@ -152,7 +152,7 @@ def _lanes(root: etree._Element) -> tuple[dict[str, SumoLane], dict[str, dict[st
                 function=edge.get("function", "normal"),
                 to_junction=edge.get("to", ""),
                 width=float(lane.get("width", "3.2")),
-                shape=_shape(_text(lane, "shape")) - offset,
+                shape=_shape(_text(lane, "shape"), offset),
                 drives=any(_allows(lane, vclass) for vclass in MOTOR_CLASSES),
                 cars=_allows(lane, "passenger"),
                 walks=_allows(lane, "pedestrian"),
@@ -160,8 +160,9 @@ def _lanes(root: etree._Element) -> tuple[dict[str, SumoLane], dict[str, dict[st
     return lanes, edges
 
 
-def _shape(text: str) -> FloatArray:
+def _shape(text: str, offset: FloatArray) -> FloatArray:
     shape = np.array([[float(part) for part in xyz.split(",")[:2]] for xyz in text.split()])
+    shape = shape - offset
     if shape.ndim != 2 or not np.isfinite(shape).all():
         msg = f"{text[:40]!r} is not the shape of a lane"
         raise ValueError(msg)
@@ -184,11 +185,16 @@ def _allows(lane: etree._Element, vclass: str) -> bool:
 
 
 def _links(root: etree._Element, edges: dict[str, dict[str, str]]) -> Iterator[SumoLink]:
+    known = {lane for lanes in edges.values() for lane in lanes.values()}
     for link in root.iterfind("connection"):
+        via = link.get("via", "")
+        if via and via not in known:
+            msg = f"connection via {via}, which is no lane"
+            raise ValueError(msg)
         yield SumoLink(
             edges[_text(link, "from")][_text(link, "fromLane")],
             edges[_text(link, "to")][_text(link, "toLane")],
-            link.get("via", ""),
+            via,
             link.get("tl", ""),
             int(link.get("linkIndex", "-1")),
         )

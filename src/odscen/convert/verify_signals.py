@@ -108,7 +108,7 @@ def _unsafe_at(net: SumoNet, junction: SumoJunction, links: list[SumoLink]) -> I
                 continue
             indices = (links[a].link_index, links[b].link_index)
             for phase, state in enumerate(program.states):
-                colors = {state[index] for index in indices}
+                colors = {state[index : index + 1] for index in indices}
                 if colors <= {"G", "g"}:
                     x, y = _middle(net, links[a], links[b])
                     yield UnsafePair(program.tl, phase, indices, "g" in colors, x, y)
