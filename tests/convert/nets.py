@@ -28,8 +28,8 @@ _CROSSWALK = """
 </outline></object>"""
 
 
-def fork(*, lights: bool = False) -> OpenDrive:
-    """Fork in the road; ``lights`` puts a controller into its junction."""
+def fork(*, lights: bool = False, sign: str = "") -> OpenDrive:
+    """Fork in the road; ``lights`` puts a controller into its junction, of ``sign`` if given."""
     walked = section(lane(-1), lane(-2, kind="sidewalk", width=2.0))
     corner = {"x": 40.0 + 20.0 * cos(TURN), "y": 20.0 * sin(TURN), "hdg": TURN}
     links = "".join(
@@ -39,7 +39,9 @@ def fork(*, lights: bool = False) -> OpenDrive:
     )
     controller = '<controller id="5" type="0"/>' if lights else ""
     return network(
-        road("1", walked, length=40.0, after="junction 9", objects=_CROSSWALK),
+        road("1", walked, length=40.0, after="junction 9", objects=_CROSSWALK).replace(
+            "</objects>", f"</objects><signals>{sign}</signals>"
+        ),
         road("2", walked, x=60.0, length=40.0, before="junction 9"),
         road("3", section(lane(-1)), **corner, length=20.0, before="junction 9"),
         _connecting("10", "2", x=40.0),

@@ -173,6 +173,13 @@ def test_junctions_with_lights_are_compared_by_place():
     assert (invented.opendrive, invented.invented) == (0, ("j",))
 
 
+def test_a_controller_of_signs_alone_is_no_light():
+    sign = '<signal s="39" t="-4" id="1" name="" dynamic="no" orientation="+" type="205"/>'
+    odr = fork(lights=True, sign=sign)
+    assert odr.roads["1"].signals
+    assert verify(bytes(HandNet()), odr, RoadTable.of(odr)).signals.opendrive == 0
+
+
 def test_a_map_without_drivable_lanes_and_a_network_without_any_can_be_compared():
     odr = network(road("1", section(lane(-1, kind="sidewalk"))))
     empty = b'<net><location netOffset="0,0"/></net>'

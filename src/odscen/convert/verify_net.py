@@ -31,7 +31,6 @@ class SumoLane:
 
     id: str
     function: str
-    to_junction: str
     width: float
     shape: FloatArray
     drives: bool
@@ -150,7 +149,6 @@ def _lanes(root: etree._Element) -> tuple[dict[str, SumoLane], dict[str, dict[st
             lanes[lane_id] = SumoLane(
                 id=lane_id,
                 function=edge.get("function", "normal"),
-                to_junction=edge.get("to", ""),
                 width=float(lane.get("width", "3.2")),
                 shape=_shape(_text(lane, "shape"), offset),
                 drives=any(_allows(lane, vclass) for vclass in MOTOR_CLASSES),

@@ -43,12 +43,18 @@ def compare_signals(
 
 
 def lit_junctions(odr: OpenDrive) -> tuple[str, ...]:
-    """Junctions with a controller, or with a dynamic traffic light on a connecting road."""
-    lights = {
-        signal.id
-        for road in odr.roads.values()
-        for signal in road.signals
-        if signal.dynamic and signal_kind(signal) == "traffic_light"
+    """Junctions with a controller of lights, or with a dynamic traffic light on a connecting road.
+
+    CARLA gives controllers to signs that say "give way", too: a controller counts unless the file
+    has all the signals it rules and none of them is a light.
+    """
+    signals = [signal for road in odr.roads.values() for signal in road.signals]
+    lights = {s.id for s in signals if s.dynamic and signal_kind(s) == "traffic_light"}
+    others = {s.id for s in signals if signal_kind(s) not in ("traffic_light", "pedestrian_light")}
+    of_signs = {
+        controller.id
+        for controller in odr.controllers.values()
+        if controller.controls and all(signal in others for signal, _ in controller.controls)
     }
     lit = {
         road.junction
@@ -56,7 +62,11 @@ def lit_junctions(odr: OpenDrive) -> tuple[str, ...]:
         if any(signal.id in lights for signal in road.signals)
         or any(reference.id in lights for reference in road.signal_references)
     }
-    return tuple(j.id for j in odr.junctions.values() if j.controllers or j.id in lit)
+    return tuple(
+        junction.id
+        for junction in odr.junctions.values()
+        if junction.id in lit or not of_signs.issuperset(junction.controllers)
+    )
 
 
 def _ruled_links(net: SumoNet) -> dict[str, list[SumoLink]]:
