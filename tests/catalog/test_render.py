@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.catalog.layers import RELATION_COLORS
+from odscen.catalog.layers import RELATION_COLORS, PlaceMarks
 from odscen.catalog.render import (
     RenderOptions,
     length_text,
@@ -116,6 +116,19 @@ def test_a_part_of_the_map_can_be_shown_without_margins():
     assert texts(svg) == []
     assert "m-crosswalk" in svg
     assert "m-symbols" not in svg
+
+
+def test_places_are_circled_and_counted_in_the_legend():
+    odr, table = street()
+    drawing = map_drawing(odr, table)
+    near = np.array([[50.0, 0.0], [50.1, 0.0], [90.0, 0.0]])
+    marks = [PlaceMarks("Gap", "#123456", near), PlaceMarks("Loss", "#abcdef", np.empty((0, 2)))]
+    svg = render_drawing(drawing, marks=marks)
+    [rings] = re.findall(r'd="([^"]*)" class="m-place" stroke="#123456"', svg)
+    assert rings.count("M") == 2, "places within one ring share it"
+    assert "Gap (3)" in texts(svg)
+    assert "#abcdef" not in svg
+    assert render_drawing(drawing, marks=marks[1:]) == render_drawing(drawing)
 
 
 def test_nothing_in_a_sheet_points_outside():

@@ -1,4 +1,6 @@
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -127,6 +129,45 @@ def test_another_spacing_builds_the_map_again(tmp_path):
     two = odscen(*add).json["maps"][0]["graph"]["nodes"]
     four = odscen(*add, "--spacing", 4).json["maps"][0]["graph"]["nodes"]
     assert four == pytest.approx(two / 2, rel=0.1)
+
+
+def test_verify_gives_every_limit_and_fails_if_one_is_not_held(workspace, tmp_path):
+    sheet = tmp_path / "found" / "sheet.svg"
+    arguments = ("maps", "verify", "signal_crossing", "--workspace", workspace)
+    done = odscen(*arguments, "--json", "--drawing", sheet)
+    assert done.code == (0 if done.json["passed"] else 1), done.err
+    assert done.json["name"] == "signal_crossing"
+    assert done.json["passed"] == all(verdict["ok"] for verdict in done.json["verdicts"])
+    assert done.json["crosswalks"] == 4
+    assert done.json["coverage"]["share"] > 0.99
+    assert sheet.read_text(encoding="utf-8").startswith("<?xml")
+    table = odscen(*arguments)
+    assert table.code == done.code
+    for verdict in done.json["verdicts"]:
+        assert verdict["name"] in table.out
+
+
+def test_verify_names_what_a_tampered_network_lost(workspace, tmp_path):
+    shutil.copytree(workspace / "maps" / "t_junction_signs", tmp_path / "maps" / "t_junction_signs")
+    net = tmp_path / "maps" / "t_junction_signs" / "net.net.xml"
+    text = net.read_text(encoding="utf-8")
+    west = r'netOffset="(-?[\d.]+)'
+    moved = re.sub(west, lambda found: f'netOffset="{float(found[1]) + 0.3}', text, count=1)
+    net.write_text(moved, encoding="utf-8")
+    sheet = tmp_path / "sheet.svg"
+    done = odscen("maps", "verify", "t_junction_signs", "--drawing", sheet, "--workspace", tmp_path)
+    assert done.code == 1
+    assert "NOT HELD" in done.out
+    assert "lane not covered" in done.out
+    assert "Lane not covered" in sheet.read_text(encoding="utf-8")
+
+
+def test_verify_refuses_a_network_that_is_none(workspace, tmp_path):
+    shutil.copytree(workspace / "maps" / "t_junction_signs", tmp_path / "maps" / "t_junction_signs")
+    (tmp_path / "maps" / "t_junction_signs" / "net.net.xml").write_text("<net", encoding="utf-8")
+    done = odscen("maps", "verify", "t_junction_signs", "--json", "--workspace", tmp_path)
+    assert done.code == 2
+    assert done.json["error"]["file"] == "net.net.xml"
 
 
 def test_help_needs_none_of_the_heavy_packages():

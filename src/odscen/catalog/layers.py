@@ -7,7 +7,7 @@ repaint the map for a dark background.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from odscen.catalog.drawing import BRIDGE
 from odscen.catalog.markup import Markup, element, join, number, path_data
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.catalog.drawing import Bounds, Lines, MapDrawing, Symbol
     from odscen.lanegraph.model import MapGraph
 
@@ -280,6 +282,47 @@ def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
     if symbol.text:
         use += symbol_text(symbol.text, size=40 if len(symbol.text) < 3 else 31, fill="#1d2126")
     return element("g", use, transform=f"{place} scale({scale})")
+
+
+class PlaceMarks(NamedTuple):
+    """Places of one kind to be circled on a map; ``xy`` is ``(N, 2)``, metres, OpenDRIVE frame."""
+
+    name: str
+    color: str
+    xy: FloatArray
+
+
+def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
+    """Circles of ``radius`` metres around places, in the colours of their kinds.
+
+    Rings lie on a light rim, so that they show on every surface; the middle stays clear. Places of
+    one kind that lie within one ring share it.
+    """
+    rings = [_circles(_spread(kind.xy, radius), radius) for kind in marks]
+    rim, line = round(radius * 48.0), round(radius * 28.0)
+    parts = []
+    for kind, ring in zip(marks, rings, strict=True):
+        parts.append(element("path", d=ring, class_="m-place-rim", stroke="#fff", stroke_width=rim))
+        parts.append(
+            element("path", d=ring, class_="m-place", stroke=kind.color, stroke_width=line)
+        )
+    return element("g", *parts, class_="m-places", fill="none")
+
+
+def _spread(xy: FloatArray, radius: float) -> FloatArray:
+    """Places no two of which lie within ``radius``; every other lies within it of one of them."""
+    left, kept = xy, []
+    while len(left):
+        kept.append(left[0])
+        left = left[np.hypot(*(left - left[0]).T) > radius]
+    return np.array(kept)
+
+
+def _circles(xy: FloatArray, radius: float) -> str:
+    r = max(1, round(radius * 100.0))
+    places = np.rint(xy * (100.0, -100.0)).astype(np.int64).tolist()
+    half = f"a{r} {r} 0 1 0"
+    return "".join(f"M{x - r} {y}{half} {2 * r} 0{half} {-2 * r} 0z" for x, y in places)
 
 
 def graph_layers(

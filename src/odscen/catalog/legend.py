@@ -19,7 +19,10 @@ from odscen.catalog.layers import (
 from odscen.catalog.markup import Markup, element, join, number
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.catalog.drawing import MapDrawing
+    from odscen.catalog.layers import PlaceMarks
     from odscen.catalog.render import RenderOptions
     from odscen.lanegraph.model import MapGraph
 
@@ -48,6 +51,11 @@ def legend_entries(
     if graph is not None and options.graph:
         entries += _graph_entries(graph)
     return entries
+
+
+def place_entries(marks: Sequence[PlaceMarks]) -> list[tuple[Markup, str]]:
+    """Rings and names of circled places, with how many there are of each kind."""
+    return [(_ring(kind.color), f"{kind.name} ({len(kind.xy)})") for kind in marks]
 
 
 def _graph_entries(graph: MapGraph) -> list[tuple[Markup, str]]:
@@ -83,6 +91,10 @@ def _sign(kind: str) -> Markup:
 
 def _dot(color: str) -> Markup:
     return element("circle", cx=9, r=5.5, fill=color, stroke=INK, stroke_width=0.5)
+
+
+def _ring(color: str) -> Markup:
+    return element("circle", cx=9, r=6, fill="none", stroke=color, stroke_width=3)
 
 
 def _bands() -> Markup:

@@ -8,13 +8,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from odscen.catalog.layers import FONT, LayerOptions, graph_layers, map_layers, segment_layer
-from odscen.catalog.legend import INK, legend, legend_entries
+from odscen.catalog.layers import (
+    FONT,
+    LayerOptions,
+    graph_layers,
+    map_layers,
+    place_layer,
+    segment_layer,
+)
+from odscen.catalog.legend import INK, legend, legend_entries, place_entries
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.errors import MissingDependencyError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.catalog.drawing import Bounds, MapDrawing
+    from odscen.catalog.layers import PlaceMarks
     from odscen.catalog.statistics import MapStatistics
     from odscen.lanegraph.model import MapGraph
     from odscen.opendrive.lanes import RoadTable
@@ -25,6 +35,7 @@ _SHEET = 1200.0
 """Width of the sheet; all sizes below are in these units."""
 _MARGIN, _HEAD = 36.0, 74.0
 _SYMBOL = 18.0
+_RING = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +95,7 @@ def render_drawing(
     graph: MapGraph | None = None,
     options: RenderOptions | None = None,
     view: Bounds | None = None,
+    marks: Sequence[PlaceMarks] = (),
 ) -> str:
     """Draw a map from its shapes.
 
@@ -95,6 +107,8 @@ def render_drawing(
         Lane graph, pedestrian graph and segments, to be drawn as ``options`` say.
     view
         Part of the map to show, metres; all of it by default.
+    marks
+        Places to be circled on top of everything, with an entry of the legend per kind.
 
     Returns
     -------
@@ -105,12 +119,15 @@ def render_drawing(
     frame = _Frame.around(view or drawing.bounds, margins=options.margins)
     if view is not None:
         drawing = drawing.clipped(frame.bounds)
+    marks = [kind for kind in marks if len(kind.xy)]
     inside = _inside(drawing, graph, options, frame)
+    if marks:
+        inside += place_layer(marks, radius=_RING / frame.scale)
     parts = [element("rect", width=frame.width, height="100%", fill=_PAPER)]
     foot = 0.0
     if options.margins:
         parts.append(_head(drawing, statistics, frame))
-        entries = legend_entries(drawing, graph, options)
+        entries = legend_entries(drawing, graph, options) + place_entries(marks)
         low = frame.top + frame.height
         listed, foot = legend(entries, left=frame.left, top=low, width=frame.inner)
         parts.append(listed)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from odscen.catalog.drawing import MapDrawing
     from odscen.catalog.statistics import MapStatistics
     from odscen.convert.lane_table import LaneTable
+    from odscen.convert.verify_result import Fidelity
     from odscen.lanegraph.model import MapGraph
 
 BUILDER = "2"
@@ -100,6 +101,17 @@ class MapEntry:
         from odscen.catalog.drawing import MapDrawing
 
         return MapDrawing.from_json(self.path("drawing").read_bytes())
+
+    def fidelity(self) -> Fidelity:
+        """How faithfully the SUMO network follows the map, measured from both files anew."""
+        from odscen.convert.verify import verify
+        from odscen.opendrive.lanes import RoadTable
+        from odscen.opendrive.parse import parse
+
+        xodr = self.path("xodr")
+        odr = parse(xodr.read_bytes(), file=xodr.name)
+        with in_file(self.path("net").name):
+            return verify(self.path("net").read_bytes(), odr, RoadTable.of(odr))
 
     def statistics(self) -> MapStatistics:
         """Figures of the map."""

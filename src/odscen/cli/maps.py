@@ -21,11 +21,17 @@ from odscen.cli.output import (
 from odscen.errors import InputError, OdscenError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from odscen.catalog.store import MapEntry
+    from odscen.convert.verify_result import Fidelity
 
 UNITS = dict.fromkeys(
     ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"
 ) | dict.fromkeys(("speed_limit_min", "speed_limit_max"), ", m/s")
+
+_WORST = 4
+"""Places shown of each kind of finding; JSON has all of them."""
 
 app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=True)
 
@@ -175,6 +181,107 @@ def render(
     log(f"Wrote {out}")
     if as_json:
         print_json({"name": name, "file": str(out)})
+
+
+@app.command()
+def verify(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    drawing: Annotated[
+        Path | None,
+        typer.Option(help="Draw the map with the places found, as .svg or .png.", metavar="FILE"),
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how faithfully a map's SUMO network follows its OpenDRIVE file.
+
+    The exit code is 1 if a limit is not held.
+    """
+    from odscen.catalog.store import Workspace
+
+    entry = Workspace.open(workspace).map(name)
+    fidelity = entry.fidelity()
+    if drawing is not None:
+        from odscen.catalog.sheet import draw_fidelity
+
+        draw_fidelity(entry, fidelity, drawing)
+        log(f"Wrote {drawing}")
+    if as_json:
+        print_json({"name": name, **fidelity.to_dict()})
+    else:
+        _print_fidelity(name, fidelity)
+    raise typer.Exit(0 if fidelity.passed else 1)
+
+
+def _print_fidelity(name: str, fidelity: Fidelity) -> None:
+    rows = [
+        (
+            verdict.name,
+            _figure(verdict.value),
+            f"{'at most' if verdict.at_most else 'at least'} {_figure(verdict.limit)}",
+            "held" if verdict.ok else "NOT HELD",
+        )
+        for verdict in fidelity.verdicts
+    ]
+    print_table(name, ("measure", "found", "limit", "verdict"), rows)
+    counts = [
+        (f"driving lanes of SUMO, {where}", f"{found.lanes:,} lanes, {found.places:,} places")
+        for where, found in (("roads", fidelity.normal), ("junctions", fidelity.internal))
+    ]
+    counts += [
+        (f"distance, {where}", f"median {d.p50:.3f}, 95 % {d.p95:.3f}, largest {d.max:.3f} m")
+        for where, d in (("roads", fidelity.normal), ("junctions", fidelity.internal))
+    ]
+    counts += [
+        (what, f"{cover.length / 1000:.2f} km, {100 * cover.share:.2f} % covered")
+        for what, cover in (
+            ("drivable lanes, roads", fidelity.coverage_roads),
+            ("drivable lanes, junctions", fidelity.coverage_junctions),
+            ("walkable lanes", fidelity.sidewalks),
+        )
+    ]
+    signals = fidelity.signals
+    counts += [
+        ("relations", f"{fidelity.relations:,}"),
+        ("crosswalks", f"{fidelity.crosswalks:,}"),
+        (
+            "junctions with lights",
+            f"{signals.opendrive} in the map, {signals.sumo} in SUMO; "
+            f"lost: {', '.join(signals.lost) or 'none'}; "
+            f"invented: {', '.join(signals.invented) or 'none'}",
+        ),
+    ]
+    print_table("", (), counts)
+    worst = list(_worst(fidelity))
+    if worst:
+        print_table("worst places", ("what", "x, m", "y, m", "where"), worst)
+
+
+def _worst(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str]]:
+    """Give the first few findings of each kind, with their place."""
+    for far in fidelity.far_places[:_WORST]:
+        yield "lane aside", far.x, far.y, f"{far.metres:.2f} m, SUMO lane {far.lane}"
+    for what, gaps in (
+        ("lane not covered", fidelity.gaps),
+        ("sidewalk not covered", fidelity.sidewalk_gaps),
+    ):
+        for gap in sorted(gaps, key=lambda found: -found.metres)[:_WORST]:
+            yield what, gap.x, gap.y, f"{gap.metres:.1f} m of lane {gap.lane}"
+    for one in fidelity.missing[:_WORST]:
+        yield "relation missing", one.x, one.y, f"lane {one.source} to {one.target}"
+    for one in fidelity.invented[:_WORST]:
+        text = f"lane {one.source} to {one.target}, SUMO lanes {one.sumo}"
+        yield "relation invented", one.x, one.y, text
+    for lost in sorted(fidelity.lost_crosswalks, key=lambda found: found.share)[:_WORST]:
+        text = f"road {lost.road}, object {lost.object_id}, {100 * lost.share:.0f} % overlapped"
+        yield "crosswalk lost", lost.x, lost.y, text
+    for pair in fidelity.unsafe_pairs[:_WORST]:
+        links = f"links {pair.links[0]} and {pair.links[1]}"
+        yield "unsafe green", pair.x, pair.y, f"light {pair.tl}, phase {pair.phase}, {links}"
+
+
+def _figure(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4f}"
 
 
 def _row(entry: MapEntry) -> dict[str, Any]:
