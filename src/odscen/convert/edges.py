@@ -32,6 +32,12 @@ LEAST_CUT = 1.0
 LEAST_WIDTH = 0.3
 """Metres: lanes that are nowhere wider are none; bad files have them where a lane has ended."""
 
+NO_WIDTH = 0.05
+"""Metres: where a lane is narrower there is no SUMO lane."""
+
+WIDTH_STEP = 0.5
+"""Metres between the places at which widths are looked at."""
+
 MARKS_LEAST = 10.0
 """Metres: a stretch on which only the right to change lanes differs must be this long."""
 
@@ -150,7 +156,7 @@ class _Planner:
     def _parts(self, road: Road, row: int, gaps: Sequence[Gap]) -> list[_Part]:
         borders = {0.0, road.length, *(section.s for section in road.sections)}
         borders |= {bound for gap in gaps for bound in gap}
-        others = {kind.s for kind in road.types}
+        others = {kind.s for kind in road.types} | self._narrow_ends(road)
         for section in road.sections:
             for lane in section.lanes.values():
                 others |= {item.s for item in (*lane.speeds, *lane.road_marks)}
@@ -206,6 +212,35 @@ class _Planner:
         if self._lefthand:
             right_first = (right_first[0][::-1], right_first[1][::-1])
         return _Part(start, end, *right_first)
+
+    def _narrow_ends(self, road: Road) -> set[float]:
+        """Where lanes become too narrow to be one, or wide enough."""
+        found: set[float] = set()
+        first = int(self._table.section_first[self._table.road_index[road.id]])
+        for number, section in enumerate(road.sections):
+            rows = range(*(int(n) for n in self._table.section_lanes[first + number :][:2]))
+            lanes = [r for r in rows if allowed(self._table.lane_type[r], "")]
+            if not lanes:
+                continue
+            count = max(2, int(np.ceil((section.s_end - section.s) / WIDTH_STEP)) + 1)
+            s = np.linspace(section.s, section.s_end, count)
+            width = self._table.lane_width(np.repeat(lanes, count), np.tile(s, len(lanes)))
+            narrow = (width < NO_WIDTH).reshape(len(lanes), count)
+            lane, place = np.nonzero(narrow[:, 1:] != narrow[:, :-1])
+            found |= {
+                self._change(lanes[i], float(s[j]), float(s[j + 1]))
+                for i, j in zip(lane.tolist(), place.tolist(), strict=True)
+            }
+        return found
+
+    def _change(self, row: int, low: float, high: float) -> float:
+        """Where between two places a lane's width passes :data:`NO_WIDTH`, to a millimetre."""
+        ends = self._table.lane_width(np.array([row, row]), np.array([low, high])) < NO_WIDTH
+        while high - low > 1e-3:
+            middle = 0.5 * (low + high)
+            narrow = self._table.lane_width(np.array([row]), np.array([middle]))[0] < NO_WIDTH
+            low, high = (middle, high) if narrow == ends[0] else (low, middle)
+        return high if ends[0] else low
 
     def _widest(self, row: int, start: float, end: float) -> float:
         s = np.linspace(start, end, 5)
