@@ -11,8 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+import sumo
+
 from bench.common import paired, shared_maps
-from odscen.convert.netconvert import netconvert_path
 
 
 def main() -> None:
@@ -36,5 +37,5 @@ def _add(town: Path, workspace: str) -> None:
 
 
 def _netconvert(town: Path, net: Path) -> None:
-    command = [str(netconvert_path()), "--opendrive-files", str(town), "-o", str(net)]
+    command = [str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"), "--opendrive-files", str(town), "-o", str(net)]
     subprocess.run(command, check=True, capture_output=True)

@@ -11,7 +11,6 @@
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
     `-- ToolError (3)               a program or library that we call failed, in its own words
-        |-- NetconvertError         netconvert: refused, crashed, ran out of time or of memory
         `-- SimulationError         SUMO: refused to start, died, or stopped early
 
 Messages read ``place: what is wrong``; a place is a file, then the path of the element in it.
@@ -133,10 +132,6 @@ class ToolError(OdscenError):
     def __init__(self, problem: str, *, output: str = "") -> None:
         self.output = output
         super().__init__(f"{problem}\n{output.strip()}" if output.strip() else problem)
-
-
-class NetconvertError(ToolError):
-    """netconvert refused the map, crashed, or ran out of time or memory."""
 
 
 class SimulationError(ToolError):

@@ -184,7 +184,7 @@ def test_doctor_says_what_is_there(workspace):
     assert done.code == 0
     checks = {check["name"]: check["found"] for check in done.json["checks"]}
     assert done.json["healthy"] is True
-    assert checks["netconvert"].endswith("netconvert")
+    assert checks["sumo"].endswith("sumo")
     assert checks["workspace"] == str(workspace)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+import sumo
 
-from odscen.convert.netconvert import netconvert_path
 from tests.cli.conftest import odscen
 
 GENERATE = ("generate", "--map", "signal_crossing", "--fill", "0.25", "--seed", "5", "--json")
@@ -96,8 +96,8 @@ def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
 ):
     done = odscen("export", scenario, "--to", "sumo", "-o", tmp_path, "--workspace", workspace)
     assert done.code == 0, done.err
-    sumo = netconvert_path().with_name("sumo")
-    subprocess.run([sumo, "-c", tmp_path / "scenario.sumocfg"], check=True, capture_output=True)
+    binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
+    subprocess.run([binary, "-c", tmp_path / "scenario.sumocfg"], check=True, capture_output=True)
     plain = pl.read_parquet(next(tmp_path.glob("*.parquet")))
     ours = pl.read_parquet(finished["files"]["trajectories"])
     assert plain.equals(ours)

@@ -9,8 +9,8 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+import sumo
 
-from odscen.convert.netconvert import netconvert_path
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks
 from odscen.opendrive.parse import parse
@@ -103,7 +103,7 @@ def test_netconvert_makes_one_network_of_it(path, tmp_path):
     odr = parse(path.read_bytes())
     done = subprocess.run(
         [
-            str(netconvert_path()),
+            str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"),
             *("--opendrive-files", str(path), "-o", str(target), "--no-turnarounds"),
             *(["--lefthand"] if odr.rule == "LHT" else []),
         ],

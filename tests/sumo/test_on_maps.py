@@ -7,7 +7,6 @@ import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import polars as pl
@@ -50,8 +49,7 @@ def built(name: str) -> Built:
     table = RoadTable.of(odr)
     sha256 = hashlib.sha256(content).hexdigest()
     graph = build_map_graph(odr, name=name, sha256=sha256, table=table)
-    with TemporaryDirectory() as folder:
-        network = build_network(odr, table, path, Path(folder))
+    network = build_network(odr, table, graph.walks)
     return Built(SumoMap.of(graph, network.table), network.net_xml)
 
 

@@ -242,8 +242,6 @@ class Workspace:
         ------
         InputError
             If the file cannot be used; names file, element and value.
-        ToolError
-            If netconvert fails on it.
         """
         name = check_name(name_from_file(source) if name is None else name)
         if not 0.1 <= spacing <= 100.0:

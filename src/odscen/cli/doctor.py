@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import platform
+import shutil
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -34,7 +36,7 @@ def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> No
         _check("python", platform.python_version(), needed=True),
         *(_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
         *(_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
-        _netconvert(),
+        _sumo(),
         _workspace(workspace),
     ]
     healthy = all(check["found"] is not None for check in checks if check["needed"])
@@ -61,14 +63,13 @@ def _package(name: str, *, needed: bool, advice: str) -> dict[str, Any]:
     return _check(name, found, needed=needed, advice=advice)
 
 
-def _netconvert() -> dict[str, Any]:
-    from odscen.convert.netconvert import netconvert_path
-
+def _sumo() -> dict[str, Any]:
+    advice = "pip install 'eclipse-sumo>=1.28,<1.29'"
     try:
-        found, advice = str(netconvert_path()), ""
-    except OdscenError as error:
-        found, advice = None, str(error)
-    return _check("netconvert", found, needed=True, advice=advice)
+        import sumo  # type: ignore[import-untyped]
+    except ImportError:
+        return _check("sumo", shutil.which("sumo"), needed=True, advice=advice)
+    return _check("sumo", str(Path(sumo.SUMO_HOME) / "bin" / "sumo"), needed=True, advice=advice)
 
 
 def _workspace(workspace: Any) -> dict[str, Any]:
