@@ -46,7 +46,7 @@ _ROAD_SPEEDS = {
 }
 
 
-def allowed(lane_type: str, road_type: str) -> frozenset[str]:
+def allowed(lane_type: str) -> frozenset[str]:
     """Vehicle classes on a lane; empty for lanes that nobody drives on.
 
     Walkable lanes are not asked for here: persons have edges of their own.
@@ -56,8 +56,7 @@ def allowed(lane_type: str, road_type: str) -> frozenset[str]:
     if lane_type in _RESERVED:
         return _RESERVED[lane_type]
     if lane_type in DRIVABLE_TYPES:
-        fast = lane_type in _RAMP_TYPES or road_type == "motorway"
-        return _MOTOR if fast else _MOTOR | _SLOW
+        return _MOTOR if lane_type in _RAMP_TYPES else _MOTOR | _SLOW
     return frozenset()
 
 

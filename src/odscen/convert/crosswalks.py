@@ -55,7 +55,7 @@ def place_crosswalks(
     things = crosswalks(odr, table)
     if not things:
         return (), {}
-    usable = [bool(allowed(kind, "")) for kind in table.lane_type]
+    usable = [bool(allowed(kind)) for kind in table.lane_type]
     rows = np.flatnonzero(np.array(usable) & (table.lane_s1 - table.lane_s0 > 1e-3))
     extent = (table.lane_s1 - table.lane_s0)[rows]
     counts = np.maximum(1, np.ceil(extent / DENSE)).astype(np.intp) + 1

@@ -39,7 +39,11 @@ WIDTH_STEP = 0.5
 """Metres between the places at which widths are looked at."""
 
 MARKS_LEAST = 10.0
-"""Metres: a stretch on which only the right to change lanes differs must be this long."""
+"""Metres: a stretch on which only the right to change lanes differs must be this long.
+
+A shorter one is joined to its neighbours, and the change is permitted on all of it: what a driver
+does within a few metres of broken line SUMO's drivers need the length of an edge for.
+"""
 
 
 class Gap(NamedTuple):
@@ -180,7 +184,7 @@ class _Planner:
         rows = [
             int(r)
             for r in table.lanes_at(row, middle)
-            if allowed(table.lane_type[r], road_type)
+            if allowed(table.lane_type[r])
             and float(table.lane_s1[r] - table.lane_s0[r]) >= LEAST_EDGE
             and self._widest(int(r), start, end) >= LEAST_WIDTH
         ]
@@ -201,7 +205,7 @@ class _Planner:
             states[forward].append(
                 _LaneState(
                     lane,
-                    allowed(kind, road_type),
+                    allowed(kind),
                     round(speed(float(limits[index]), kind, road_type), 2),
                     up if forward else down,
                     down if forward else up,
@@ -219,7 +223,7 @@ class _Planner:
         first = int(self._table.section_first[self._table.road_index[road.id]])
         for number, section in enumerate(road.sections):
             rows = range(*(int(n) for n in self._table.section_lanes[first + number :][:2]))
-            lanes = [r for r in rows if allowed(self._table.lane_type[r], "")]
+            lanes = [r for r in rows if allowed(self._table.lane_type[r])]
             if not lanes:
                 continue
             count = max(2, int(np.ceil((section.s_end - section.s) / WIDTH_STEP)) + 1)
@@ -297,8 +301,8 @@ class _Planner:
                     tuple(course),
                     state.allowed,
                     state.speed,
-                    state.change_left,
-                    state.change_right,
+                    any(side[index].change_left for side in sides),
+                    any(side[index].change_right for side in sides),
                     state.type,
                 )
             )

@@ -159,7 +159,7 @@ class _Finder:
                 todo.append((other, float(start), course))
 
     def _open(self, key: LaneKey) -> bool:
-        return bool(allowed(self._table.lane_type[self._table.lane_index[key]], ""))
+        return bool(allowed(self._table.lane_type[self._table.lane_index[key]]))
 
 
 def _extended(course: Course, stretch: Stretch) -> Course:
