@@ -153,9 +153,7 @@ def build_junction(
 
 
 def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
-    return [
-        SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)
-    ]
+    return [SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)]
 
 
 def _obeying(passages: Sequence[Passage]) -> list[Passage]:
@@ -173,9 +171,7 @@ def _obeying(passages: Sequence[Passage]) -> list[Passage]:
     return result
 
 
-def _state(
-    movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool
-) -> str:
+def _state(movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool) -> str:
     """SUMO's letter for the right of way of a link."""
     if lit:
         return "o" if right.yields_to else "O"

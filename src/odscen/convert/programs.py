@@ -105,36 +105,33 @@ def plan_stages(groups: Sequence[SignalGroup], foes: frozenset[tuple[int, int]])
         Pairs of groups (smaller first) that meet.
     """
 
-    def fits(group: int, stage: set[int]) -> bool:
-        return all((min(group, g), max(group, g)) not in foes for g in stage)
-
-    stages: list[set[int]] = []
     vehicles = [n for n, group in enumerate(groups) if not group.walkers]
     walkers = [n for n, group in enumerate(groups) if group.walkers]
-    placed: set[int] = set()
+    stages: list[set[int]] = []
     for number in vehicles:
-        if number in placed:
+        if any(number in stage for stage in stages):
             continue
-        stage = {number}
-        mates = [n for n in vehicles if groups[n].controller == groups[number].controller]
-        for other in (*(mates if groups[number].controller else ()), *vehicles):
-            if other not in placed and other not in stage and fits(other, stage):
-                stage.add(other)
-        placed |= stage
-        stages.append(stage)
-    for number in walkers:
-        for stage in stages:
-            if fits(number, stage):
-                stage.add(number)
-                placed.add(number)
-    left = [n for n in walkers if n not in placed]
-    if left:
-        stages.append(set(left))
-    for stage in stages:
-        for number in (*vehicles, *walkers):
-            if number not in stage and fits(number, stage):
-                stage.add(number)
-    return Stages(tuple(groups), tuple(frozenset(stage) for stage in stages))
+        controller = groups[number].controller
+        mates = [n for n in vehicles if controller and groups[n].controller == controller]
+        left = [n for n in (*mates, *vehicles) if not any(n in stage for stage in stages)]
+        stages.append(_filled({number}, left, foes))
+    stages = [_filled(stage, walkers, foes) for stage in stages]
+    waiting = {n for n in walkers if not any(n in stage for stage in stages)}
+    if waiting:
+        stages.append(waiting)
+    full = [_filled(stage, (*vehicles, *walkers), foes) for stage in stages]
+    return Stages(tuple(groups), tuple(frozenset(stage) for stage in full))
+
+
+def _filled(
+    stage: set[int], candidates: Sequence[int], foes: frozenset[tuple[int, int]]
+) -> set[int]:
+    """Add to a stage what meets nothing in it, in the order given."""
+    result = set(stage)
+    for one in candidates:
+        if all((min(one, other), max(one, other)) not in foes for other in result):
+            result.add(one)
+    return result
 
 
 def program(stages: Stages, links: int) -> tuple[Phase, ...]:
@@ -168,7 +165,9 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
             phases.append(Phase(walk, _state(groups, still, "G", links), "crossings clear"))
         staying = _state(groups, stage & following, "G", links)
         if yellow:
-            state = _state(groups, frozenset(g for g in ending if not groups[g].walkers), "y", links)
+            state = _state(
+                groups, frozenset(g for g in ending if not groups[g].walkers), "y", links
+            )
             phases.append(Phase(yellow, _over(staying, state), "yellow"))
         if red:
             phases.append(Phase(red, staying, "all red"))

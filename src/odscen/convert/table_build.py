@@ -1,4 +1,4 @@
-"""Making the lane table: what each SUMO lane was laid on is known, it only has to be written down."""
+"""Making the lane table: what each SUMO lane was laid on only has to be written down."""
 
 from __future__ import annotations
 

@@ -70,7 +70,9 @@ def from_data(data: dict[str, Any]) -> LaneTable:
     lanes = _lanes(data["lanes"], lane_ids, edge_ids, data["classes"])
     return LaneTable(
         lane_keys=tuple(
-            Roadside(RoadId(road), section, lane) if beside else LaneKey(RoadId(road), section, lane)
+            Roadside(RoadId(road), section, lane)
+            if beside
+            else LaneKey(RoadId(road), section, lane)
             for road, section, lane, *beside in data["lane_keys"]
         ),
         lanes=lanes,

@@ -77,7 +77,9 @@ class SumoMap:
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
-            walk_places=_all_scaled(_places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)),
+            walk_places=_all_scaled(
+                _places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)
+            ),
             net_offset=table.net_offset,
             elevation=table.elevation,
         )
