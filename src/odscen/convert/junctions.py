@@ -34,6 +34,12 @@ FloatArray = NDArray[np.float64]
 LEAST_LENGTH = 0.1
 """Metres of a lane, at least, as SUMO wants it."""
 
+BUS_LENGTH = 12.0
+"""Metres of the longest body that turns are made for."""
+
+MOST_SWEPT = 2.5
+"""Metres that are added to the width of an internal lane, at most."""
+
 _STRAIGHT = math.radians(30.0)
 _AROUND = math.radians(150.0)
 
@@ -193,6 +199,17 @@ def direction(turn: float) -> str:
     return "l" if turn > 0.0 else "r"
 
 
+def _swept(passage: Passage) -> float:
+    """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
+
+    SUMO draws a body as the chord of its path, so that the middle lies inside of it by the sagitta
+    of a circle.
+    """
+    turn = abs(passage.movement.turn)
+    radius = passage.length / max(turn, 1e-3)
+    return min(BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
+
+
 def _passages(
     name: str, passages: Sequence[Passage], states: Sequence[str], rows: Mapping[int, int]
 ) -> tuple[list[NetLane], list[NetEdge], list[NetLink]]:
@@ -207,7 +224,7 @@ def _passages(
             0,
             round(max(passage.length, LEAST_LENGTH), 4),
             passage.speed,
-            movement.width,
+            round(movement.width + _swept(passage), 2),
             passage.allowed,
             movement.shape,
             passage.type,

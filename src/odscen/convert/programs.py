@@ -104,7 +104,6 @@ def plan_stages(groups: Sequence[SignalGroup], foes: frozenset[tuple[int, int]])
     foes
         Pairs of groups (smaller first) that meet.
     """
-
     vehicles = [n for n, group in enumerate(groups) if not group.walkers]
     walkers = [n for n, group in enumerate(groups) if group.walkers]
     stages: list[set[int]] = []
