@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive, Road
 
-LEAST_EDGE = 0.1
+LEAST_EDGE = 0.05
 """Metres: shorter stretches of lanes are passed over on the way from one edge to the next."""
 
 LEAST_CUT = 1.0
