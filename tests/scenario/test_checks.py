@@ -222,3 +222,12 @@ def test_an_unknown_light_is_named_with_those_that_there_are() -> None:
     (problem,) = check(timed, GRAPH, lights=())
     assert "the map has no traffic lights" in problem.message
     assert check(timed, GRAPH) == ()
+
+
+def test_a_wrong_number_of_greens_is_answered_with_those_of_the_program() -> None:
+    timed = scenario(actor(), signals={"junctions": [{"junction": "X0", "green": [9]}]})
+    (problem,) = check(timed, GRAPH, lights=LIGHTS)
+    assert (
+        "2 stages, but green has 1 times; give one for each (the map's are 30, 7)"
+        in problem.message
+    )

@@ -57,9 +57,10 @@ def signal_problems(signals: Signals, lights: Sequence[Light]) -> Iterator[Probl
             yield error("light_twice", f"{where}.junction", message)
         timed.setdefault(light, where)
         if timing.green and len(timing.green) != len(light.green):
+            program = ", ".join(f"{seconds:g}" for seconds in light.green)
             message = (
                 f"the light of junction {timing.junction!r} has {len(light.green)} stages, but "
-                f"green has {len(timing.green)} times; give one for each"
+                f"green has {len(timing.green)} times; give one for each (the map's are {program})"
             )
             yield error("wrong_number_of_greens", f"{where}.green", message)
         for stage, seconds in enumerate(timing.green):
