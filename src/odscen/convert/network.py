@@ -85,7 +85,7 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
     builder = _Builder(odr, table, found, nodes, on_foot, lefthand=lefthand)
     net = builder.net()
-    lanes = build_table(net, table, builder.laid(), on_foot)
+    lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
     entries, figures = findings(odr, table, net, lanes, found, builder.ruled, crosswalks)
     notes = [Entry(Fate.REPAIRED, *_split(note)) for note in odr.notes]
     report = ConversionReport.of([*notes, *entries], figures)

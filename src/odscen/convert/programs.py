@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.convert.net import Phase
+from odscen.convert.net import STAGE, Phase
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -155,7 +155,7 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
         green = float(round(min(max(share, LEAST_GREEN), MOST_GREEN))) if vehicles else WALK_GREEN
         if not stage:
             green = REST
-        name = f"stage {number + 1}"
+        name = f"{STAGE}{number + 1}"
         bounds = (LEAST_GREEN, PROLONGED * green) if vehicles else (0.0, 0.0)
         phases.append(Phase(green, _state(groups, stage, "G", links), name, *bounds))
         ending = stage - following
