@@ -295,15 +295,15 @@ def _light(
     foes = set(conflicts.pairs)
     foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
     heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
-    for link in ruled:
-        own = heads.setdefault((passages[link].movement.source[0], passages[link].lights), [[]])
-        fitting = next(
-            (g for g in own if all((min(link, n), max(link, n)) not in foes for n in g)), None
-        )
+    for lane in _lanes_of(passages, ruled):
+        # Who waits for the green of one lane must not be held up by those who wait for another.
+        key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
+        own = heads.setdefault(key, [])
+        fitting = next((group for group in own if not _meet(lane, group, foes)), None)
         if fitting is None:
-            own.append([link])
+            own.append(lane)
         else:
-            fitting.append(link)
+            fitting += lane
     groups: list[SignalGroup] = []
     members: list[list[int]] = []
     for (_, lights), parts in heads.items():
@@ -327,11 +327,24 @@ def _light(
         (i, j)
         for i, one in enumerate(members)
         for j, other in enumerate(members[i + 1 :], start=i + 1)
-        if any((min(a, b), max(a, b)) in foes for a in one for b in other)
+        if _meet(one, other, foes)
     )
     phases = program(plan_stages(groups, meeting), len(rows))
     signals = tuple(passages[n].lights if n < count else () for n in rows)
     return TrafficLight(name, phases, signals=signals), rows
+
+
+def _lanes_of(passages: Sequence[Passage], ruled: Sequence[int]) -> list[list[int]]:
+    """Links by the lane that they leave and the signals that rule them, in order."""
+    found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
+    for link in ruled:
+        passage = passages[link]
+        found.setdefault((passage.movement.source, passage.lights), []).append(link)
+    return list(found.values())
+
+
+def _meet(one: Sequence[int], other: Sequence[int], foes: set[tuple[int, int]]) -> bool:
+    return any((min(a, b), max(a, b)) in foes for a in one for b in other)
 
 
 def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:

@@ -6,7 +6,8 @@ nobody turns left through oncoming traffic and nobody turns over a crossing with
 common practice:
 
 - yellow by speed: 3 s up to 50 km/h, 4 s up to 60, 5 s above (RiLSA 2015, section 2.4);
-- all-red until the last vehicle has left: (way through the junction + 6 m) / speed;
+- all-red until the last vehicle has left, (way through the junction + 6 m) / speed, but for the
+  second that the next ones need to start;
 - a crossing turns red so early that one who has just started walks over at 1.2 m/s.
 """
 
@@ -35,8 +36,11 @@ REST = 15.0
 WALKER = 1.2
 """m/s."""
 
-CLEARING = 10.0
+CLEARING = 14.0
 """m/s at which vehicles are taken to leave a junction, at most."""
+
+STARTING = 1.0
+"""Seconds after the change to green before anybody moves."""
 
 VEHICLE = 6.0
 """Metres of a vehicle that must have left."""
@@ -82,7 +86,7 @@ class SignalGroup(NamedTuple):
         if self.walkers:
             return math.ceil(self.way / WALKER)
         pace = min(max(self.speed, 3.0), CLEARING)
-        return min(max(math.ceil((self.way + VEHICLE) / pace), 1.0), 8.0)
+        return min(max(math.ceil((self.way + VEHICLE) / pace - STARTING), 1.0), 8.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,9 +89,7 @@ def build_table(
         counts=net.counts(),
         elevation=not net.flat,
         lights=tuple(
-            SumoLight(
-                light.id, xodr.get(light.id, ()), light.phases, light.offset, light.signals
-            )
+            SumoLight(light.id, xodr.get(light.id, ()), light.phases, light.offset, light.signals)
             for light in net.lights
         ),
     )
