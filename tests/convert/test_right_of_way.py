@@ -159,7 +159,7 @@ def test_some_never_meet(pair: tuple[Movement, Movement]) -> None:
 
 def test_what_runs_over_a_bridge_meets_nobody_below() -> None:
     above = movement(NORTH, NORTH)
-    above = replace(above, shape=above.shape + [0.0, 0.0, 6.0])
+    above = replace(above, shape=above.shape + np.array([0.0, 0.0, 6.0]))
     assert find_conflicts([movement(EAST, EAST), above], []).pairs == ()
     crossing = Walkway(np.array([[-1.0, -5.0, 6.0], [-1.0, 1.0, 6.0]]), 3.0)
     assert find_conflicts([movement(EAST, EAST)], [crossing]).crossed == ((),)
@@ -167,7 +167,9 @@ def test_what_runs_over_a_bridge_meets_nobody_below() -> None:
 
 def test_side_by_side_lanes_of_one_road_do_not_meet() -> None:
     one = movement(EAST, EAST)
-    beside = replace(one, source=("in0", 1), target=("out0", 1), shape=one.shape + [0.0, 1.5, 0.0])
+    beside = replace(
+        one, source=("in0", 1), target=("out0", 1), shape=one.shape + np.array([0.0, 1.5, 0.0])
+    )
     assert find_conflicts([one, beside], []).pairs == ()
 
 
@@ -196,6 +198,7 @@ all_rules = st.builds(
     Rules,
     st.frozensets(st.tuples(st.sampled_from("abc"), st.sampled_from("abc")), max_size=3),
     st.booleans(),
+    all_stop=st.just(False),
 )
 
 
