@@ -85,7 +85,7 @@ class Traffic:
         return min(one.speed for one in self.seen[who] if not edges or one.edge in edges)
 
 
-def drive(made: Converted, *who: Car | Person, until: float = 120.0) -> Traffic:
+def drive(made: Converted, *who: Car | Person, until: float = 120.0, step: float = STEP) -> Traffic:
     """Run SUMO; teleports, collisions and emergency brakes are in ``said``."""
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -97,7 +97,7 @@ def drive(made: Converted, *who: Car | Person, until: float = 120.0) -> Traffic:
             [
                 BIN / "sumo", "-n", "net.net.xml", "-r", "routes.rou.xml",
                 "--fcd-output", "fcd.xml", "--fcd-output.attributes", "id,x,y,speed,lane,edge",
-                "--tripinfo-output", "trips.xml", "--step-length", str(STEP), "--no-step-log",
+                "--tripinfo-output", "trips.xml", "--step-length", str(step), "--no-step-log",
                 "--end", str(until), "--collision.check-junctions", "--precision", "4",
                 "--time-to-teleport", "-1", "--seed", "3", "--xml-validation", "never",
             ],
