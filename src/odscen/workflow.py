@@ -26,6 +26,7 @@ from odscen.scenario.sampling import choose_map, sample_scenario
 from odscen.sumo.layout import NET_FILE
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.runner import RunJob, run_many, write_sumo_files
+from odscen.sumo.signals import scenario_lights
 from odscen.sumo.sumo_map import SumoMap
 from odscen.sumo.usable import usable_places
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from odscen.results.expectations import Expectation
     from odscen.scenario.document import Scenario
     from odscen.scenario.problems import Problem
+    from odscen.scenario.signals import Light
     from odscen.scenario.supply import Usable
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunResult
@@ -53,13 +55,15 @@ class LoadedMap:
     sumo: SumoMap
     usable: Usable
     drawing: MapDrawing
+    lights: tuple[Light, ...]
 
 
 @lru_cache(maxsize=4)
 def load_map(entry: MapEntry) -> LoadedMap:
     """Load a map; the last few stay in memory."""
     sumo = SumoMap.of(entry.graph(), entry.lane_table())
-    return LoadedMap(entry, sumo, usable_places(sumo), entry.drawing())
+    lights = scenario_lights(sumo.lights)
+    return LoadedMap(entry, sumo, usable_places(sumo), entry.drawing(), lights)
 
 
 def read_scenario(path: Path) -> Scenario:
@@ -97,7 +101,7 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
 def check_scenario(workspace: Workspace, scenario: Scenario) -> tuple[Problem, ...]:
     """Every problem of a scenario on its map, see :mod:`odscen.scenario.checks`."""
     loaded = load_map(workspace.map_for(scenario.map.name, scenario.map.sha256))
-    return check(scenario, loaded.sumo.graph, shipped_assets())
+    return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights)
 
 
 def read_config(path: Path | None) -> SamplingConfig:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLink
+from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
+from odscen.convert.net import Phase
 from odscen.convert.pieces import Piece
-from odscen.ids import LaneKey, RoadId, SumoEdgeId, SumoLaneId
+from odscen.ids import JunctionId, LaneKey, RoadId, SumoEdgeId, SumoLaneId
 
 DRIVE = LaneKey(RoadId("1"), 0, -1)
 AGAINST = LaneKey(RoadId("1"), 0, 1)
@@ -72,4 +73,13 @@ def table() -> LaneTable:
         lefthand=False,
         counts={"edges": 5, "lanes": 5},
         elevation=True,
+        lights=(
+            SumoLight(
+                "t",
+                (JunctionId("9"), JunctionId("10")),
+                (Phase(20.0, "G", "stage 1", 8.0, 40.0), Phase(3.0, "y", "yellow")),
+                0.0,
+                (("17", "18"),),
+            ),
+        ),
     )

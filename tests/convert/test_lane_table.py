@@ -102,6 +102,7 @@ def test_the_json_form_gives_the_table_back() -> None:
     assert back.edges == TABLE.edges
     assert back.links == TABLE.links
     assert back.walk_links == TABLE.walk_links
+    assert back.lights == TABLE.lights
     assert (back.net_offset, back.boundary) == (TABLE.net_offset, TABLE.boundary)
     assert (back.lefthand, back.elevation, back.counts) == (False, True, TABLE.counts)
     for one, other in zip(back.pieces, TABLE.pieces, strict=True):

@@ -3,7 +3,15 @@
 from hypothesis import strategies as st
 
 from odscen.categories import Category
-from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario
+from odscen.scenario.document import (
+    Actor,
+    Environment,
+    Flow,
+    JunctionTiming,
+    MapReference,
+    Scenario,
+    Signals,
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text(
@@ -44,6 +52,15 @@ environments = st.builds(
     parameters=st.dictionaries(labels, finite, max_size=3),
     affects_driving=st.booleans(),
 )
+controls = st.sampled_from(["fixed", "actuated"])
+timings = st.builds(
+    JunctionTiming,
+    junction=labels,
+    control=st.none() | controls,
+    offset=st.floats(0, 3600),
+    green=st.lists(st.floats(0, 3600), max_size=3).map(tuple),
+)
+signals = st.builds(Signals, control=controls, junctions=st.lists(timings, max_size=3).map(tuple))
 scenarios = st.builds(
     Scenario,
     name=labels,
@@ -54,4 +71,5 @@ scenarios = st.builds(
     environment=environments,
     actors=st.lists(actors, max_size=4).map(tuple),
     flows=st.lists(flows, max_size=3).map(tuple),
+    signals=signals,
 )

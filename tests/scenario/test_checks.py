@@ -8,6 +8,7 @@ from odscen.lanegraph.model import MapGraph
 from odscen.scenario.checks import check
 from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario
 from odscen.scenario.problems import Problem
+from odscen.scenario.signals import Light
 from tests.graphs import SHA256, fork, line_of_segments, two_lane_road
 
 GRAPH = fork()
@@ -181,3 +182,52 @@ def test_a_setting_that_no_run_acts_on_is_a_warning() -> None:
     assert [(p.severity, p.code, p.where) for p in found] == [
         ("warning", "not_acted_on", "actors[0].ignores_red")
     ]
+
+
+LIGHTS = (Light(("5", "6"), (20.0, 20.0, 7.0)), Light(("X0",), (30.0, 7.0)))
+
+
+def signal_codes(
+    *timings: dict[str, Any], lights: tuple[Light, ...] = LIGHTS
+) -> list[tuple[str, str]]:
+    timed = scenario(actor(), signals={"junctions": timings})
+    return [(p.code, p.where) for p in check(timed, GRAPH, lights=lights)]
+
+
+def test_lights_are_timed_by_any_of_their_junctions_or_by_their_own_id() -> None:
+    good = {"junction": "6", "green": [5, 60, 7]}, {"junction": "X0", "control": "actuated"}
+    assert signal_codes(*good) == []
+
+
+@pytest.mark.parametrize(
+    ("timings", "code", "where"),
+    [
+        ([{"junction": "7"}], "unknown_light", "junctions[0].junction"),
+        ([{"junction": "J5"}], "unknown_light", "junctions[0].junction"),
+        ([{"junction": "5"}, {"junction": "6"}], "light_twice", "junctions[1].junction"),
+        ([{"junction": "5", "green": [9, 9]}], "wrong_number_of_greens", "junctions[0].green"),
+        ([{"junction": "X0", "green": [9, 4.9]}], "green_too_short", "junctions[0].green[1]"),
+    ],
+)
+def test_timing_that_a_light_cannot_have_is_an_error(
+    timings: list[dict[str, Any]], code: str, where: str
+) -> None:
+    assert signal_codes(*timings) == [(code, f"signals.{where}")]
+
+
+def test_an_unknown_light_is_named_with_those_that_there_are() -> None:
+    timed = scenario(actor(), signals={"junctions": [{"junction": "7"}]})
+    (problem,) = check(timed, GRAPH, lights=LIGHTS)
+    assert "'7'; there are lights in '5', '6', 'X0'" in problem.message
+    (problem,) = check(timed, GRAPH, lights=())
+    assert "the map has no traffic lights" in problem.message
+    assert check(timed, GRAPH) == ()
+
+
+def test_a_wrong_number_of_greens_is_answered_with_those_of_the_program() -> None:
+    timed = scenario(actor(), signals={"junctions": [{"junction": "X0", "green": [9]}]})
+    (problem,) = check(timed, GRAPH, lights=LIGHTS)
+    assert (
+        "2 stages, but green has 1 times; give one for each (the map's are 30, 7)"
+        in problem.message
+    )

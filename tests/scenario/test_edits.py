@@ -4,7 +4,8 @@ from odscen.categories import Category
 from odscen.errors import NotFoundError, ScenarioError
 from odscen.lanegraph.model import MapGraph
 from odscen.scenario import edits
-from odscen.scenario.document import Scenario
+from odscen.scenario.document import JunctionTiming, Scenario
+from odscen.scenario.signals import Light
 from tests.graphs import fork, line_of_segments
 
 GRAPH = fork()
@@ -167,3 +168,43 @@ def test_name_seed_and_simulation_change() -> None:
     assert (new.name, new.description, new.seed, new.simulation.duration) == ("other", "why", 7, 60)
     with pytest.raises(ScenarioError, match="duration"):
         edits.set_simulation(new, duration=0)
+
+
+LIGHTS = (Light(("5", "6"), (20.0, 7.0)), Light(("X0",), (30.0, 7.0)))
+
+
+def test_lights_are_timed_one_by_one_and_given_back() -> None:
+    one = edits.set_timing(scenario(), LIGHTS, "5", green=[25, 8])
+    two = edits.set_timing(one, LIGHTS, "X0", control="actuated")
+    three = edits.set_timing(two, LIGHTS, "6", offset=12)  # the same light as 5
+    assert three.signals.junctions == (
+        JunctionTiming(junction="5", green=(25.0, 8.0), offset=12.0),
+        JunctionTiming(junction="X0", control="actuated"),
+    )
+    assert edits.clear_timing(three, "5").signals.junctions == two.signals.junctions[1:]
+    assert scenario().signals == edits.clear_timing(one, "5").signals
+    with pytest.raises(NotFoundError, match="'6'"):
+        edits.clear_timing(three, "6")
+
+
+@pytest.mark.parametrize(
+    ("junction", "fields", "reason"),
+    [
+        ("7", {}, "no traffic light"),
+        ("5", {"green": [20]}, "2 stages"),
+        ("5", {"green": [20, 1]}, "too short"),
+        ("5", {"control": "by hand"}, "control"),
+        ("5", {"yellow": 1}, "yellow"),
+    ],
+)
+def test_timing_that_can_never_be_right_is_refused(
+    junction: str, fields: dict[str, object], reason: str
+) -> None:
+    with pytest.raises(ScenarioError, match=reason):
+        edits.set_timing(scenario(), LIGHTS, junction, **fields)
+
+
+def test_all_lights_are_actuated_at_once() -> None:
+    new = edits.set_signal_control(scenario(), control="actuated")
+    assert new.signals.control == "actuated"
+    assert edits.set_signal_control(new, control="fixed") == scenario()

@@ -7,7 +7,7 @@ from hypothesis import given
 
 from odscen.categories import Category
 from odscen.errors import ScenarioError
-from odscen.scenario.document import Actor, MapReference, Scenario
+from odscen.scenario.document import Actor, JunctionTiming, MapReference, Scenario, Signals
 from odscen.scenario.files import dumps, loads, read_any, schema
 from tests.scenario.strategies import scenarios
 
@@ -27,6 +27,15 @@ def test_each_actor_is_one_line_without_defaults() -> None:
     actor = Actor(id="car-1", category=Category.CAR, spawn="1.0.-1.0", speed=12.5)
     text = dumps(Scenario(name="one", map=MAP, roi=("r1",), actors=(actor,)))
     line = '    {"id": "car-1", "category": "car", "spawn": "1.0.-1.0", "speed": 12.5}'
+    assert line in text.splitlines()
+
+
+def test_signals_are_written_only_where_they_are_not_the_maps_and_without_defaults() -> None:
+    plain = Scenario(name="one", map=MAP, roi=("r1",))
+    assert "signals" not in dumps(plain)
+    timing = JunctionTiming(junction="54", green=(20.0, 7.0))
+    text = dumps(plain.model_copy(update={"signals": Signals(junctions=(timing,))}))
+    line = '  "signals": {"junctions": [{"junction": "54", "green": [20.0, 7.0]}]},'
     assert line in text.splitlines()
 
 

@@ -13,7 +13,7 @@ from odscen.scenario.document import Actor, Flow, MapReference, Scenario
 from odscen.scenario.files import read_any
 from odscen.scenario.graphform import from_graph, from_graphml, to_graph, to_graphml
 from tests.graphs import SHA256, fork
-from tests.scenario.strategies import actors, environments, flows, labels, names
+from tests.scenario.strategies import actors, environments, flows, labels, names, signals
 
 GRAPH = fork()
 WHOLE = ("r1", "j9", "r2", "r3")
@@ -42,6 +42,7 @@ def placed(draw: st.DrawFn) -> Scenario:
         environment=draw(environments),
         actors=tuple(one for one in ones if isinstance(one, Actor)),
         flows=tuple(one for one in ones if isinstance(one, Flow)),
+        signals=draw(signals),
     )
 
 
@@ -130,6 +131,12 @@ def test_broken_graphml_is_refused_with_the_reason(old: str, new: str, reason: s
         from_graphml(text.replace(old, new), file="x.graphml")
     assert reason in str(caught.value)
     assert str(caught.value).startswith("x.graphml")
+
+
+def test_signals_that_are_all_the_maps_leave_no_attribute() -> None:
+    assert "signals" not in to_graph(example(), GRAPH).graph
+    timed = edits.set_signal_control(example(), control="actuated")
+    assert to_graph(timed, GRAPH).graph["signals"] == '{"control": "actuated"}'
 
 
 def test_the_same_scenario_gives_the_same_text() -> None:

@@ -35,7 +35,7 @@ LEVEL = 2.5
 
 
 class PlacedCrosswalk(NamedTuple):
-    """A crosswalk, the roads outside junctions that it lies on (and where), and connecting roads."""
+    """A crosswalk, roads outside junctions that it lies on (with s), and connecting roads."""
 
     crosswalk: Crosswalk
     roads: tuple[tuple[RoadId, float], ...]

@@ -1,13 +1,14 @@
 """Edges: every road divided into stretches of unchanging lanes, one edge per driving direction.
 
-A road is cut where the lanes of its sections do not simply continue, where speed limits, permissions
-or the right to change lanes change, and at crosswalks, which become junctions of their own: cars
-give way to persons only where SUMO has a crossing, and crossings belong to junctions.
+A road is cut where the lanes of its sections do not simply continue, where speed limits,
+permissions or the right to change lanes change, and at crosswalks, which become junctions of their
+own: cars give way to persons only where SUMO has a crossing, and crossings belong to junctions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive, Road
 
-LEAST_EDGE = 0.1
+LEAST_EDGE = 0.05
 """Metres: shorter stretches of lanes are passed over on the way from one edge to the next."""
 
 LEAST_CUT = 1.0
@@ -163,14 +164,15 @@ class _Planner:
         others = {kind.s for kind in road.types} | self._narrow_ends(road)
         for section in road.sections:
             for lane in section.lanes.values():
-                others |= {item.s for item in (*lane.speeds, *lane.road_marks)}
+                others |= {speed.s for speed in lane.speeds}
+                others |= {mark.s for mark in lane.road_marks}
         kept = sorted(s for s in borders if 0.0 <= s <= road.length)
         for place in sorted(others):
             if 0.0 < place < road.length and all(abs(place - s) >= LEAST_CUT for s in kept):
                 kept.append(place)
         kept.sort()
         parts: list[_Part] = []
-        for start, end in zip(kept, kept[1:], strict=False):
+        for start, end in pairwise(kept):
             middle = 0.5 * (start + end)
             if end - start < LEAST_EDGE or any(gap.start < middle < gap.end for gap in gaps):
                 continue

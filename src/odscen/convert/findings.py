@@ -103,7 +103,9 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Entry
             gap = length - covered.get(key, 0.0)
             if gap > WORTH_TELLING:
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
-                reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
+                reason = (
+                    f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
+                )
                 yield Entry(Fate.LOST, _place(*key), reason)
         elif kind not in ("none", ""):
             reason = f"lanes of type {kind} are open to nobody and left out"
@@ -122,8 +124,8 @@ def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, fl
         where = "road" if odr.roads[key.road].junction is None else "junction"
         length = float(table.lane_s1[row] - table.lane_s0[row])
         for name, value in (("length", length), ("covered", covered.get(key, 0.0))):
-            name = f"{kind}_{where}_{name}"
-            figures[name] = figures.get(name, 0.0) + value
+            full = f"{kind}_{where}_{name}"
+            figures[full] = figures.get(full, 0.0) + value
     return {name: round(value, 2) for name, value in sorted(figures.items())}
 
 

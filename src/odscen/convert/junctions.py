@@ -34,6 +34,12 @@ FloatArray = NDArray[np.float64]
 LEAST_LENGTH = 0.1
 """Metres of a lane, at least, as SUMO wants it."""
 
+BUS_LENGTH = 12.0
+"""Metres of the longest body that turns are made for."""
+
+MOST_SWEPT = 2.5
+"""Metres that are added to the width of an internal lane, at most."""
+
 _STRAIGHT = math.radians(30.0)
 _AROUND = math.radians(150.0)
 
@@ -153,9 +159,7 @@ def build_junction(
 
 
 def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
-    return [
-        SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)
-    ]
+    return [SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)]
 
 
 def _obeying(passages: Sequence[Passage]) -> list[Passage]:
@@ -173,9 +177,7 @@ def _obeying(passages: Sequence[Passage]) -> list[Passage]:
     return result
 
 
-def _state(
-    movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool
-) -> str:
+def _state(movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool) -> str:
     """SUMO's letter for the right of way of a link."""
     if lit:
         return "o" if right.yields_to else "O"
@@ -197,6 +199,17 @@ def direction(turn: float) -> str:
     return "l" if turn > 0.0 else "r"
 
 
+def _swept(passage: Passage) -> float:
+    """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
+
+    SUMO draws a body as the chord of its path, so that the middle lies inside of it by the sagitta
+    of a circle.
+    """
+    turn = abs(passage.movement.turn)
+    radius = passage.length / max(turn, 1e-3)
+    return min(BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
+
+
 def _passages(
     name: str, passages: Sequence[Passage], states: Sequence[str], rows: Mapping[int, int]
 ) -> tuple[list[NetLane], list[NetEdge], list[NetLink]]:
@@ -211,7 +224,7 @@ def _passages(
             0,
             round(max(passage.length, LEAST_LENGTH), 4),
             passage.speed,
-            movement.width,
+            round(movement.width + _swept(passage), 2),
             passage.allowed,
             movement.shape,
             passage.type,
@@ -282,15 +295,15 @@ def _light(
     foes = set(conflicts.pairs)
     foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
     heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
-    for link in ruled:
-        own = heads.setdefault((passages[link].movement.source[0], passages[link].lights), [[]])
-        fitting = next(
-            (g for g in own if all((min(link, n), max(link, n)) not in foes for n in g)), None
-        )
+    for lane in _lanes_of(passages, ruled):
+        # Who waits for the green of one lane must not be held up by those who wait for another.
+        key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
+        own = heads.setdefault(key, [])
+        fitting = next((group for group in own if not _meet(lane, group, foes)), None)
         if fitting is None:
-            own.append([link])
+            own.append(lane)
         else:
-            fitting.append(link)
+            fitting += lane
     groups: list[SignalGroup] = []
     members: list[list[int]] = []
     for (_, lights), parts in heads.items():
@@ -314,11 +327,24 @@ def _light(
         (i, j)
         for i, one in enumerate(members)
         for j, other in enumerate(members[i + 1 :], start=i + 1)
-        if any((min(a, b), max(a, b)) in foes for a in one for b in other)
+        if _meet(one, other, foes)
     )
     phases = program(plan_stages(groups, meeting), len(rows))
     signals = tuple(passages[n].lights if n < count else () for n in rows)
     return TrafficLight(name, phases, signals=signals), rows
+
+
+def _lanes_of(passages: Sequence[Passage], ruled: Sequence[int]) -> list[list[int]]:
+    """Links by the lane that they leave and the signals that rule them, in order."""
+    found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
+    for link in ruled:
+        passage = passages[link]
+        found.setdefault((passage.movement.source, passage.lights), []).append(link)
+    return list(found.values())
+
+
+def _meet(one: Sequence[int], other: Sequence[int], foes: set[tuple[int, int]]) -> bool:
+    return any((min(a, b), max(a, b)) in foes for a in one for b in other)
 
 
 def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:

@@ -21,13 +21,14 @@ from odscen.errors import GraphFormatError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.ids import LaneKey, Roadside, SumoEdgeId, SumoLaneId
+    from odscen.convert.net import Phase
+    from odscen.ids import JunctionId, LaneKey, Roadside, SumoEdgeId, SumoLaneId
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
-VERSION = 2
+VERSION = 3
 
 
 class SumoPlace(NamedTuple):
@@ -118,6 +119,28 @@ class SumoLink(NamedTuple):
     tl: str
 
 
+class SumoLight(NamedTuple):
+    """A traffic light of the network, with its program.
+
+    Attributes
+    ----------
+    junctions
+        OpenDRIVE junctions that it stands in; none at a crosswalk on the open road.
+    phases
+        In their order; the letters of a state are those of the links that the light rules.
+    offset
+        Seconds.
+    signals
+        For each link the OpenDRIVE signals behind it; none for crossings.
+    """
+
+    id: str
+    junctions: tuple[JunctionId, ...]
+    phases: tuple[Phase, ...]
+    offset: float
+    signals: tuple[tuple[str, ...], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class LaneTable:
     """Where OpenDRIVE lanes are in the SUMO network, and back; immutable.
@@ -144,6 +167,8 @@ class LaneTable:
         Numbers of edges, lanes, junctions, tl_logics, crossings, ... for the catalogue.
     elevation
         Whether the network has heights.
+    lights
+        Traffic lights, in the order of the file.
     """
 
     lane_keys: tuple[LaneKey | Roadside, ...]
@@ -157,6 +182,7 @@ class LaneTable:
     lefthand: bool
     counts: Mapping[str, int]
     elevation: bool
+    lights: tuple[SumoLight, ...] = ()
 
     # Crossing over
 

@@ -30,6 +30,9 @@ DIGITS = 4
 VERSION = "1.20"
 """Version of the network format."""
 
+STAGE = "stage "
+"""How the names of phases begin that give green; a number follows, from 1."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetLane:
@@ -128,7 +131,7 @@ class NetJunction:
 class Phase:
     """One ``<phase>``: seconds, and a letter for each link of the light.
 
-    ``least`` and ``most`` bound a phase that vehicles may prolong; equal to ``duration`` otherwise.
+    ``least`` and ``most`` bound a phase that vehicles may prolong, in seconds; both 0 otherwise.
     """
 
     duration: float
@@ -136,6 +139,11 @@ class Phase:
     name: str = ""
     least: float = 0.0
     most: float = 0.0
+
+    @property
+    def is_stage(self) -> bool:
+        """Whether it is the green of a stage, not the change to the next one."""
+        return self.name.startswith(STAGE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +213,7 @@ class Net:
         for edge in (*inner, *outer):
             lines += self._edge(edge)
         for light in self.lights:
-            lines += _light(light)
+            lines += light_xml(light)
         for junction in self.junctions:
             lines += self._junction(junction)
         lines += [_link(link) for link in self.links]
@@ -277,7 +285,8 @@ def _link(link: NetLink) -> str:
     )
 
 
-def _light(light: TrafficLight) -> Iterator[str]:
+def light_xml(light: TrafficLight) -> Iterator[str]:
+    """Lines of one ``<tlLogic>``."""
     yield (
         f'    <tlLogic id="{light.id}" type="{light.type}" programID="{light.program}"'
         f' offset="{light.offset:g}">'

@@ -85,7 +85,7 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
     builder = _Builder(odr, table, found, nodes, on_foot, lefthand=lefthand)
     net = builder.net()
-    lanes = build_table(net, table, builder.laid(), on_foot)
+    lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
     entries, figures = findings(odr, table, net, lanes, found, builder.ruled, crosswalks)
     notes = [Entry(Fate.REPAIRED, *_split(note)) for note in odr.notes]
     report = ConversionReport.of([*notes, *entries], figures)
@@ -157,8 +157,8 @@ class _Builder:
             for index, lane in enumerate(edge.lanes):
                 line = self._lane_lines[number][index]
                 found.append((self._net_edges[number].lanes[index], line, lane.course))
-        for number, lane in sorted(self._via.items()):
-            found.append((lane, self._way_lines[number], self._ways[number].course))
+        for number, inner in sorted(self._via.items()):
+            found.append((inner, self._way_lines[number], self._ways[number].course))
         return found
 
     def net(self) -> Net:
@@ -207,11 +207,11 @@ class _Builder:
             for lane in self._net_edges[edge].lanes
         ]
         crossings = self._walks.crossings.get(name, ())
-        lanes += [(c.walkway.axis, c.walkway.width, which) for c in crossings for which in (True, False)]
-        shape = outline(lanes)
-        walked = [
-            walk.edge.lanes[0].id for walk in self._walks.lanes if walk.edge.end == name
+        lanes += [
+            (c.walkway.axis, c.walkway.width, which) for c in crossings for which in (True, False)
         ]
+        shape = outline(lanes)
+        walked = [walk.edge.lanes[0].id for walk in self._walks.lanes if walk.edge.end == name]
         incoming = [lane.id for edge in ends for lane in self._net_edges[edge].lanes]
         x, y, z = (float(value) for value in shape.mean(axis=0))
         junctions = self._nodes.xodr.get(name, ())
@@ -337,10 +337,8 @@ class _Builder:
     # Persons
 
     def _walk_junctions(self) -> list[NetJunction]:
-        known = {name: [] for name in (j.id for j in self._walks.junctions)}
+        known: dict[str, list[SumoLaneId]] = {j.id: [] for j in self._walks.junctions}
         for walk in self._walks.lanes:
             if walk.edge.end in known:
                 known[walk.edge.end].append(walk.edge.lanes[0].id)
         return [replace(j, incoming=tuple(known[j.id])) for j in self._walks.junctions]
-
-

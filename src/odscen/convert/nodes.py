@@ -6,21 +6,18 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.edges import LEAST_EDGE
-from odscen.convert.ways import Groups
+from odscen.convert.ways import Groups, Key
 from odscen.ids import RoadId
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.convert.crosswalks import PlacedCrosswalk
-    from odscen.convert.edges import EdgePlan, Gap
+    from odscen.convert.edges import Gap
     from odscen.convert.ways import Ways
     from odscen.ids import JunctionId
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive, Road, RoadLink
-
-Port = tuple[object, ...]
-"""Where ways meet: a junction, an end of a road, a cut, a crosswalk."""
 
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]+")
 
@@ -60,23 +57,8 @@ def find_nodes(
     crosswalks: Sequence[PlacedCrosswalk],
 ) -> Nodes:
     """Join the ends of edges: those of one OpenDRIVE junction, and those that ways connect."""
-    groups = Groups()
-    for junction in odr.junctions:
-        groups.find(("junction", junction))
-    for road in odr.roads.values():
-        for end, link in (("start", road.predecessor), ("end", road.successor)):
-            _join_link(odr, groups, road, end, link)
-        for gap in gaps.get(road.id, ()):
-            groups.join(_port(road, gap.start), _port(road, gap.end))
-    walked = [("crosswalk", number) for number in range(len(crosswalks))]
-    for own, placed in zip(walked, crosswalks, strict=True):
-        groups.find(own)
-        for road_id in placed.connecting:
-            groups.join(("junction", odr.roads[road_id].junction), own)
-        for road_id, s in placed.roads:
-            for gap in gaps[road_id]:
-                if gap.start <= s <= gap.end:
-                    groups.join(_port(odr.roads[road_id], gap.start), own)
+    groups = _joined(odr, gaps)
+    walked = [_join_crosswalk(odr, groups, gaps, n, c) for n, c in enumerate(crosswalks)]
     roads = [odr.roads[table.road_ids[edge.road]] for edge in found.edges]
     heads = [_port(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]
     tails = [_port(road, edge.start) for road, edge in zip(roads, found.edges, strict=True)]
@@ -103,7 +85,38 @@ def find_nodes(
     )
 
 
-def _name(port: Port) -> str:
+def _joined(odr: OpenDrive, gaps: Mapping[RoadId, Sequence[Gap]]) -> Groups:
+    """Ends of roads joined as the roads' links say, and over crosswalks."""
+    groups = Groups()
+    for junction in odr.junctions:
+        groups.find(("junction", junction))
+    for road in odr.roads.values():
+        for end, link in (("start", road.predecessor), ("end", road.successor)):
+            _join_link(odr, groups, road, end, link)
+        for gap in gaps.get(road.id, ()):
+            groups.join(_port(road, gap.start), _port(road, gap.end))
+    return groups
+
+
+def _join_crosswalk(
+    odr: OpenDrive,
+    groups: Groups,
+    gaps: Mapping[RoadId, Sequence[Gap]],
+    number: int,
+    placed: PlacedCrosswalk,
+) -> Key:
+    own: Key = ("crosswalk", number)
+    groups.find(own)
+    for road_id in placed.connecting:
+        groups.join(("junction", odr.roads[road_id].junction), own)
+    for road_id, s in placed.roads:
+        for gap in gaps[road_id]:
+            if gap.start <= s <= gap.end:
+                groups.join(_port(odr.roads[road_id], gap.start), own)
+    return own
+
+
+def _name(port: Key) -> str:
     """What a node is called: after its junction, or after the end of a road."""
     kind, *rest = port
     if kind == "junction":
@@ -116,7 +129,7 @@ def _name(port: Port) -> str:
 def _join_link(odr: OpenDrive, groups: Groups, road: Road, end: str, link: RoadLink | None) -> None:
     if link is None:
         return
-    here: Port = ("road", road.id, end)
+    here: Key = ("road", road.id, end)
     if road.junction is not None:
         here = ("junction", road.junction)
     if link.element_type == "junction":
@@ -132,7 +145,7 @@ def _join_link(odr: OpenDrive, groups: Groups, road: Road, end: str, link: RoadL
         groups.join(here, ("road", other.id, link.contact_point))
 
 
-def _port(road: Road, s: float) -> Port:
+def _port(road: Road, s: float) -> Key:
     if s <= LEAST_EDGE:
         return ("road", road.id, "start")
     if s >= road.length - LEAST_EDGE:

@@ -6,7 +6,8 @@ nobody turns left through oncoming traffic and nobody turns over a crossing with
 common practice:
 
 - yellow by speed: 3 s up to 50 km/h, 4 s up to 60, 5 s above (RiLSA 2015, section 2.4);
-- all-red until the last vehicle has left: (way through the junction + 6 m) / speed;
+- all-red until the last vehicle has left, (way through the junction + 6 m) / speed, but for the
+  second that the next ones need to start;
 - a crossing turns red so early that one who has just started walks over at 1.2 m/s.
 """
 
@@ -16,7 +17,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.convert.net import Phase
+from odscen.convert.net import STAGE, Phase
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,8 +36,11 @@ REST = 15.0
 WALKER = 1.2
 """m/s."""
 
-CLEARING = 10.0
+CLEARING = 14.0
 """m/s at which vehicles are taken to leave a junction, at most."""
+
+STARTING = 1.0
+"""Seconds after the change to green before anybody moves."""
 
 VEHICLE = 6.0
 """Metres of a vehicle that must have left."""
@@ -82,7 +86,7 @@ class SignalGroup(NamedTuple):
         if self.walkers:
             return math.ceil(self.way / WALKER)
         pace = min(max(self.speed, 3.0), CLEARING)
-        return min(max(math.ceil((self.way + VEHICLE) / pace), 1.0), 8.0)
+        return min(max(math.ceil((self.way + VEHICLE) / pace - STARTING), 1.0), 8.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,37 +108,33 @@ def plan_stages(groups: Sequence[SignalGroup], foes: frozenset[tuple[int, int]])
     foes
         Pairs of groups (smaller first) that meet.
     """
-
-    def fits(group: int, stage: set[int]) -> bool:
-        return all((min(group, g), max(group, g)) not in foes for g in stage)
-
-    stages: list[set[int]] = []
     vehicles = [n for n, group in enumerate(groups) if not group.walkers]
     walkers = [n for n, group in enumerate(groups) if group.walkers]
-    placed: set[int] = set()
+    stages: list[set[int]] = []
     for number in vehicles:
-        if number in placed:
+        if any(number in stage for stage in stages):
             continue
-        stage = {number}
-        mates = [n for n in vehicles if groups[n].controller == groups[number].controller]
-        for other in (*(mates if groups[number].controller else ()), *vehicles):
-            if other not in placed and other not in stage and fits(other, stage):
-                stage.add(other)
-        placed |= stage
-        stages.append(stage)
-    for number in walkers:
-        for stage in stages:
-            if fits(number, stage):
-                stage.add(number)
-                placed.add(number)
-    left = [n for n in walkers if n not in placed]
-    if left:
-        stages.append(set(left))
-    for stage in stages:
-        for number in (*vehicles, *walkers):
-            if number not in stage and fits(number, stage):
-                stage.add(number)
-    return Stages(tuple(groups), tuple(frozenset(stage) for stage in stages))
+        controller = groups[number].controller
+        mates = [n for n in vehicles if controller and groups[n].controller == controller]
+        left = [n for n in (*mates, *vehicles) if not any(n in stage for stage in stages)]
+        stages.append(_filled({number}, left, foes))
+    stages = [_filled(stage, walkers, foes) for stage in stages]
+    waiting = {n for n in walkers if not any(n in stage for stage in stages)}
+    if waiting:
+        stages.append(waiting)
+    full = [_filled(stage, (*vehicles, *walkers), foes) for stage in stages]
+    return Stages(tuple(groups), tuple(frozenset(stage) for stage in full))
+
+
+def _filled(
+    stage: set[int], candidates: Sequence[int], foes: frozenset[tuple[int, int]]
+) -> set[int]:
+    """Add to a stage what meets nothing in it, in the order given."""
+    result = set(stage)
+    for one in candidates:
+        if all((min(one, other), max(one, other)) not in foes for other in result):
+            result.add(one)
+    return result
 
 
 def program(stages: Stages, links: int) -> tuple[Phase, ...]:
@@ -159,7 +159,7 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
         green = float(round(min(max(share, LEAST_GREEN), MOST_GREEN))) if vehicles else WALK_GREEN
         if not stage:
             green = REST
-        name = f"stage {number + 1}"
+        name = f"{STAGE}{number + 1}"
         bounds = (LEAST_GREEN, PROLONGED * green) if vehicles else (0.0, 0.0)
         phases.append(Phase(green, _state(groups, stage, "G", links), name, *bounds))
         ending = stage - following
@@ -168,7 +168,9 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
             phases.append(Phase(walk, _state(groups, still, "G", links), "crossings clear"))
         staying = _state(groups, stage & following, "G", links)
         if yellow:
-            state = _state(groups, frozenset(g for g in ending if not groups[g].walkers), "y", links)
+            state = _state(
+                groups, frozenset(g for g in ending if not groups[g].walkers), "y", links
+            )
             phases.append(Phase(yellow, _over(staying, state), "yellow"))
         if red:
             phases.append(Phase(red, staying, "all red"))

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -214,8 +213,7 @@ def requests(
             foes[count + number].add(link)
             yields[link].add(count + number)
     return tuple(
-        Request(frozenset(before), frozenset(met))
-        for before, met in zip(yields, foes, strict=True)
+        Request(frozenset(before), frozenset(met)) for before, met in zip(yields, foes, strict=True)
     )
 
 
@@ -225,23 +223,32 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
         return other.ring
     if one.sign != other.sign:
         return one.sign > other.sign
-    for mine in sorted(one.roads):
-        for theirs in sorted(other.roads):
-            if (theirs, mine) in rules.high_low:
-                return True
-            if (mine, theirs) in rules.high_low:
-                return False
+    ruled = _ruled(one, other, rules)
+    if ruled is not None:
+        return ruled
     if merge and (only_merges or abs(wrapped(one.heading_in - other.heading_in)) < math.pi / 4):
         if abs(one.speed - other.speed) > _FASTER:
             return one.speed < other.speed
         if abs(abs(one.turn) - abs(other.turn)) > 0.05:
             return abs(one.turn) > abs(other.turn)
-    side = -1.0 if rules.lefthand else 1.0
+    return _waits_by_place(one, other, -1.0 if rules.lefthand else 1.0)
+
+
+def _ruled(one: Movement, other: Movement, rules: Rules) -> bool | None:
+    """What ``<priority>`` says on who gives way, if anything."""
+    pairs = [(mine, theirs) for mine in one.roads for theirs in other.roads]
+    if any((theirs, mine) in rules.high_low for mine, theirs in pairs):
+        return True
+    return False if any(pair in rules.high_low for pair in pairs) else None
+
+
+def _waits_by_place(one: Movement, other: Movement, side: float) -> bool:
+    """Oncoming traffic before those who turn across, then right before left (``side`` 1)."""
     angle = side * wrapped(other.heading_in - one.heading_in)
     if abs(angle) > 0.75 * math.pi:
-        mine, theirs = side * one.turn, side * other.turn
-        if abs(mine - theirs) > 0.1:
-            return mine > theirs
+        own_turn, their_turn = side * one.turn, side * other.turn
+        if abs(own_turn - their_turn) > 0.1:
+            return own_turn > their_turn
     elif abs(angle) > 0.05:
         return angle > 0.0
     return (one.source, one.target) > (other.source, other.target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from odscen.convert.right_of_way import wrapped
@@ -90,4 +91,4 @@ def _turned(line: Line) -> float:
     """Change of heading along a line, summed over its vertices, radians."""
     steps = line.shape[1:, :2] - line.shape[:-1, :2]
     headings = [math.atan2(y, x) for x, y in steps.tolist()]
-    return sum(wrapped(b - a) for a, b in zip(headings, headings[1:], strict=False))
+    return sum(wrapped(b - a) for a, b in pairwise(headings))

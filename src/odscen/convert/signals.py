@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from odscen.convert.ways import Way
     from odscen.ids import RoadId
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.model import OpenDrive, Validity
+    from odscen.opendrive.model import OpenDrive, Signal, SignalReference, Validity
 
 REACH = 80.0
 """Metres ahead of a signal on a road within which the junction that it rules must come."""
@@ -77,7 +77,7 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
         signal.id: signal_kind(signal) for road in odr.roads.values() for signal in road.signals
     }
     for road in odr.roads.values():
-        things = (*road.signals, *road.signal_references)
+        things: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
         for thing in things:
             kind = kinds.get(thing.id, "other")
             if kind == "traffic_light" or kind in SIGN_KINDS:

@@ -1,4 +1,4 @@
-"""Making the lane table: what each SUMO lane was laid on is known, it only has to be written down."""
+"""Making the lane table: what each SUMO lane was laid on only has to be written down."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLink
+from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
 from odscen.convert.pieces import Piece, monotone, simplified
 from odscen.ids import Roadside, SumoLaneId
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from odscen.convert.courses import Course, Line
     from odscen.convert.net import Net, NetLane
     from odscen.convert.walks import WalkNet
-    from odscen.ids import LaneKey
+    from odscen.ids import JunctionId, LaneKey
     from odscen.opendrive.lanes import RoadTable
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +28,7 @@ def build_table(
     table: RoadTable,
     laid: Sequence[tuple[NetLane, Line, Course]],
     walks: WalkNet,
+    xodr: Mapping[str, tuple[JunctionId, ...]],
 ) -> LaneTable:
     """Write down where the lanes of a network lie.
 
@@ -35,6 +36,8 @@ def build_table(
     ----------
     laid
         Lanes for vehicles, with the lines and courses that they were laid on.
+    xodr
+        OpenDRIVE junctions that a SUMO junction stands for.
     """
     everything = [*laid, *((w.edge.lanes[0], w.line, w.course) for w in walks.lanes)]
     keys: dict[LaneKey | Roadside, int] = {}
@@ -85,4 +88,8 @@ def build_table(
         lefthand=net.lefthand,
         counts=net.counts(),
         elevation=not net.flat,
+        lights=tuple(
+            SumoLight(light.id, xodr.get(light.id, ()), light.phases, light.offset, light.signals)
+            for light in net.lights
+        ),
     )

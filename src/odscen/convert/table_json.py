@@ -6,9 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from odscen.convert.lane_table import VERSION, LaneTable, SumoEdge, SumoLane, SumoLink
+from odscen.convert.lane_table import (
+    VERSION,
+    LaneTable,
+    SumoEdge,
+    SumoLane,
+    SumoLight,
+    SumoLink,
+)
+from odscen.convert.net import Phase
 from odscen.convert.pieces import Piece
-from odscen.ids import LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
+from odscen.ids import JunctionId, LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
 
 _DIGITS = 4
 
@@ -57,6 +65,16 @@ def to_data(table: LaneTable) -> dict[str, Any]:
             "s": _column([piece.s for piece in table.pieces]),
             "deviation": _column([piece.deviation for piece in table.pieces]),
         },
+        "lights": [
+            {
+                "id": light.id,
+                "junctions": list(light.junctions),
+                "offset": light.offset,
+                "phases": [[p.duration, p.state, p.name, p.least, p.most] for p in light.phases],
+                "signals": [list(signals) for signals in light.signals],
+            }
+            for light in table.lights
+        ],
     }
 
 
@@ -70,7 +88,9 @@ def from_data(data: dict[str, Any]) -> LaneTable:
     lanes = _lanes(data["lanes"], lane_ids, edge_ids, data["classes"])
     return LaneTable(
         lane_keys=tuple(
-            Roadside(RoadId(road), section, lane) if beside else LaneKey(RoadId(road), section, lane)
+            Roadside(RoadId(road), section, lane)
+            if beside
+            else LaneKey(RoadId(road), section, lane)
             for road, section, lane, *beside in data["lane_keys"]
         ),
         lanes=lanes,
@@ -88,6 +108,16 @@ def from_data(data: dict[str, Any]) -> LaneTable:
         lefthand=data["lefthand"],
         counts=data["counts"],
         elevation=data["elevation"],
+        lights=tuple(
+            SumoLight(
+                light["id"],
+                tuple(JunctionId(junction) for junction in light["junctions"]),
+                tuple(Phase(*phase) for phase in light["phases"]),
+                light["offset"],
+                tuple(tuple(signals) for signals in light["signals"]),
+            )
+            for light in data["lights"]
+        ),
     )
 
 

@@ -18,9 +18,17 @@ from numpy.typing import NDArray
 
 from odscen.convert.access import PEDESTRIAN, WALKING_SPEED
 from odscen.convert.courses import Course, Line, Stretch, evaluate
-from odscen.convert.net import CROSSING, NORMAL, WALKING_AREA, NetEdge, NetJunction, NetLane, NetLink
+from odscen.convert.net import (
+    CROSSING,
+    NORMAL,
+    WALKING_AREA,
+    NetEdge,
+    NetJunction,
+    NetLane,
+    NetLink,
+)
 from odscen.convert.right_of_way import Walkway
-from odscen.convert.ways import Groups
+from odscen.convert.ways import Groups, Key
 from odscen.ids import SumoEdgeId, SumoLaneId
 from odscen.lanegraph.model import WalkKind
 from odscen.lanegraph.pedestrians import ROADSIDE_OFFSET, ROADSIDE_WIDTH
@@ -97,8 +105,8 @@ class _Arc(NamedTuple):
     walk: int
     start: float
     end: float
-    first: object
-    last: object
+    first: Key
+    last: Key
 
 
 class _End(NamedTuple):
@@ -142,8 +150,8 @@ class _Builder:
         self._crosswalks = crosswalks
         self._junctions = junctions
         self._rows = [table.lane_index[key] for key in graph.lane_keys]
-        self._hubs: dict[object, _Hub] = {}
-        self._ends: dict[tuple[int, int], object] = {}  # hub of each end of each crosswalk
+        self._hubs: dict[Key, _Hub] = {}
+        self._ends: dict[tuple[int, int], Key] = {}  # hub of each end of each crosswalk
         self._lanes: list[WalkLane] = []
         self._number = 0
         self._own: list[NetJunction] = []
@@ -233,8 +241,8 @@ class _Builder:
         arcs: list[_Arc] = []
         for walk in range(len(self._rows)):
             low, high = self._bounds(walk)
-            before: tuple[float, object] = (low, clusters.find((walk, 0)))
-            last: object = clusters.find((walk, 1))
+            before: tuple[float, Key] = (low, clusters.find((walk, 0)))
+            last: Key = clusters.find((walk, 1))
             for end in ends.get(walk, ()):
                 junction = self._junctions[end.crosswalk]
                 hub = self._hubs.get(before[1])
@@ -256,11 +264,11 @@ class _Builder:
             arcs.append(_Arc(walk, before[0], high, before[1], last))
         return arcs
 
-    def _takes(self, key: object, junction: str) -> bool:
+    def _takes(self, key: Key, junction: str) -> bool:
         hub = self._hubs.get(key)
         return hub is None or hub.junction in ("", junction)
 
-    def _attach(self, end: _End, key: object, junction: str) -> None:
+    def _attach(self, end: _End, key: Key, junction: str) -> None:
         hub = self._hubs.setdefault(key, _Hub())
         hub.junction = junction
         hub.crossings += 1
@@ -277,7 +285,7 @@ class _Builder:
         used: set[int] = set()
         chains: list[list[tuple[_Arc, bool]]] = []
 
-        def follow(number: int, key: object) -> list[tuple[_Arc, bool]]:
+        def follow(number: int, key: Key) -> list[tuple[_Arc, bool]]:
             chain: list[tuple[_Arc, bool]] = []
             while number not in used:
                 used.add(number)
@@ -291,9 +299,9 @@ class _Builder:
             return chain
 
         for number, arc in enumerate(arcs):
-            for key in (arc.first, arc.last):
-                if number not in used and key not in passed:
-                    chains.append(follow(number, key))
+            start = next((key for key in (arc.first, arc.last) if key not in passed), None)
+            if number not in used and start is not None:
+                chains.append(follow(number, start))
         for number, arc in enumerate(arcs):  # what is left are rings
             if number not in used:
                 passed.discard(arc.first)
@@ -302,7 +310,7 @@ class _Builder:
 
     def _free_ends(self) -> None:
         """Give crosswalk ends without a walk a hub of their own; ends side by side share one."""
-        free: dict[str, list[tuple[object, FloatArray]]] = {}
+        free: dict[str, list[tuple[Key, FloatArray]]] = {}
         for number, placed in enumerate(self._crosswalks):
             junction = self._junctions[number]
             for which in (0, 1):
@@ -322,7 +330,7 @@ class _Builder:
     def _lay(self, chains: Sequence[list[tuple[_Arc, bool]]]) -> None:
         """Make an edge of each chain, of two parts if both ends are at one junction."""
         courses: list[Course] = []
-        ends: list[tuple[object, object]] = []
+        ends: list[tuple[Key, Key]] = []
         for chain in chains:
             course = tuple(
                 self._stretch(arc.walk, *((arc.start, arc.end) if along else (arc.end, arc.start)))
@@ -344,7 +352,7 @@ class _Builder:
                 ends.append((first, last))
         meetings = Counter(key for pair in ends for key in pair)
 
-        def meets(key: object) -> bool:
+        def meets(key: Key) -> bool:
             return meetings[key] + self._hub(key).crossings > 1
 
         trimmed = [
@@ -354,10 +362,10 @@ class _Builder:
         for line, course, pair in zip(evaluate(trimmed, self._table), trimmed, ends, strict=True):
             self._edge(line, course, pair)
 
-    def _hub(self, key: object) -> _Hub:
+    def _hub(self, key: Key) -> _Hub:
         return self._hubs.setdefault(key, _Hub())
 
-    def _edge(self, line: Line, course: Course, ends: tuple[object, object]) -> None:
+    def _edge(self, line: Line, course: Course, ends: tuple[Key, Key]) -> None:
         roadside = course[0].at == 1.0
         name = f"w{self._number}"
         self._number += 1
@@ -397,7 +405,7 @@ class _Builder:
         """Crossings by junction; walking areas get their names here, in the order of need."""
         counts: Counter[str] = Counter()
 
-        def area(key: object) -> SumoEdgeId:
+        def area(key: Key) -> SumoEdgeId:
             hub = self._hubs[key]
             if hub.area is None:
                 hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")
@@ -433,7 +441,8 @@ class _Builder:
                 self._hubs[self._ends[number, which]].arms.append((across, width))
             link = NetLink(edge, end)
             crossing = NetEdge(edge, CROSSING, (lane,))
-            own.append(PlacedCrossing(crossing, Walkway(axis, width), SumoLaneId(f"{start}_0"), link))
+            walkway = Walkway(axis, width)
+            own.append(PlacedCrossing(crossing, walkway, SumoLaneId(f"{start}_0"), link))
         for hub in self._hubs.values():
             if hub.area is None and len(hub.edges) > 1:
                 hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")

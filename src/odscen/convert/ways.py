@@ -7,6 +7,7 @@ stretches too short for an edge; SUMO gets one internal lane for each.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.access import allowed
@@ -14,12 +15,15 @@ from odscen.convert.courses import Course, Stretch
 from odscen.convert.edges import LEAST_EDGE
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from odscen.convert.edges import EdgePlan
     from odscen.ids import LaneKey
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive
+
+Key = tuple[object, ...]
+"""What :class:`Groups` joins: a kind and what tells things of a kind apart."""
 
 LONGEST_WAY = 400
 """Lanes in one way; more is a circle in a file that links a junction to itself."""
@@ -55,7 +59,7 @@ class Ways:
 
 
 class _Visit(NamedTuple):
-    """A lane of an edge on a row of the table: between which s, and whether the edge begins there."""
+    """A lane of an edge on a row of the table; ``first`` if the edge begins there."""
 
     entry: float
     leave: float
@@ -109,11 +113,8 @@ class _Finder:
         """All ways from the end of a lane, the shortest to each other lane."""
         last = self._edges[edge].lanes[lane].course[-1]
         best: dict[tuple[int, int], Course] = {}
-        count = 0
-        for target, course in self._onwards(last.row, last.end, ()):
-            count += 1
-            if count > MOST_WAYS:
-                break
+        ways = self._onwards(last.row, last.end, ())
+        for target, course in islice(ways, MOST_WAYS):
             known = best.get(target)
             if known is None or _extent(course) < _extent(known):
                 best[target] = course
@@ -208,10 +209,10 @@ class Groups:
     """Things that belong together (union-find); the first one seen stands for its group."""
 
     def __init__(self) -> None:
-        self._parent: dict[Hashable, Hashable] = {}
-        self._order: dict[Hashable, int] = {}
+        self._parent: dict[Key, Key] = {}
+        self._order: dict[Key, int] = {}
 
-    def find(self, item: Hashable) -> Hashable:
+    def find(self, item: Key) -> Key:
         """Representative of an item's group; new items are groups of their own."""
         if item not in self._parent:
             self._parent[item] = item
@@ -223,7 +224,7 @@ class Groups:
             self._parent[item], item = root, self._parent[item]
         return root
 
-    def join(self, one: Hashable, other: Hashable) -> None:
+    def join(self, one: Key, other: Key) -> None:
         """Make two groups one."""
         first, second = self.find(one), self.find(other)
         if first == second:

@@ -15,18 +15,25 @@ from odscen.scenario.actor_checks import (
 from odscen.scenario.bodies import Crowd, box_at
 from odscen.scenario.problems import Problem, error, warning
 from odscen.scenario.region import Region
+from odscen.scenario.signals import signal_problems
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from odscen.lanegraph.model import MapGraph
     from odscen.scenario.document import Scenario
+    from odscen.scenario.signals import Light
 
 SAME_TIME = 1.0
 """Actors that depart within this many seconds of each other stand on the road together."""
 
 
-def check(scenario: Scenario, graph: MapGraph, assets: Assets | None = None) -> tuple[Problem, ...]:
+def check(
+    scenario: Scenario,
+    graph: MapGraph,
+    assets: Assets | None = None,
+    lights: Sequence[Light] | None = None,
+) -> tuple[Problem, ...]:
     """Find everything that is wrong with a scenario on its map.
 
     Parameters
@@ -36,6 +43,8 @@ def check(scenario: Scenario, graph: MapGraph, assets: Assets | None = None) -> 
         the first problem and rules that need the graph are left out.
     assets
         Catalogue for the rules on models and for their sizes; without one those are left out.
+    lights
+        Traffic lights of the map for the rules on their timing; without them those are left out.
 
     Returns
     -------
@@ -52,6 +61,8 @@ def check(scenario: Scenario, graph: MapGraph, assets: Assets | None = None) -> 
         found += actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):
         found += flow_problems(scenario, region, index)
+    if lights is not None:
+        found += signal_problems(scenario.signals, lights)
     found += shared_nodes(scenario)
     found += _overlaps(scenario, region, assets)
     return tuple(found)

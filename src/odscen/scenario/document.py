@@ -27,6 +27,8 @@ Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
 Identifier = Annotated[str, Field(pattern=_IDENTIFIER, max_length=64)]
 Seconds = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+Control = Literal["fixed", "actuated"]
 
 
 class Part(BaseModel):
@@ -94,6 +96,28 @@ class Flow(Part):
     speed: Speed | None = None
 
 
+class JunctionTiming(Part):
+    """Timing of the traffic light of one junction, where it differs from the map's program.
+
+    ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that stands in none.
+    ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
+    order; empty keeps the program's. Yellow and clearing times cannot be changed. The program
+    begins ``offset`` seconds into the scenario, as if it had run before.
+    """
+
+    junction: Label
+    control: Control | None = None
+    offset: SignalSeconds = 0.0
+    green: tuple[SignalSeconds, ...] = ()
+
+
+class Signals(Part):
+    """How traffic lights are run: by the clock, or with greens that waiting vehicles prolong."""
+
+    control: Control = "fixed"
+    junctions: tuple[JunctionTiming, ...] = ()
+
+
 class Simulation(Part):
     """How the scenario is run unless the command says otherwise; seconds."""
 
@@ -114,4 +138,5 @@ class Scenario(Part):
     environment: Environment = Environment()
     actors: tuple[Actor, ...] = ()
     flows: tuple[Flow, ...] = ()
+    signals: Signals = Signals()
     simulation: Simulation = Simulation()

@@ -21,6 +21,7 @@ from odscen.scenario.document import (
     Actor,
     Environment,
     Flow,
+    JunctionTiming,
     MapReference,
     Part,
     Scenario,
@@ -28,12 +29,15 @@ from odscen.scenario.document import (
 from odscen.scenario.files import validated
 from odscen.scenario.problems import Problem, refuse_errors
 from odscen.scenario.region import Region, on_foot
+from odscen.scenario.signals import find_light, signal_problems
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.categories import Category
     from odscen.lanegraph.model import MapGraph
+    from odscen.scenario.document import Control
+    from odscen.scenario.signals import Light
 
 _One = TypeVar("_One", bound=Actor | Flow)
 _Document = TypeVar("_Document", bound=Part)
@@ -102,6 +106,57 @@ def set_environment(
         fields["affects_driving"] = affects_driving
     environment: Environment = _changed(scenario.environment, fields)
     return _with(scenario, environment=environment)
+
+
+def set_signal_control(scenario: Scenario, *, control: Control) -> Scenario:
+    """Say how all traffic lights are run that have no control of their own."""
+    return _with(scenario, signals=_changed(scenario.signals, {"control": control}))
+
+
+def set_timing(
+    scenario: Scenario, lights: Sequence[Light], junction: str, **fields: Any
+) -> Scenario:
+    """Change how the traffic light of one junction is timed.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map.
+    fields
+        Fields of a :class:`~odscen.scenario.document.JunctionTiming`, such as ``green``; those not
+        given stay as they are.
+
+    Raises
+    ------
+    ScenarioError
+        If no light stands in the junction, or if it cannot be timed so.
+    """
+    timings = scenario.signals.junctions
+    light = find_light(lights, junction)
+    own = [n for n, one in enumerate(timings) if light and one.junction in light.names]
+    old = timings[own[0]] if own else JunctionTiming(junction=junction)
+    new = _changed(old, fields)
+    changed = (*timings[: own[0]], new, *timings[own[0] + 1 :]) if own else (*timings, new)
+    signals = _changed(scenario.signals, {"junctions": changed})
+    refuse_errors(signal_problems(signals, lights))
+    return _with(scenario, signals=signals)
+
+
+def clear_timing(scenario: Scenario, junction: str) -> Scenario:
+    """Give the traffic light of one junction back to the map's program.
+
+    Raises
+    ------
+    NotFoundError
+        If the scenario has no timing for it.
+    """
+    timings = scenario.signals.junctions
+    names = [one.junction for one in timings]
+    if junction not in names:
+        what = "timing of junction"
+        raise NotFoundError(what, junction, names)
+    left = tuple(one for one in timings if one.junction != junction)
+    return _with(scenario, signals=_changed(scenario.signals, {"junctions": left}))
 
 
 def eligible_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, ...]:

@@ -49,13 +49,19 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
 def dumps(scenario: Scenario) -> str:
     """Write a scenario document as JSON: fields in fixed order, one actor or flow per line.
 
-    Fields of actors and flows that have their default value are left out. The same scenario gives
-    the same text, and :func:`loads` gives the same scenario back.
+    Fields of actors and flows that have their default value are left out, and so are signals that
+    are all the map's. The same scenario gives the same text, and :func:`loads` gives the same
+    scenario back.
     """
     data = scenario.model_dump(mode="json")
     for key in ("actors", "flows"):
         parts = getattr(scenario, key)
         data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
+    signals = scenario.signals.model_dump(mode="json", exclude_defaults=True)
+    if signals:
+        data["signals"] = signals
+    else:
+        del data["signals"]
     fields = [f"  {json.dumps(key)}: {_layout(key, value)}" for key, value in data.items()]
     return "{\n" + ",\n".join(fields) + "\n}\n"
 

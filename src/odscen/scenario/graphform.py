@@ -38,7 +38,7 @@ _One = TypeVar("_One", bound=Actor | Flow)
 GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
-_JSON = ("roi", "environment", "simulation")
+_JSON = ("roi", "environment", "signals", "simulation")
 """Graph attributes that hold JSON."""
 
 
@@ -111,6 +111,8 @@ def from_graphml(text: str, *, file: str | None = None) -> Scenario:
 
 def _about(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
+    data["signals"] = scenario.signals.model_dump(mode="json", exclude_defaults=True)
+    held = [name for name in _JSON if name != "signals" or data[name]]
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -120,7 +122,7 @@ def _about(scenario: Scenario) -> dict[str, Any]:
         "map_name": scenario.map.name,
         "map_sha256": scenario.map.sha256,
         "map_spacing": scenario.map.spacing,
-        **{name: json.dumps(data[name], ensure_ascii=False) for name in _JSON},
+        **{name: json.dumps(data[name], ensure_ascii=False) for name in held},
     }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from odscen.sumo.layout import NET_FILE, ROUTES_FILE, TRAJECTORIES_FILE
+from odscen.sumo.layout import NET_FILE, ROUTES_FILE, SIGNALS_FILE, TRAJECTORIES_FILE
 
 FCD_ATTRIBUTES = ("id", "x", "y", "angle", "speed", "lane")
 """What is recorded of each vehicle and person in each step."""
@@ -30,6 +30,8 @@ class RunSettings:
         Seconds that a vehicle may stand at the head of its lane before SUMO moves it on.
     elevation
         Whether the network has heights, so that z is recorded.
+    signals
+        Whether there are programs of traffic lights beside the network's own.
     """
 
     until: float
@@ -37,6 +39,7 @@ class RunSettings:
     seed: int
     time_to_teleport: float = 300.0
     elevation: bool = False
+    signals: bool = False
 
 
 def sumo_config(settings: RunSettings) -> str:
@@ -44,8 +47,11 @@ def sumo_config(settings: RunSettings) -> str:
     attributes = [*FCD_ATTRIBUTES]
     if settings.elevation:
         attributes.insert(3, "z")
+    inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
+    if settings.signals:
+        inputs["additional-files"] = SIGNALS_FILE
     sections: dict[str, dict[str, str]] = {
-        "input": {"net-file": NET_FILE, "route-files": ROUTES_FILE},
+        "input": inputs,
         "output": {
             "fcd-output": TRAJECTORIES_FILE,
             "fcd-output.attributes": ",".join(attributes),

@@ -19,13 +19,16 @@ from odscen.errors import ScenarioError
 from odscen.lanegraph.paths import Router
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.results.records import Plan, PlannedActor
+from odscen.scenario.problems import refuse_errors
 from odscen.scenario.region import Region
+from odscen.scenario.signals import signal_problems
 from odscen.sumo.config import RunSettings, sumo_config
 from odscen.sumo.demand import Demand
 from odscen.sumo.driving import KINDS, draw_factor, driver
-from odscen.sumo.layout import CONFIG_FILE, ROUTES_FILE
+from odscen.sumo.layout import CONFIG_FILE, ROUTES_FILE, SIGNALS_FILE
 from odscen.sumo.people import RoadUser, road_users
 from odscen.sumo.routes import NoRouteError, RoutePlanner
+from odscen.sumo.signals import scenario_lights, signals_xml
 from odscen.sumo.walks import WalkPlanner
 from odscen.sumo.weather import NO_EFFECT, weather_effect
 
@@ -91,8 +94,10 @@ def realize(
     Raises
     ------
     ScenarioError
-        With every actor and flow whose spawn or goal is not usable.
+        With every actor and flow whose spawn or goal is not usable, or with every timing of a
+        traffic light that is not possible.
     """
+    refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map.lights)))
     if seed is not None:
         scenario = scenario.model_copy(update={"seed": seed})
     until = scenario.simulation.duration if until is None else until
@@ -112,10 +117,17 @@ def realize(
         actors=planned,
         elevation=sumo_map.elevation,
     )
+    signals = signals_xml(scenario.signals, sumo_map.lights)
     settings = RunSettings(
-        until=until, step_length=step_length, seed=scenario.seed, elevation=sumo_map.elevation
+        until=until,
+        step_length=step_length,
+        seed=scenario.seed,
+        elevation=sumo_map.elevation,
+        signals=signals is not None,
     )
     files = {ROUTES_FILE: writer.demand.to_xml(), CONFIG_FILE: sumo_config(settings)}
+    if signals is not None:
+        files[SIGNALS_FILE] = signals
     return Realization(files, plan, tuple(writer.problems), tuple(writer.notes))
 
 

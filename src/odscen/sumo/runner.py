@@ -48,7 +48,8 @@ class PreparedRun:
     plan
         What is to happen, actor by actor.
     sumo_files
-        Text by file name: routes and configuration, from :func:`odscen.sumo.realize.realize`.
+        Text by file name: routes, configuration and perhaps signals, from
+        :func:`odscen.sumo.realize.realize`.
     net
         SUMO network file of the map.
     scenario_json
@@ -295,6 +296,7 @@ def _files(folder: Path) -> dict[str, str]:
         "plan": layout.PLAN_FILE,
         "net": f"{sumo}/{layout.NET_FILE}",
         "routes": f"{sumo}/{layout.ROUTES_FILE}",
+        "signals": f"{sumo}/{layout.SIGNALS_FILE}",
         "config": f"{sumo}/{layout.CONFIG_FILE}",
         "trajectories": layout.TRAJECTORIES_FILE,
         "events": layout.EVENTS_FILE,

@@ -16,7 +16,7 @@ from odscen.sumo.routes import Places
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.convert.lane_table import LaneTable
+    from odscen.convert.lane_table import LaneTable, SumoLight
     from odscen.ids import LaneKey
     from odscen.lanegraph.model import BoolArray, FloatArray, IntArray, LaneGraph, MapGraph
 
@@ -42,6 +42,8 @@ class SumoMap:
         Added to OpenDRIVE x and y to give SUMO's, metres.
     elevation
         Whether the network has heights.
+    lights
+        Traffic lights of the network.
     """
 
     graph: MapGraph
@@ -50,6 +52,7 @@ class SumoMap:
     walk_places: Places
     net_offset: tuple[float, float]
     elevation: bool = False
+    lights: tuple[SumoLight, ...] = ()
 
     @cached_property
     def drivable(self) -> BoolArray:
@@ -77,9 +80,12 @@ class SumoMap:
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
-            walk_places=_all_scaled(_places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)),
+            walk_places=_all_scaled(
+                _places(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)
+            ),
             net_offset=table.net_offset,
             elevation=table.elevation,
+            lights=table.lights,
         )
 
 
