@@ -19,8 +19,6 @@ from odscen.opendrive.parse import parse
 from tests.conftest import shared_map_files
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from odscen.convert.lane_table import SumoPlaces
     from odscen.opendrive.model import OpenDrive
 
@@ -32,17 +30,9 @@ def _named(path: Path) -> str:
     return path.stem if path in SHIPPED else f"{path.parent.name}/{path.stem}"
 
 
-def each_map(*, but: Mapping[str, str] | None = None) -> pytest.MarkDecorator:
-    """Parametrise ``path`` with all maps; ``but`` are those that fail for now, and why."""
-    but = but or {}
-    params = [
-        pytest.param(
-            path,
-            id=_named(path),
-            marks=[pytest.mark.xfail(reason=but[_named(path)])] if _named(path) in but else [],
-        )
-        for path in (*SHIPPED, *shared_map_files())
-    ]
+def each_map() -> pytest.MarkDecorator:
+    """Parametrise ``path`` with all maps."""
+    params = [pytest.param(path, id=_named(path)) for path in (*SHIPPED, *shared_map_files())]
     if not shared_map_files():
         skip = pytest.mark.skip(reason="real maps: name their folder in ODSCEN_TEST_MAPS")
         params.append(pytest.param(None, id="real maps", marks=skip))

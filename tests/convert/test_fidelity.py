@@ -14,8 +14,6 @@ from tests.convert.maps import converted, each_map, named
 if TYPE_CHECKING:
     from odscen.convert.verify_result import Fidelity
 
-NOT_YET = {"carla-2019/Town03": "one relation between lanes over a very short road is missing"}
-
 
 @cache
 def measured(path: Path) -> Fidelity:
@@ -23,7 +21,7 @@ def measured(path: Path) -> Fidelity:
     return verify(made.network.net_xml, made.odr, made.roads)
 
 
-@each_map(but=NOT_YET)
+@each_map()
 def test_the_network_follows_its_map(path: Path) -> None:
     failed = [verdict for verdict in measured(path).verdicts if not verdict.ok]
     assert failed == []
