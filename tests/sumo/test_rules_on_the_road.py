@@ -48,7 +48,7 @@ def test_a_car_from_a_side_street_lets_a_column_pass(
     signs: Converted, own: str, junction: str
 ) -> None:
     main = {
-        ":J10002": "1.1.b 1.0.b 4.1.b 4.0.b",
+        ":J10002": "4.0.f 4.1.f 1.0.f 1.1.f",
         ":J10001": "2.0.f 2.1.f 1.2.b 1.1.b",
     }[junction]
     column = [Car(f"m{k}", main, depart=2.0 * k) for k in range(20)]
