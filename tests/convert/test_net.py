@@ -1,106 +1,164 @@
+"""How a network is written down: what SUMO reads must be what was meant."""
+
 from __future__ import annotations
+
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from odscen.convert.net import Net
-from odscen.errors import NetconvertError
+from odscen.convert.net import (
+    CROSSING,
+    INTERNAL,
+    NORMAL,
+    WALKING_AREA,
+    Net,
+    NetEdge,
+    NetJunction,
+    NetLane,
+    NetLink,
+    Phase,
+    Request,
+    TrafficLight,
+)
 from odscen.ids import SumoEdgeId, SumoLaneId
 
-NET = """<net version="1.20" lefthand="true">
-  <location netOffset="100.00,-5.00" convBoundary="0.00,0.00,50.00,9.00"
-            origBoundary="0,0,0,0" projParameter="!"/>
-  <edge id=":j_0" function="internal">
-    <lane id=":j_0_0" index="0" speed="8" length="3.0" shape="110,0 113,0" disallow="pedestrian"/>
-  </edge>
-  <edge id=":j_c0" function="crossing" crossingEdges="a b">
-    <lane id=":j_c0_0" index="0" allow="pedestrian" speed="1" length="6" shape="110,0 110,6"/>
-  </edge>
-  <edge id="a" from="i" to="j">
-    <lane id="a_0" index="0" allow="pedestrian" speed="2" length="10" shape="100,0 110,0"/>
-    <lane id="a_1" index="1" speed="13.9" length="11" shape="100,3 105,3,0.5 110,3" width="3.5"/>
-    <lane id="a_2" index="2" disallow="all" speed="1" length="11" shape="100,6,1 110,6,2"/>
-  </edge>
-  <edge id="b" from="j" to="k">
-    <lane id="b_0" index="0" allow="bus taxi" speed="13.9" length="10" shape="113,3 123,3"/>
-  </edge>
-  <tlLogic id="t" type="static" programID="0" offset="0"/>
-  <junction id="j" type="traffic_light" x="111" y="1"/>
-  <junction id=":j_0_0" type="internal" x="111" y="1"/>
-  <connection from="a" to="b" fromLane="1" toLane="0" via=":j_0_0" tl="t" linkIndex="2" dir="s"/>
-  <connection from=":j_0" to="b" fromLane="0" toLane="0" dir="s"/>
-</net>"""
+CARS = frozenset({"passenger", "bus"})
 
 
-def net() -> Net:
-    return Net.parse(NET.encode())
+def lane(name: str, *points: tuple[float, float, float], **more: object) -> NetLane:
+    return NetLane(SumoLaneId(name), 0, 10.0, 13.89, 3.5, CARS, np.array(points), **more)
 
 
-def test_shapes_are_moved_into_the_opendrive_frame() -> None:
-    shape = net().lanes[SumoLaneId("a_0")].shape
-    np.testing.assert_allclose(shape, [[0.0, 5.0, 0.0], [10.0, 5.0, 0.0]])
+STREET = lane("a_0", (0.0, 0.0, 0.0), (10.0, 0.0, 0.0), change_left=False, xodr=("7_-1", "8_-1"))
+WAY = lane(":j_0_0", (10.0, 0.0, 0.0), (12.0, 0.0, 0.0))
 
 
-def test_a_shape_may_leave_out_heights_of_zero_point_by_point() -> None:
-    lanes = net().lanes
-    np.testing.assert_allclose(lanes[SumoLaneId("a_1")].shape[:, 2], [0.0, 0.5, 0.0])
-    np.testing.assert_allclose(lanes[SumoLaneId("a_2")].shape[:, 2], [1.0, 2.0])
+def net(
+    *,
+    edges: tuple[NetEdge, ...] = (),
+    junctions: tuple[NetJunction, ...] = (),
+    lights: tuple[TrafficLight, ...] = (),
+    flat: bool = True,
+    lefthand: bool = False,
+) -> Net:
+    street = NetEdge(SumoEdgeId("a"), NORMAL, (STREET,), "i", "j", 'Rue "A" & <B>')
+    inner = NetEdge(SumoEdgeId(":j_0"), INTERNAL, (WAY,))
+    return Net(
+        (100.0, -5.0),
+        lefthand,
+        (street, inner, *edges),
+        (NetLink(SumoEdgeId("a"), SumoEdgeId("b"), 0, 1, WAY.id, "l", "m", "j", 3),),
+        junctions,
+        lights,
+        flat=flat,
+    )
 
 
-@pytest.mark.parametrize(
-    ("lane", "vclass", "allowed"),
-    [
-        ("a_0", "pedestrian", True),
-        ("a_0", "passenger", False),
-        ("a_1", "passenger", True),
-        ("a_1", "pedestrian", True),
-        ("a_2", "passenger", False),
-        ("b_0", "bus", True),
-        ("b_0", "passenger", False),
-        (":j_0_0", "pedestrian", False),
-        (":j_0_0", "truck", True),
-    ],
-)
-def test_permissions_follow_allow_and_disallow(lane: str, vclass: str, allowed: bool) -> None:
-    assert net().lanes[SumoLaneId(lane)].allows(vclass) is allowed
+def text(made: Net) -> ET.Element:
+    return ET.fromstring(made.to_xml())
 
 
-def test_connections_name_lanes_by_their_own_ids() -> None:
-    first, second = net().connections
-    assert first == ("a_1", "b_0", ":j_0_0", "t", 2, "s")
-    assert (second.from_lane, second.to_lane, second.via) == (":j_0_0", "b_0", "")
+def test_shapes_are_moved_by_the_offset_that_the_file_states() -> None:
+    xml = text(net())
+    assert xml.find("location").get("netOffset") == "100.00,-5.00"
+    assert xml.find("edge[@id='a']/lane").get("shape") == "100.0000,-5.0000 110.0000,-5.0000"
+    assert xml.find("location").get("convBoundary") == "100.0,-5.0,112.0,-5.0"
 
 
-def test_edges_know_their_function_ends_and_what_they_cross() -> None:
-    edges = net().edges
-    assert edges[SumoEdgeId("a")].lanes == ("a_0", "a_1", "a_2")
-    assert (edges[SumoEdgeId("a")].from_junction, edges[SumoEdgeId("a")].to_junction) == ("i", "j")
-    assert edges[SumoEdgeId(":j_c0")].crosses == ("a", "b")
+def test_heights_are_written_unless_the_network_is_flat() -> None:
+    high = text(net(flat=False))
+    assert high.find("edge[@id='a']/lane").get("shape").split()[0] == "100.0000,-5.0000,0.0000"
+
+
+def test_a_lane_says_who_may_use_it_where_it_comes_from_and_what_may_not_be_crossed() -> None:
+    found = text(net()).find("edge[@id='a']/lane")
+    assert found.get("allow") == "bus passenger"
+    assert found.find("param").attrib == {"key": "origId", "value": "7_-1 8_-1"}
+    assert found.get("changeLeft") == "emergency", "only emergency vehicles may cross"
+    assert found.get("changeRight") is None
+
+
+def test_names_are_quoted() -> None:
+    assert text(net()).find("edge[@id='a']").get("name") == 'Rue "A" & <B>'
+
+
+@given(st.text(max_size=20))
+def test_any_name_of_a_street_leaves_the_file_well_formed(name: str) -> None:
+    odd = NetEdge(SumoEdgeId("b"), NORMAL, (lane("b_0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),),
+                  "j", "k", name)  # fmt: skip
+    found = text(net(edges=(odd,))).find("edge[@id='b']")
+    assert found.get("name", "") == "".join(c if c.isprintable() else " " for c in name)
+
+
+def test_edges_inside_junctions_come_first_as_sumo_wants_them() -> None:
+    assert [edge.get("id") for edge in text(net()).iter("edge")] == [":j_0", "a"]
+
+
+def test_a_connection_names_its_lanes_its_way_and_its_light() -> None:
+    assert text(net()).find("connection").attrib == {
+        "from": "a", "to": "b", "fromLane": "0", "toLane": "1", "via": ":j_0_0", "tl": "j",
+        "linkIndex": "3", "dir": "l", "state": "m",
+    }  # fmt: skip
+
+
+def test_the_last_letter_of_a_response_is_the_first_link() -> None:
+    requests = (
+        Request(frozenset(), frozenset({1})),
+        Request(frozenset({0, 2}), frozenset({0, 2})),
+        Request(frozenset(), frozenset({1})),
+    )
+    junction = NetJunction(
+        "j", "priority", (10.0, 0.0, 0.0), np.zeros((3, 3)), (STREET.id,), (WAY.id,), requests
+    )
+    rows = text(net(junctions=(junction,))).findall("junction/request")
+    assert [row.get("response") for row in rows] == ["000", "101", "000"]
+    assert [row.get("foes") for row in rows] == ["010", "101", "010"]
+    assert [row.get("index") for row in rows] == ["0", "1", "2"]
+
+
+def test_a_light_has_its_phases_and_names_the_signals_behind_its_links() -> None:
+    phases = (Phase(31.0, "Gr", "stage 1", 8.0, 62.0), Phase(3.0, "yr"))
+    light = TrafficLight("j", phases, signals=(("s1", "s2"), ()))
+    found = text(net(lights=(light,))).find("tlLogic")
+    assert [p.attrib for p in found.iter("phase")] == [
+        {"duration": "31", "state": "Gr", "name": "stage 1"},
+        {"duration": "3", "state": "yr"},
+    ]
+    assert [(p.get("key"), p.get("value")) for p in found.iter("param")] == [
+        ("linkSignalID:0", "s1 s2")
+    ]
+
+
+def test_only_actuated_phases_have_bounds() -> None:
+    light = TrafficLight("j", (Phase(31.0, "G", "", 8.0, 62.0), Phase(3.0, "y")), "actuated")
+    first, second = text(net(lights=(light,))).findall("tlLogic/phase")
+    assert (first.get("minDur"), first.get("maxDur")) == ("8", "62")
+    assert second.get("minDur") is None
 
 
 def test_counts_are_those_outside_junctions() -> None:
-    assert net().counts() == {
-        "edges": 2,
-        "lanes": 4,
-        "junctions": 1,
-        "tl_logics": 1,
-        "crossings": 1,
-        "walking_areas": 0,
-    }
-    assert net().lefthand
+    walked = [
+        NetEdge(SumoEdgeId(name), function, (lane(f"{name}_0", (0, 0, 0), (1, 0, 0)),))
+        for name, function in (
+            (":j_c0", CROSSING),
+            (":j_w0", WALKING_AREA),
+            (":j_w1", WALKING_AREA),
+        )
+    ]
+    assert net(edges=tuple(walked)).counts() == {
+        "edges": 1, "lanes": 1, "junctions": 0, "tl_logics": 0, "crossings": 1,
+        "walking_areas": 2,
+    }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "<net/>",
-        NET.replace('netOffset="100.00,-5.00"', ""),
-        NET.replace('shape="100,0 110,0"', 'shape="100,0 nan,0"'),
-        NET.replace('toLane="0"', 'toLane="7"'),
-        NET[: len(NET) // 2],
-    ],
-)
-def test_a_broken_network_is_refused(text: str) -> None:
-    with pytest.raises(NetconvertError):
-        Net.parse(text.encode())
+@pytest.mark.parametrize("lefthand", [True, False])
+def test_the_file_says_on_which_side_one_drives(lefthand: bool) -> None:
+    assert (text(net(lefthand=lefthand)).get("lefthand") == "true") is lefthand
+
+
+def test_a_network_of_nothing_can_be_written() -> None:
+    xml = text(Net((0.0, 0.0), False, (), (), ()))
+    assert [child.tag for child in xml] == ["location"]

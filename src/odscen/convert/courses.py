@@ -24,7 +24,7 @@ IndexArray = NDArray[np.intp]
 CHORD_ERROR = 0.01
 """Metres between a lane's centre line and its shape, at most."""
 
-DENSE = 0.5
+DENSE = 0.25
 """Metres between the places from which the vertices of a shape are chosen."""
 
 MOST_PLACES = 2_000_000
