@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from odscen.convert.lane_table import SumoLight
+
 
 FORMAT = "odscen-map"
 
@@ -100,6 +102,7 @@ def build_map(
         "statistics": statistics.to_dict(),
         "graph": graph_counts(graph),
         "sumo": {"net_file": FILES["net"], **network.table.counts},
+        "lights": [_light(light) for light in network.table.lights],
         "files": FILES,
         "semantics": map_semantics(odr, table),
         "report": network.report.to_dict(),
@@ -108,6 +111,17 @@ def build_map(
     text = json.dumps(info, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / FILES["info"]).write_text(text + "\n", encoding="utf-8")
     progress("done", 1.0)
+
+
+def _light(light: SumoLight) -> dict[str, Any]:
+    """A traffic light, as scenarios name and time it."""
+    return {
+        "id": light.id,
+        "junctions": list(light.junctions),
+        "signals": sorted({signal for signals in light.signals for signal in signals}),
+        "green": [phase.duration for phase in light.phases if phase.is_stage],
+        "cycle": sum(phase.duration for phase in light.phases),
+    }
 
 
 def graph_counts(graph: MapGraph) -> dict[str, Any]:

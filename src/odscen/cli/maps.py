@@ -140,6 +140,14 @@ def show(
             values = values["counts"]
         rows = [(f"{key}{UNITS.get(key, '')}", _plain(value)) for key, value in values.items()]
         print_table(part, (), rows)
+    lights = [
+        (", ".join(light["junctions"]) or light["id"], len(light["signals"]),
+         ", ".join(f"{green:g}" for green in light["green"]), f"{light['cycle']:g}")
+        for light in entry.info["lights"]
+    ]  # fmt: skip
+    if lights:
+        columns = ("junction", "signals", "green of its stages, s", "cycle, s")
+        print_table("traffic lights", columns, lights)
     log(f"Drawing: {entry.path('preview')}")
 
 

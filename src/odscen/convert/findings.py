@@ -9,7 +9,7 @@ import numpy as np
 from odscen.convert.access import BICYCLE_TYPES, is_used
 from odscen.convert.report import Entry, Fate
 from odscen.ids import LaneKey
-from odscen.opendrive.model import DRIVABLE_TYPES
+from odscen.opendrive.model import DRIVABLE_TYPES, WALKABLE_TYPES
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
+
+AREA = 1.5
+"""Metres of a walk that walking areas, which are no lanes, may take without an entry."""
 
 VARYING = 0.25
 """Metres that a lane's width may differ from its SUMO lane's without an entry."""
@@ -101,7 +104,7 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Entry
         if is_used(kind):
             length = float(table.lane_s1[row] - table.lane_s0[row])
             gap = length - covered.get(key, 0.0)
-            if gap > WORTH_TELLING:
+            if gap > (AREA if kind in WALKABLE_TYPES and gap < length else WORTH_TELLING):
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
                 reason = (
                     f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
