@@ -37,5 +37,11 @@ def _add(town: Path, workspace: str) -> None:
 
 
 def _netconvert(town: Path, net: Path) -> None:
-    command = [str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"), "--opendrive-files", str(town), "-o", str(net)]
+    command = [
+        str(Path(sumo.SUMO_HOME) / "bin" / "netconvert"),
+        "--opendrive-files",
+        str(town),
+        "-o",
+        str(net),
+    ]
     subprocess.run(command, check=True, capture_output=True)

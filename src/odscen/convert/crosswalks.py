@@ -9,13 +9,13 @@ import shapely
 
 from odscen.convert.access import allowed
 from odscen.convert.courses import DENSE
-from odscen.convert.edges import Gap
+from odscen.convert.gaps import Gap
 from odscen.opendrive.objects import crosswalks
 
 if TYPE_CHECKING:
     from odscen.ids import RoadId
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.model import OpenDrive, Road
+    from odscen.opendrive.model import OpenDrive
     from odscen.opendrive.objects import Crosswalk
 
 MARGIN = 1.0
@@ -23,12 +23,6 @@ MARGIN = 1.0
 
 SHARE = 0.2
 """Share of a road's length that the margin is at most: short roads stay."""
-
-TO_JUNCTION = 12.0
-"""Metres between crosswalk and junction: with less, the crosswalk belongs to the junction."""
-
-BETWEEN = 8.0
-"""Metres between crosswalks on one road: with less, no edge lies between them."""
 
 LEVEL = 2.5
 """Metres of height between a crosswalk and lanes of other levels."""
@@ -44,7 +38,7 @@ class PlacedCrosswalk(NamedTuple):
 
 def place_crosswalks(
     odr: OpenDrive, table: RoadTable
-) -> tuple[tuple[PlacedCrosswalk, ...], dict[RoadId, tuple[Gap, ...]]]:
+) -> tuple[tuple[PlacedCrosswalk, ...], dict[RoadId, list[Gap]]]:
     """Find the lanes under each crosswalk.
 
     Returns
@@ -85,27 +79,4 @@ def place_crosswalks(
             taken.setdefault(road, []).append(gap)
             outside.append((road, float(under.min() + under.max()) / 2.0))
         placed.append(PlacedCrosswalk(thing, tuple(outside), tuple(connecting)))
-    gaps = {road: _merged(odr.roads[road], sorted(own)) for road, own in taken.items()}
-    return tuple(placed), gaps
-
-
-def _merged(road: Road, gaps: list[Gap]) -> tuple[Gap, ...]:
-    """Gaps of a road, widened to junctions that are near, and joined if they are close."""
-    found: list[Gap] = []
-    for gap in gaps:
-        start, end = max(gap.start, 0.0), min(gap.end, road.length)
-        before, behind = start, road.length - end
-        if before < min(TO_JUNCTION, behind) and _at_junction(road, "start"):
-            start = 0.0
-        if behind < min(TO_JUNCTION, before) and _at_junction(road, "end"):
-            end = road.length
-        if found and start - found[-1].end < BETWEEN:
-            found[-1] = Gap(found[-1].start, max(found[-1].end, end))
-        else:
-            found.append(Gap(start, end))
-    return tuple(found)
-
-
-def _at_junction(road: Road, end: str) -> bool:
-    link = road.predecessor if end == "start" else road.successor
-    return link is not None and link.element_type == "junction"
+    return tuple(placed), taken

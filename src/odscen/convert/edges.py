@@ -20,6 +20,7 @@ from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.convert.gaps import Gap
     from odscen.ids import LaneKey, RoadId
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive, Road
@@ -45,13 +46,6 @@ MARKS_LEAST = 10.0
 A shorter one is joined to its neighbours, and the change is permitted on all of it: what a driver
 does within a few metres of broken line SUMO's drivers need the length of an edge for.
 """
-
-
-class Gap(NamedTuple):
-    """Part of a road that belongs to a junction: under a crosswalk, metres of s."""
-
-    start: float
-    end: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from odscen.convert.courses import evaluate
 from odscen.convert.crosswalks import place_crosswalks
 from odscen.convert.edges import plan_edges
 from odscen.convert.findings import findings
+from odscen.convert.gaps import merge_gaps, side_gaps
 from odscen.convert.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.net import NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.nodes import find_nodes, plain_ids
@@ -29,7 +30,7 @@ from odscen.convert.table_build import build_table
 from odscen.convert.walks import build_walks
 from odscen.convert.ways import find_ways
 from odscen.ids import SumoEdgeId, SumoLaneId
-from odscen.opendrive.topology import lane_successors
+from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,10 +79,12 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     """
     lefthand = _keeps_left(table)
     successors = lane_successors(odr)
-    crosswalks, gaps = place_crosswalks(odr, table)
+    sides = side_links(odr)
+    crosswalks, under = place_crosswalks(odr, table)
+    gaps = merge_gaps(odr, under, side_gaps(sides))
     plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
-    found = find_ways(odr, table, successors, plans)
-    nodes = find_nodes(odr, table, found, gaps, crosswalks)
+    found = find_ways(table, successors, plans, sides)
+    nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
     on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
     builder = _Builder(odr, table, found, nodes, on_foot, lefthand=lefthand)
     net = builder.net()

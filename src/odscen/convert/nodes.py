@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.convert.crosswalks import PlacedCrosswalk
-    from odscen.convert.edges import Gap
+    from odscen.convert.gaps import Gap
     from odscen.convert.ways import Ways
     from odscen.ids import JunctionId
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive, Road, RoadLink
+    from odscen.opendrive.topology import SideLink
 
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]+")
 
@@ -55,9 +56,16 @@ def find_nodes(
     found: Ways,
     gaps: Mapping[RoadId, Sequence[Gap]],
     crosswalks: Sequence[PlacedCrosswalk],
+    sides: Sequence[SideLink] = (),
 ) -> Nodes:
     """Join the ends of edges: those of one OpenDRIVE junction, and those that ways connect."""
     groups = _joined(odr, gaps)
+    for side in sides:
+        main = odr.roads[side.main.road]
+        junction = odr.roads[side.other.road].junction
+        for gap in gaps[main.id]:
+            if gap.start <= side.s <= gap.end:
+                groups.join(("junction", junction), _port(main, gap.start))
     walked = [_join_crosswalk(odr, groups, gaps, n, c) for n, c in enumerate(crosswalks)]
     roads = [odr.roads[table.road_ids[edge.road]] for edge in found.edges]
     heads = [_port(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.convert.tracks import PIECE_MIN, Polylines
-from odscen.opendrive.topology import lane_successors
+from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -43,7 +43,10 @@ def lane_relations(odr: OpenDrive, drivable: Sequence[LaneKey]) -> dict[Pair, La
     dict
         From (lane, lane) to the lane, with its section, at whose end the relation begins.
     """
-    successors = lane_successors(odr)
+    successors = {key: list(after) for key, after in lane_successors(odr).items()}
+    for side in side_links(odr):
+        source, target = (side.main, side.other) if side.leaves else (side.other, side.main)
+        successors[source].append(target)
     allowed = set(drivable)
     found: dict[Pair, LaneKey] = {}
     for start in drivable:

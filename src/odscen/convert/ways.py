@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from odscen.convert.edges import EdgePlan
     from odscen.ids import LaneKey
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.model import OpenDrive
+    from odscen.opendrive.topology import SideLink
 
 Key = tuple[object, ...]
 """What :class:`Groups` joins: a kind and what tells things of a kind apart."""
@@ -69,16 +69,16 @@ class _Visit(NamedTuple):
 
 
 def find_ways(
-    odr: OpenDrive,
     table: RoadTable,
     successors: Mapping[LaneKey, Sequence[LaneKey]],
     edges: Sequence[EdgePlan],
+    sides: Sequence[SideLink] = (),
 ) -> Ways:
-    """Follow the lanes of all edges to where the next edges begin.
+    """Follow the lanes of all edges to where the next edges begin, side links included.
 
     Where several ways lead from one lane to the same other lane, the shortest is taken.
     """
-    finder = _Finder(odr, table, successors, edges)
+    finder = _Finder(table, successors, edges, sides)
     found: list[Way] = []
     for number, edge in enumerate(edges):
         for index in range(len(edge.lanes)):
@@ -90,13 +90,20 @@ def find_ways(
 class _Finder:
     def __init__(
         self,
-        odr: OpenDrive,
         table: RoadTable,
         successors: Mapping[LaneKey, Sequence[LaneKey]],
         edges: Sequence[EdgePlan],
+        sides: Sequence[SideLink],
     ) -> None:
-        self._odr = odr
         self._table = table
+        self._exits: dict[int, list[tuple[float, int]]] = {}
+        self._entries: dict[int, list[tuple[float, int]]] = {}
+        for side in sides:
+            main, other = table.lane_index[side.main], table.lane_index[side.other]
+            if side.leaves:
+                self._exits.setdefault(main, []).append((side.s, other))
+            else:
+                self._entries.setdefault(other, []).append((side.s, main))
         self._successors = successors
         self._edges = edges
         self.lost: list[Lost] = []
@@ -141,12 +148,15 @@ class _Finder:
             visit = next(
                 (v for v in self._visits.get(row, ()) if sign * (v.entry - s) >= -1e-6), None
             )
+            until = visit.entry if visit is not None else end
+            todo += self._turning_off(row, s, until, course)
             if visit is not None and visit.first:
                 yield (visit.edge, visit.lane), _extended(course, Stretch(row, s, visit.entry))
                 continue
             if visit is not None or len(course) > LONGEST_WAY:
                 continue
             course = _extended(course, Stretch(row, s, end))
+            todo += [(main, place, course) for place, main in self._entries.get(row, ())]
             following = [
                 self._table.lane_index[key]
                 for key in self._successors[self._table.lane_keys[row]]
@@ -158,6 +168,17 @@ class _Finder:
                 forward = bool(self._table.lane_forward[other])
                 start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
                 todo.append((other, float(start), course))
+
+    def _turning_off(
+        self, row: int, s: float, until: float, course: Course
+    ) -> Iterator[tuple[int, float, Course]]:
+        """Lanes that begin beside a lane between two places, with the way to them."""
+        low, high = sorted((s, until))
+        for place, other in self._exits.get(row, ()):
+            if low - 1e-6 <= place <= high + 1e-6 and self._open(self._table.lane_keys[other]):
+                forward = bool(self._table.lane_forward[other])
+                start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
+                yield other, float(start), _extended(course, Stretch(row, s, place))
 
     def _open(self, key: LaneKey) -> bool:
         return bool(allowed(self._table.lane_type[self._table.lane_index[key]]))

@@ -14,7 +14,7 @@ from odscen.lanegraph.pedestrians import build_pedestrians
 from odscen.lanegraph.segments import SegmentMap, build_segments
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks
-from odscen.opendrive.topology import lane_successors
+from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -91,7 +91,7 @@ def _lane_graph(
     successors: Mapping[LaneKey, Sequence[LaneKey]],
 ) -> LaneGraph:
     keys = [table.lane_keys[row] for row in nodes.lines.rows.tolist()]
-    edges = connect(nodes, keys, successors)
+    edges = connect(nodes, keys, successors, side_links(odr))
     used = np.flatnonzero(np.diff(nodes.first))
     number = np.full(len(keys) + 1, -1, dtype=np.int64)  # the last answers for lane -1
     number[used] = np.arange(len(used))

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from odscen.ids import LaneKey
     from odscen.lanegraph.nodes import NodeTable
     from odscen.opendrive.profiles import IntArray
+    from odscen.opendrive.topology import SideLink
 
 
 MAX_PASSED = 16
@@ -37,7 +38,10 @@ class Edges(NamedTuple):
 
 
 def connect(
-    nodes: NodeTable, keys: Sequence[LaneKey], successors: Mapping[LaneKey, Sequence[LaneKey]]
+    nodes: NodeTable,
+    keys: Sequence[LaneKey],
+    successors: Mapping[LaneKey, Sequence[LaneKey]],
+    sides: Sequence[SideLink] = (),
 ) -> Edges:
     """Make all edges of a map.
 
@@ -49,6 +53,8 @@ def connect(
         Name of each lane of ``nodes``.
     successors
         Lanes that follow each lane in driving direction, of all types.
+    sides
+        Lanes that begin or end beside others.
     """
     number = {key: lane for lane, key in enumerate(keys)}
     follow = [
@@ -57,6 +63,7 @@ def connect(
     parts = [
         _along_lanes(nodes),
         _across_joints(nodes, follow),
+        _at_sides(nodes, number, sides),
         _to_the_side(nodes, follow, Relation.LEFT),
         _to_the_side(nodes, follow, Relation.RIGHT),
     ]
@@ -98,6 +105,33 @@ def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
     rest = nodes.lines.lengths[lane] - nodes.offset[source]
     length = rest + table[:, 2] + nodes.offset[target]
     return _edges(source, target, Relation.SUCCESSOR, length)
+
+
+def _at_sides(nodes: NodeTable, number: Mapping[LaneKey, int], sides: Sequence[SideLink]) -> Edges:
+    """Between the last node before a side link and the first one behind it."""
+    pairs: list[tuple[int, int, float]] = []
+    for side in sides:
+        if side.main not in number or side.other not in number:
+            continue
+        main, other = number[side.main], number[side.other]
+        place = float(nodes.lines.offset_at(np.array([main]), np.array([side.s]))[0])
+        own = range(int(nodes.first[main]), int(nodes.first[main + 1]))
+        first, end = int(nodes.first[other]), int(nodes.first[other + 1])
+        if first == end:
+            continue
+        if side.leaves:
+            before = [node for node in own if nodes.offset[node] <= place]
+            if before:
+                gap = place - float(nodes.offset[before[-1]]) + float(nodes.offset[first])
+                pairs.append((before[-1], first, gap))
+        else:
+            behind = [node for node in own if nodes.offset[node] >= place]
+            if behind:
+                rest = float(nodes.lines.lengths[other] - nodes.offset[end - 1])
+                pairs.append((end - 1, behind[0], rest + float(nodes.offset[behind[0]]) - place))
+    table = np.array(pairs, dtype=np.float64).reshape(-1, 3)
+    source, target = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
+    return _edges(source, target, Relation.SUCCESSOR, table[:, 2])
 
 
 def _following(

@@ -8,7 +8,7 @@ with the driving direction of both lanes are given.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
@@ -163,3 +163,61 @@ def _incoming_ends(
         for end, own in ends
         if own is not None and own.element_type == "junction" and own.element_id == junction.id
     )
+
+
+class SideLink(NamedTuple):
+    """A lane that begins or ends beside another lane, not at an end of it (section 12.6).
+
+    Attributes
+    ----------
+    main, s
+        The lane that goes on, and where; metres.
+    other
+        Lane of a connecting road of a virtual junction.
+    leaves
+        Whether traffic of ``main`` can turn into ``other`` there, or else comes from it.
+    """
+
+    main: LaneKey
+    s: float
+    other: LaneKey
+    leaves: bool
+
+
+def side_links(odr: OpenDrive) -> tuple[SideLink, ...]:
+    """Links of connecting roads to places within a road, as virtual junctions have them."""
+    found: dict[SideLink, None] = {}
+    for road in odr.roads.values():
+        ends: tuple[tuple[End, RoadLink | None], ...] = (
+            ("start", road.predecessor),
+            ("end", road.successor),
+        )
+        for end, link in ends:
+            if road.junction is None or link is None or link.element_s is None:
+                continue
+            main = odr.roads.get(RoadId(link.element_id))
+            if main is not None and main is not road and link.contact_point is None:
+                found.update(dict.fromkeys(_beside(odr, road, end, main, link.element_s)))
+    return tuple(found)
+
+
+def _beside(odr: OpenDrive, road: Road, end: End, main: Road, s: float) -> Iterator[SideLink]:
+    number = next((n for n in reversed(range(len(main.sections))) if main.sections[n].s <= s), None)
+    if number is None or s > main.length:
+        return
+    junction = odr.junctions.get(road.junction) if road.junction is not None else None
+    stated = {
+        (to_id, from_id)
+        for connection in (junction.connections if junction else ())
+        if (connection.incoming_road, connection.connecting_road) == (main.id, road.id)
+        and connection.contact_point == end
+        for from_id, to_id in connection.lane_links
+    }
+    section = end_section(road, end)
+    for lane in road.sections[section].lanes.values():
+        own = lane.predecessors if end == "start" else lane.successors
+        for main_id in sorted({*own, *(m for own_id, m in stated if own_id == lane.id)}):
+            if lane.id and _lane(main, number, main_id) is not None:
+                leaves = is_forward(road, lane) == (end == "start")
+                here = LaneKey(main.id, number, main_id)
+                yield SideLink(here, s, LaneKey(road.id, section, lane.id), leaves)
