@@ -106,16 +106,16 @@ def test_a_connection_names_its_lanes_its_way_and_its_light() -> None:
 
 def test_the_last_letter_of_a_response_is_the_first_link() -> None:
     requests = (
-        Request(frozenset(), frozenset({1})),
-        Request(frozenset({0, 2}), frozenset({0, 2})),
-        Request(frozenset(), frozenset({1})),
+        Request(frozenset(), frozenset({1, 2})),
+        Request(frozenset({0}), frozenset({0})),
+        Request(frozenset({0}), frozenset({0})),
     )
     junction = NetJunction(
         "j", "priority", (10.0, 0.0, 0.0), np.zeros((3, 3)), (STREET.id,), (WAY.id,), requests
     )
     rows = text(net(junctions=(junction,))).findall("junction/request")
-    assert [row.get("response") for row in rows] == ["000", "101", "000"]
-    assert [row.get("foes") for row in rows] == ["010", "101", "010"]
+    assert [row.get("response") for row in rows] == ["000", "001", "001"]
+    assert [row.get("foes") for row in rows] == ["110", "001", "001"]
     assert [row.get("index") for row in rows] == ["0", "1", "2"]
 
 

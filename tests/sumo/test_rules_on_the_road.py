@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from odscen.opendrive.parse import parse
 from tests.convert.maps import Converted, converted, named, of_model
 from tests.lanegraph.roads import lane, network, road, section
 from tests.sumo.traffic import Car, Person, drive
@@ -17,7 +20,9 @@ WEST, EAST, SIDE = "2.0.f 2.1.f 1.2.b 1.1.b", "1.1.f 1.2.f 2.1.b 2.0.b", "3.0.f 
 
 @pytest.fixture(scope="module")
 def signs() -> Converted:
-    return converted(named("t_junction_signs"))
+    """Where nothing but signs tells who goes first."""
+    text = named("t_junction_signs").read_text(encoding="utf-8")
+    return of_model(parse(re.sub("<priority [^>]*>", "", text)))
 
 
 @pytest.mark.parametrize("onwards", ["2.1.b 2.0.b", "1.2.b 1.1.b"], ids=["left", "right"])

@@ -70,7 +70,7 @@ class Surroundings(NamedTuple):
     incoming
         Lanes that end there, with those that lead nowhere.
     high_low
-        Pairs of OpenDRIVE connecting roads of which the first has priority.
+        Pairs of OpenDRIVE roads, incoming or connecting, of which the first has priority.
     controllers
         Controller of each signal.
     xodr

@@ -239,7 +239,9 @@ class _Builder:
         before = self._lane_lines[way.source][way.source_lane]
         after = self._lane_lines[way.target][way.target_lane]
         table = self._table
-        roads = [table.road_ids[table.lane_road[stretch.row]] for stretch in way.course]
+        over = [table.road_ids[table.lane_road[stretch.row]] for stretch in way.course]
+        connecting = [road for road in over if self._odr.roads[road].junction is not None]
+        incoming = table.road_ids[self._edges[way.source].road]
         movement = Movement(
             source=(self._ids[way.source], way.source_lane),
             target=(self._ids[way.target], way.target_lane),
@@ -250,7 +252,7 @@ class _Builder:
             speed=source.speed,
             sign=self.ruled.signs[number],
             ring=way.source in self._ring_edges,
-            roads=frozenset(str(road) for road in roads),
+            roads=frozenset(str(road) for road in (incoming, *connecting)),
         )
         return Passage(
             movement,

@@ -75,7 +75,8 @@ class Movement:
     ring
         Whether it comes from within a roundabout.
     roads
-        OpenDRIVE connecting roads that it runs over.
+        OpenDRIVE road that it comes from, and connecting roads that it runs over: files name either
+        in ``<priority>``.
     """
 
     source: tuple[str, int]

@@ -1,0 +1,81 @@
+"""What ``<priority>`` and signs of a map become: the right of way in the file."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import pytest
+
+from odscen.opendrive.parse import parse
+from tests.convert.maps import Converted, named, of_model
+
+SIGNALS = re.compile(r"<signals>.*?</signals>", re.DOTALL)
+OBJECTS = re.compile(r"<objects>.*?</objects>", re.DOTALL)
+PRIORITY = re.compile(r"<priority [^>]*>")
+
+
+@cache
+def stripped(*what: re.Pattern[str]) -> Converted:
+    """The T junctions without their signs, crosswalks or priorities."""
+    text = named("t_junction_signs").read_text(encoding="utf-8")
+    for pattern in what:
+        text = pattern.sub("", text)
+    return of_model(parse(text))
+
+
+def waits(made: Converted, one: tuple[str, str], other: tuple[str, str]) -> bool:
+    """Whether the way between two roads waits for another one; one of both does."""
+    links = [link for link in made.xml.iter("connection") if link.get("via")]
+    roads = [(link.get("from").split(".")[0], link.get("to").split(".")[0]) for link in links]
+    via, via2 = (links[roads.index(way)].get("via") for way in (one, other))
+    for junction in made.xml.iter("junction"):
+        inner = junction.get("intLanes").split()
+        if via in inner:
+            requests = [request.get("response")[::-1] for request in junction.iter("request")]
+            first, second = inner.index(via), inner.index(via2)
+            assert requests[first][second] != requests[second][first]
+            return requests[first][second] == "1"
+    raise AssertionError
+
+
+YIELDS = [
+    (("5", "4"), ("1", "4")),
+    (("5", "4"), ("4", "1")),
+    (("5", "4"), ("1", "5")),
+    (("5", "1"), ("4", "1")),
+    (("3", "2"), ("2", "1")),
+    (("3", "2"), ("1", "3")),
+    (("3", "1"), ("2", "1")),
+]
+"""Ways from the side streets, and those on the main road that they let pass."""
+
+
+@pytest.mark.parametrize(("side", "main"), YIELDS)
+@pytest.mark.parametrize(
+    "without",
+    [(), (SIGNALS,), (SIGNALS, OBJECTS), (PRIORITY,), (PRIORITY, OBJECTS)],
+    ids=["all", "no signs", "priorities only", "no priorities", "signs only"],
+)
+def test_side_streets_yield_by_sign_or_by_priority(
+    without: tuple[re.Pattern[str], ...], side: tuple[str, str], main: tuple[str, str]
+) -> None:
+    assert waits(stripped(*without), side, main)
+
+
+def test_without_both_right_goes_before_left() -> None:
+    bare = stripped(SIGNALS, PRIORITY)
+    assert waits(bare, ("4", "1"), ("5", "4")), "the side street is on the right"
+    assert waits(bare, ("5", "4"), ("1", "4"))
+    assert {j.get("type") for j in bare.xml.iter("junction")} >= {"right_before_left"}
+
+
+def test_a_priority_may_name_connecting_roads_instead() -> None:
+    text = SIGNALS.sub("", named("t_junction_signs").read_text(encoding="utf-8"))
+    turn, straight = "15", "13"
+    first = '<priority high="{}" low="{}"/></junction>'
+    for high, low in ((straight, turn), (turn, straight)):
+        made = of_model(
+            parse(PRIORITY.sub("", text).replace("</junction>", first.format(high, low)))
+        )
+        assert waits(made, ("5", "4"), ("4", "1")) is (low == turn)
