@@ -7,7 +7,12 @@ import re
 import numpy as np
 import pytest
 
+from odscen.convert.lane_table import LaneTable
 from odscen.convert.report import Fate
+from odscen.convert.verify import verify
+from odscen.ids import LaneKey
+from odscen.sumo.sumo_map import SumoMap
+from odscen.sumo.usable import usable_places
 from tests.convert.maps import Converted, converted, named, of_model
 from tests.lanegraph.roads import junction, lane, network, road, section
 
@@ -122,6 +127,24 @@ def test_a_crosswalk_between_junctions_becomes_one() -> None:
     assert set(crossing.get("crossingEdges").split()) <= set(found.edges())
     [yielding] = [j for j in found.xml.iter("junction") if len(j.findall("request")) > 2]
     assert {request.get("response") for request in yielding.findall("request")} == {"100", "000"}
+
+
+@pytest.mark.parametrize(("place", "length"), [(2.0, 100.0), (98.5, 100.0), (4.0, 8.0)])
+def test_a_crosswalk_at_a_dead_end_leaves_a_stub_behind_it(place: float, length: float) -> None:
+    lanes = section(lane(-1), lane(1))
+    found = made(road("1", lanes, length=length, objects=crosswalk(place)))
+    assert links(found) == {("1.0.f_0", "1.1.f_0"), ("1.1.b_0", "1.0.b_0")}
+    assert verify(found.network.net_xml, found.odr, found.roads).passed
+
+
+def test_a_map_without_anything_to_move_on_is_an_empty_network() -> None:
+    found = made(road("1", section(lane(-1, kind="shoulder"))))
+    assert found.edges() == {}
+    table = LaneTable.from_json(found.network.table.to_json())
+    assert table.to_sumo(LaneKey("1", 0, -1), 5.0) is None
+    usable = usable_places(SumoMap.of(found.graph, table))
+    assert not usable.spawnable.any()
+    assert not usable.walkable.any()
 
 
 def test_crosswalks_close_to_each_other_are_in_one_junction() -> None:

@@ -17,6 +17,9 @@ TO_JUNCTION = 12.0
 BETWEEN = 8.0
 """Metres between gaps of one road: with less, no edge lies between them."""
 
+STUB = 0.5
+"""Metres of road that stay beyond a gap at a dead end."""
+
 SIDE_MARGIN = 2.0
 """Metres of road before and behind a place where side roads turn off."""
 
@@ -62,7 +65,9 @@ def _merged(road: Road, gaps: list[Gap]) -> tuple[Gap, ...]:
     """Gaps of a road, widened to junctions that are near, and joined if they are close."""
     found: list[Gap] = []
     for gap in gaps:
-        start, end = max(gap.start, 0.0), min(gap.end, road.length)
+        # At a dead end a stub stays: without an edge there nobody would come over the gap.
+        start = max(gap.start, 0.0 if road.predecessor else min(STUB, 0.1 * road.length))
+        end = min(gap.end, road.length - (0.0 if road.successor else min(STUB, 0.1 * road.length)))
         before, behind = start, road.length - end
         if before < min(TO_JUNCTION, behind) and _at_junction(road, "start"):
             start = 0.0

@@ -145,7 +145,7 @@ def build_junction(
         kind = "priority" if not conflicts.pairs else kind
     junction = NetJunction(
         name,
-        kind if passages else "dead_end",
+        kind if passages or crossings else "dead_end",
         around.place,
         around.outline,
         tuple(dict.fromkeys((*_sources(passages), *around.incoming, *starts))),

@@ -169,6 +169,8 @@ def _edges(
 
 
 def _pieces(data: dict[str, Any]) -> tuple[Piece, ...]:
+    if not data["lane"]:
+        return ()
     ends = np.cumsum(np.array(data["knots"], dtype=np.int64))
     pos, s, deviation = (
         np.split(np.array(data[name], dtype=np.float64), ends[:-1])

@@ -42,7 +42,8 @@ def usable_places(sumo_map: SumoMap) -> Usable:
         [
             not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
             for lane in _lanes(sumo_map, sumo_map.walk_places)
-        ]
+        ],
+        dtype=np.bool_,
     )
     on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
