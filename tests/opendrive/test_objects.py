@@ -69,6 +69,15 @@ def test_corners_in_road_coordinates_follow_the_road() -> None:
     assert crosswalk.z == pytest.approx(0.1)
 
 
+def test_a_crosswalk_drawn_as_a_line_has_a_usual_width() -> None:
+    corners = '<cornerRoad id="0" s="79" t="-3"/><cornerRoad id="1" s="79" t="3"/>'
+    outlines = f"<outlines><outline>{corners}</outline></outlines>"
+    text = f'<object id="1" type="crosswalk" s="79" t="0">{outlines}</object>'
+    (found,) = crosswalks(*model_with(text))
+    assert found.width == pytest.approx(3.0)
+    assert sorted(map(tuple, found.axis.round(9).tolist())) == [(79, -3), (79, 3)]
+
+
 def test_a_crosswalk_without_a_size_is_left_out() -> None:
     assert crosswalks(*model_with('<object id="1" type="crosswalk" s="4" t="0"/>')) == ()
 

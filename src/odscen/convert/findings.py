@@ -175,6 +175,11 @@ def _signals(odr: OpenDrive, net: Net, ruled: Ruled) -> Iterator[Entry]:
             elif kind in ("traffic_light", "stop", "yield"):
                 word = kind.replace("_", " ")
                 yield Entry(Fate.KEPT, element, f"{word}, as right of way in SUMO")
+            elif kind == "pedestrian_light":
+                reason = (
+                    "every crossing of a junction with lights has a light, wherever poles stand"
+                )
+                yield Entry(Fate.GUESSED, element, reason)
     if net.lights:
         reason = (
             f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "

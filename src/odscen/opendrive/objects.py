@@ -20,6 +20,9 @@ SignalKind = Literal["traffic_light", "pedestrian_light", "stop", "yield", "spee
 
 _CIRCLE_CORNERS = 16
 
+LINE_WIDTH = 3.0
+"""Metres of a crosswalk that is drawn as a mere line: about what zebra crossings have at least."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crosswalk:
@@ -145,9 +148,11 @@ def _crosswalk(
     table: RoadTable, road: RoadId, obj: RoadObject, outline: FloatArray
 ) -> Crosswalk | None:
     polygon = outline[:, :2]
-    area = _signed_area(polygon)
-    if len(polygon) < 3 or abs(area) < 0.01:
+    if len(polygon) < 3 or abs(_signed_area(polygon)) < 0.01:
+        polygon = _widened(polygon)
+    if len(polygon) < 3:
         return None
+    area = _signed_area(polygon)
     if area < 0.0:
         polygon = polygon[::-1]
     line = table.reference(np.array([table.road_index[road]]), np.array([obj.s]))
@@ -162,6 +167,17 @@ def _crosswalk(
         axis=_chord(polygon, along),
         width=float(np.ptp(polygon @ across)),
     )
+
+
+def _widened(line: FloatArray) -> FloatArray:
+    """Rectangle of :data:`LINE_WIDTH` around a line across the road; nothing around a point."""
+    gaps = np.linalg.norm(line[:, None] - line[None], axis=2)
+    start, end = np.unravel_index(np.argmax(gaps), gaps.shape)
+    if gaps[start, end] < 1.0:
+        return np.empty((0, 2))
+    ahead = (line[end] - line[start]) / gaps[start, end]
+    side = np.array([-ahead[1], ahead[0]]) * (LINE_WIDTH / 2.0)
+    return np.array([line[start] - side, line[end] - side, line[end] + side, line[start] + side])
 
 
 def _signed_area(polygon: FloatArray) -> float:
