@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-SNAP = 0.3
+SNAP = 0.65
 """Metres: a place this close beside the end of a piece is taken to be on it."""
 
 _STRIDE = 1e6

@@ -236,11 +236,11 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
 
 
 def _ruled(one: Movement, other: Movement, rules: Rules) -> bool | None:
-    """What ``<priority>`` says on who gives way, if anything."""
+    """What ``<priority>`` says on who gives way, if anything that does not contradict itself."""
     pairs = [(mine, theirs) for mine in one.roads for theirs in other.roads]
-    if any((theirs, mine) in rules.high_low for mine, theirs in pairs):
-        return True
-    return False if any(pair in rules.high_low for pair in pairs) else None
+    waits = any((theirs, mine) in rules.high_low for mine, theirs in pairs)
+    goes = any(pair in rules.high_low for pair in pairs)
+    return waits if waits != goes else None
 
 
 def _waits_by_place(one: Movement, other: Movement, side: float) -> bool:

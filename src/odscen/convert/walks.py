@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-TRIM = 0.25
+TRIM = 0.6
 """Metres that an edge keeps off the middle of a walking area."""
 
 APART = 1.0
@@ -328,7 +328,7 @@ class _Builder:
     # Geometry
 
     def _lay(self, chains: Sequence[list[tuple[_Arc, bool]]]) -> None:
-        """Make an edge of each chain, of two parts if both ends are at one junction."""
+        """Make an edge of each chain, of three parts if both ends are at one junction."""
         courses: list[Course] = []
         ends: list[tuple[Key, Key]] = []
         for chain in chains:
@@ -343,10 +343,11 @@ class _Builder:
                 continue
             one, other = self._hub(first), self._hub(last)
             if one is other or (one.junction and one.junction == other.junction):
-                middle = ("middle", len(courses))
-                head, tail = _halves(course)
-                courses += [head, tail]
-                ends += [(first, middle), (middle, last)]
+                # Of two parts both would join the same junctions, and SUMO could not tell
+                # whether a walk from one to the other goes over the middle or round the ends.
+                keys = [("part", len(courses)), ("part", len(courses) + 1)]
+                courses += _thirds(course)
+                ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
             else:
                 courses.append(course)
                 ends.append((first, last))
@@ -509,16 +510,22 @@ def _outline(arms: Sequence[FloatArray]) -> FloatArray:
     return np.column_stack((outline, np.full(len(outline), z)))
 
 
-def _halves(course: Course) -> tuple[Course, Course]:
-    """Divide a course in its middle."""
-    half = sum(stretch.extent for stretch in course) / 2.0
+def _thirds(course: Course) -> list[Course]:
+    """Divide a course into three parts of about the same extent."""
+    third = sum(stretch.extent for stretch in course) / 3.0
+    head, rest = _divided(course, third)
+    return [head, *_divided(rest, third)]
+
+
+def _divided(course: Course, extent: float) -> tuple[Course, Course]:
+    """Divide a course after ``extent`` metres of s."""
     for index, stretch in enumerate(course):
-        if half < stretch.extent or index == len(course) - 1:
-            share = min(max(half / stretch.extent, 0.25), 0.75)
+        if extent < stretch.extent or index == len(course) - 1:
+            share = min(max(extent / stretch.extent, 0.1), 0.9)
             middle = stretch.start + share * (stretch.end - stretch.start)
             head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
             return (*course[:index], head), (tail, *course[index + 1 :])
-        half -= stretch.extent
+        extent -= stretch.extent
     raise AssertionError
 
 

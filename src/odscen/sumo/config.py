@@ -13,6 +13,12 @@ from odscen.sumo.layout import NET_FILE, ROUTES_FILE, SIGNALS_FILE, TRAJECTORIES
 FCD_ATTRIBUTES = ("id", "x", "y", "angle", "speed", "lane")
 """What is recorded of each vehicle and person in each step."""
 
+SQUEEZE = 120.0
+"""Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
+
+Longer than a red light, at which they stand behind each other for a reason.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
@@ -70,6 +76,7 @@ def sumo_config(settings: RunSettings) -> str:
             "collision.check-junctions": "true",
             "intermodal-collision.action": "warn",
             "pedestrian.model": "striping",
+            "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
             "time-to-teleport": f"{settings.time_to_teleport:g}",
         },
         "random_number": {"seed": str(settings.seed)},
