@@ -121,8 +121,10 @@ def _steps(
                 send(
                     Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned)
                 )
-        if watch is not None:
+        if watch is not None:  # whoever watches sees how it ends
             watch.show(session, recorder)
+            running = session.running()
+            send(Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned))
         return now, steps
 
 
