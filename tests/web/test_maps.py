@@ -109,7 +109,9 @@ def test_a_map_is_added_in_the_background_and_removed(client: TestClient) -> Non
 def test_a_map_that_cannot_be_read_is_a_failed_job_that_names_the_place(
     client: TestClient,
 ) -> None:
-    content = b'<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="-3"/></OpenDRIVE>'
+    content = (
+        b'<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="-3"/></OpenDRIVE>'
+    )
     failed = job(client, upload(client, content, "bad.xodr"))
     assert failed["state"] == "failed"
     assert failed["error"]["kind"] == "OpenDriveError"

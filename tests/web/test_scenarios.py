@@ -89,7 +89,7 @@ def _filled(value, places):
     return [_filled(one, places) for one in value] if isinstance(value, list) else value
 
 
-def post_edit(client: TestClient, name: str, version: int, kind: str, **arguments: object):
+def post_edit(client: TestClient, name: str, version: int, kind: str, /, **arguments: object):
     body = {"version": version, "edit": {"kind": kind, **arguments}}
     return client.post(f"/api/scenarios/{name}/edits", json=body)
 

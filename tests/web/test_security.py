@@ -99,9 +99,7 @@ def test_a_token_is_not_a_way_to_be_sent_elsewhere(guarded: TestClient) -> None:
 
 def test_an_oversized_upload_is_refused_announced_or_not(guarded: TestClient) -> None:
     headers = {"Authorization": "Bearer s3cret"}
-    announced = guarded.post(
-        "/api/maps", files={"file": ("m.xodr", b"x" * 2000)}, headers=headers
-    )
+    announced = guarded.post("/api/maps", files={"file": ("m.xodr", b"x" * 2000)}, headers=headers)
     assert announced.status_code == 413
     assert "1,000 bytes" in announced.json()["error"]["message"]
 
