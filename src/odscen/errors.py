@@ -7,7 +7,8 @@
     |   |-- OpenDriveError          an .xodr file, with the element path and the value at fault
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
     |   |-- ScenarioError           a scenario document or its graph form; carries all problems
-    |   `-- NotFoundError           a name that is not in the catalogue, with close names
+    |   |-- NotFoundError           a name that is not in the catalogue, with close names
+    |   `-- ConflictError           it is taken, in use, or has changed meanwhile
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
     `-- ToolError (3)               a program or library that we call failed, in its own words
@@ -110,6 +111,14 @@ class NotFoundError(InputError):
         else:
             hint = f"; there is no {what} yet"
         super().__init__(f"no {what} named {name!r}{hint}")
+
+
+class ConflictError(InputError):
+    """What was asked for does not fit what is there now; ``current`` is its newest version."""
+
+    def __init__(self, problem: str, *, current: int | None = None) -> None:
+        self.current = current
+        super().__init__(problem)
 
 
 class WorkspaceError(OdscenError):

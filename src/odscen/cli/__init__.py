@@ -18,6 +18,7 @@ from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
+from odscen.cli.serve import serve
 from odscen.errors import OdscenError
 
 app = typer.Typer(
@@ -33,6 +34,7 @@ app.command()(generate)
 app.command()(check)
 app.command()(export)
 app.command()(run)
+app.command()(serve)
 app.command()(doctor)
 app.command()(demo)
 

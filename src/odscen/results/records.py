@@ -170,6 +170,11 @@ class Event:
     detail: str | None = None
 
 
+def event_row(event: Event) -> dict[str, Any]:
+    """One event as it stands in ``events.json``: without what has its default value."""
+    return rounded(_without_defaults(event))
+
+
 def events_to_json(events: tuple[Event, ...]) -> str:
     """``events.json``: one event per line, in order of time."""
     return json_with_rows(

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.sumo.layout import LOG_FILE, PLAN_FILE
-from odscen.sumo.progress import Done, Failed, Progress, decode
+from odscen.sumo.progress import Command, Done, Failed, Frame, Progress, decode, encode
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
-    from odscen.sumo.progress import OnProgress
+    from odscen.sumo.live import Live
+    from odscen.sumo.progress import Message, OnProgress
 
 WORKER = "odscen.sumo.worker"
 
@@ -41,7 +43,11 @@ class Ended:
 
 
 def run_worker(
-    folder: Path, *, progress: OnProgress | None = None, time_limit: float | None = None
+    folder: Path,
+    *,
+    progress: OnProgress | None = None,
+    time_limit: float | None = None,
+    live: Live | None = None,
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -56,21 +62,22 @@ def run_worker(
         Called with each progress message, in this thread.
     time_limit
         Wall seconds after which the process is killed.
+    live
+        Makes it a run that can be watched and steered.
     """
     start = time.perf_counter()
     command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
+    if live is not None:
+        command.append(encode(live.start))
     late = threading.Event()
-    last: Done | Failed | None = None
     # Python's own words (a traceback before the worker has opened its log) belong in the log too.
     with (
         (folder / LOG_FILE).open("ab") as log,
         subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL if live is None else subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
-            text=True,
-            encoding="utf-8",
             # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
             # a failed run, and the folder of a run that was called off would appear.
             start_new_session=True,
@@ -78,19 +85,15 @@ def run_worker(
     ):
         timer = _kill_after(process, time_limit, late)
         try:
-            for line in process.stdout or ():
-                message = decode(line)
-                if isinstance(message, Progress):
-                    if progress is not None:
-                        progress(message)
-                elif message is not None:
-                    last = message
+            last = _follow(process, progress, live)
         except BaseException:  # an interrupt, or the caller's progress function
             process.kill()
             raise
         finally:
             if timer is not None:
                 timer.cancel()
+            if live is not None:
+                live.detach()
     seconds = time.perf_counter() - start
     if isinstance(last, Done) and process.returncode == 0:
         return Ended(last, seconds, None)
@@ -99,6 +102,34 @@ def run_worker(
     reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
     words = sumo_words(folder)
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
+
+
+def _follow(
+    process: subprocess.Popen[bytes], progress: OnProgress | None, live: Live | None
+) -> Done | Failed | None:
+    """Pass on what the worker says; return the last thing it said of its end."""
+    last: Done | Failed | None = None
+    if live is not None:
+        live.attach(process)
+    for message, payload in _messages(process):
+        if live is not None:
+            live.take(message, payload)
+        if isinstance(message, Progress) and progress is not None:
+            progress(message)
+        elif isinstance(message, Done | Failed):
+            last = message
+    return last
+
+
+def _messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]]:
+    """Yield what the worker says, each message with the bytes that belong to it."""
+    if process.stdout is None:
+        return
+    for line in process.stdout:
+        message = decode(line)
+        if message is None or isinstance(message, Command):
+            continue
+        yield message, process.stdout.read(message.size) if isinstance(message, Frame) else b""
 
 
 def sumo_words(folder: Path, *, lines: int = 12) -> str:
@@ -113,7 +144,7 @@ def sumo_words(folder: Path, *, lines: int = 12) -> str:
 
 
 def _kill_after(
-    process: subprocess.Popen[str], seconds: float | None, late: threading.Event
+    process: subprocess.Popen[bytes], seconds: float | None, late: threading.Event
 ) -> threading.Timer | None:
     if seconds is None:
         return None

@@ -1,10 +1,15 @@
-"""Messages from the worker to the runner: JSON, one object per line."""
+"""Messages between the runner and the worker: JSON, one object per line, either way.
+
+A run that can be watched (see :mod:`odscen.sumo.live`) also sends frames: a line :class:`Frame` and
+then so many bytes. A run that nobody can watch sends :class:`Progress` and its end only.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +32,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The run has ended by itself: simulated seconds, steps, wall seconds of the simulation."""
+    """The run has ended without an error: simulated seconds, steps, wall seconds of the simulation.
+
+    ``stopped`` if somebody who watched it has ended it before its time.
+    """
 
     sim_seconds: float
     steps: int
     wall_seconds: float
+    stopped: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +50,69 @@ class Failed:
     reason: str
 
 
-Message = Progress | Done | Failed
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Everyone's place after a step; ``size`` bytes follow the line, see ``sumo.snapshots``."""
+
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lights:
+    """State of each traffic light that has changed since the last such message, by SUMO id."""
+
+    states: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Incidents:
+    """Events worth a mark on the map, as in ``events.json``: conflicts, jumps, hard stops."""
+
+    events: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How the run goes on: ``speed`` in simulated seconds per second, ``None`` as fast as it can.
+
+    As a message, what is so now; as an argument of the worker, how to start. A run that starts
+    ``paused`` makes its first step, so that there is something to see.
+    """
+
+    paused: bool = False
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """To the worker; ``speed`` belongs to ``speed``, and ``frame`` asks for the next frame."""
+
+    do: Literal["pause", "resume", "step", "speed", "stop", "frame"]
+    speed: float | None = None
+
+
+Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace
 OnProgress = Callable[[Progress], None]
 
-_KINDS: dict[str, type[Message]] = {"progress": Progress, "done": Done, "failed": Failed}
+_KINDS: dict[str, type[Message | Command]] = {
+    "progress": Progress,
+    "done": Done,
+    "failed": Failed,
+    "frame": Frame,
+    "lights": Lights,
+    "incidents": Incidents,
+    "pace": Pace,
+    "command": Command,
+}
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 
-def encode(message: Message) -> str:
+def encode(message: Message | Command) -> str:
     """One line, newline included."""
     return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
 
 
-def decode(line: str) -> Message | None:
+def decode(line: str | bytes) -> Message | Command | None:
     """Inverse of :func:`encode`; ``None`` for a line that is no message."""
     try:
         data = json.loads(line)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from odscen.results.expectations import Expectation
     from odscen.results.records import Plan
+    from odscen.sumo.live import Live
     from odscen.sumo.process import Ended
     from odscen.sumo.progress import OnProgress, Progress
 
@@ -108,6 +109,7 @@ def run_prepared(
     progress: OnProgress | None = None,
     time_limit: float | None = None,
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    live: Live | None = None,
 ) -> RunResult:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -120,6 +122,8 @@ def run_prepared(
     finish
         Called with the folder and the summary when a run has completed, before the folder appears:
         the place to add a report.
+    live
+        Makes it a run that can be watched and steered while it goes.
 
     Raises
     ------
@@ -129,7 +133,7 @@ def run_prepared(
     try:
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
-            ended = run_worker(folder, progress=progress, time_limit=time_limit)
+            ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
             if ended.done is None:
                 _drop_torn_trajectories(folder)
             summary = _summary(prepared, folder, ended, expectations)
@@ -241,6 +245,7 @@ def _summary(
         "version": VERSION,
         "status": "completed" if done else "failed",
         "error": ended.error,
+        "stopped": bool(done and done.stopped),
         "scenario": plan.scenario,
         **prepared.about,
         "seed": plan.seed,

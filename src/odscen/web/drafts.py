@@ -1,0 +1,231 @@
+"""The scenarios of a workspace: saved with every edit, versioned, with undo and redo.
+
+A scenario is the file ``scenarios/NAME.scenario.json`` that every other command reads; its history
+lies in ``scenarios/.history/NAME/``. Each change names the version that it was made on, so that two
+pages cannot silently overwrite each other.
+"""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from odscen.catalog.store import check_name
+from odscen.errors import ConflictError, InputError, NotFoundError, ScenarioError, WorkspaceError
+from odscen.scenario.files import dumps
+from odscen.web import history
+from odscen.web.history import History
+from odscen.web.messages import ScenarioRow
+from odscen.workflow import SUFFIX, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from odscen.catalog.store import Workspace
+    from odscen.scenario.document import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A scenario as it is now."""
+
+    name: str
+    scenario: Scenario
+    history: History
+
+
+class Drafts:
+    """All scenarios of a workspace; one change at a time."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._folder = workspace.scenarios
+        self._lock = threading.RLock()
+        self._open: dict[str, Draft] = {}
+
+    def rows(self) -> list[ScenarioRow]:
+        """All scenarios, those changed last first."""
+        files = self._folder.glob(f"*{SUFFIX}") if self._folder.is_dir() else ()
+        rows = [self._row(path) for path in files if _is_name(path.name.removesuffix(SUFFIX))]
+        return sorted(rows, key=lambda row: (-row.modified, row.name))
+
+    def get(self, name: str) -> Draft:
+        """One scenario; a file that another program has changed is read again.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none of that name.
+        ScenarioError
+            If its file is not a scenario.
+        """
+        with self._lock, _disk_errors():
+            path = self._path(name)
+            if not path.is_file():
+                what = "scenario"
+                raise NotFoundError(what, name, [row.name for row in self.rows()])
+            text = path.read_text(encoding="utf-8", errors="replace")
+            known = self._open.get(name)
+            sha256 = history.digest(text)
+            if known is not None and known.history.sha256 == sha256:
+                return known
+            return self._opened(name, text, sha256)
+
+    def create(self, scenario: Scenario, name: str | None, *, stem: str, label: str) -> Draft:
+        """Save a new scenario; a free name is made from ``stem`` if none is given.
+
+        Raises
+        ------
+        ConflictError
+            If the name is taken.
+        """
+        with self._lock, _disk_errors():
+            name = self._free_name(stem) if name is None else check_name(name, what="scenario")
+            self._refuse_taken(name)
+            text = dumps(scenario)
+            begun = history.first(text, self._history(name), label=label)
+            write_text(self._path(name), text)
+            self._open[name] = Draft(name, scenario, begun)
+            return self._open[name]
+
+    def change(
+        self, name: str, version: int, label: str, edit: Callable[[Scenario], Scenario]
+    ) -> Draft:
+        """Make an edit and save it.
+
+        Raises
+        ------
+        ConflictError
+            If ``version`` is not the newest.
+        InputError
+            If the edit is refused.
+        """
+        with self._lock, _disk_errors():
+            old = self._of_version(name, version)
+            scenario = edit(old.scenario)
+            text = dumps(scenario)
+            new = history.grown(old.history, text, self._history(name), label=label)
+            return self._save(Draft(name, scenario, new), text)
+
+    def undo(self, name: str, version: int) -> Draft:
+        """Take the last edit back; :class:`ConflictError` if there is none."""
+        return self._move(name, version, -1)
+
+    def redo(self, name: str, version: int) -> Draft:
+        """Make the edit again that was taken back last; :class:`ConflictError` if there is none."""
+        return self._move(name, version, +1)
+
+    def rename(self, name: str, new: str) -> Draft:
+        """Give a scenario's file another name."""
+        with self._lock, _disk_errors():
+            draft = self.get(name)
+            check_name(new, what="scenario")
+            self._refuse_taken(new)
+            shutil.rmtree(self._history(new), ignore_errors=True)
+            with suppress(FileNotFoundError):
+                self._history(name).rename(self._history(new))
+            self._path(name).rename(self._path(new))
+            del self._open[name]
+            self._open[new] = replace(draft, name=new)
+            return self._open[new]
+
+    def remove(self, name: str) -> None:
+        """Remove a scenario and its history."""
+        with self._lock, _disk_errors():
+            path = self._path(name)
+            if not path.is_file():
+                what = "scenario"
+                raise NotFoundError(what, name, [row.name for row in self.rows()])
+            path.unlink()
+            shutil.rmtree(self._history(name), ignore_errors=True)
+            self._open.pop(name, None)
+
+    def _opened(self, name: str, text: str, sha256: str) -> Draft:
+        scenario = history.document(text, file=f"{name}{SUFFIX}")
+        folder = self._history(name)
+        found = history.read(folder)
+        if found is None:
+            found = history.first(text, folder, label="Open")
+        elif found.sha256 != sha256:
+            found = history.grown(found, text, folder, label="Change by another program")
+            found = replace(found, sha256=sha256)
+        self._open[name] = Draft(name, scenario, found)
+        return self._open[name]
+
+    def _move(self, name: str, version: int, step: int) -> Draft:
+        with self._lock, _disk_errors():
+            old = self._of_version(name, version)
+            if (old.history.undo if step < 0 else old.history.redo) is None:
+                msg = f"there is nothing to {'undo' if step < 0 else 'redo'}"
+                raise ConflictError(msg, current=version)
+            new, text = history.moved(old.history, step, self._history(name))
+            scenario = history.document(text, file=f"{name}{SUFFIX}")
+            return self._save(Draft(name, scenario, new), text)
+
+    def _save(self, draft: Draft, text: str) -> Draft:
+        write_text(self._path(draft.name), text)
+        self._open[draft.name] = draft
+        return draft
+
+    def _of_version(self, name: str, version: int) -> Draft:
+        draft = self.get(name)
+        current = draft.history.version
+        if version != current:
+            msg = f"scenario {name!r} has changed: it is at version {current}, not {version}"
+            raise ConflictError(msg, current=current)
+        return draft
+
+    def _row(self, path: Path) -> ScenarioRow:
+        name = path.name.removesuffix(SUFFIX)
+        modified = path.stat().st_mtime
+        try:
+            draft = self.get(name)
+        except ScenarioError as error:
+            return ScenarioRow(name=name, modified=modified, version=0, error=str(error))
+        one = draft.scenario
+        return ScenarioRow(
+            name=name,
+            title=one.name,
+            map=one.map.name,
+            actors=len(one.actors),
+            flows=len(one.flows),
+            modified=modified,
+            version=draft.history.version,
+        )
+
+    def _free_name(self, stem: str) -> str:
+        number = 1
+        while self._path(name := f"{stem[:56]}-{number}").exists():
+            number += 1
+        return name
+
+    def _refuse_taken(self, name: str) -> None:
+        if self._path(name).exists():
+            msg = f"there is a scenario named {name!r} already"
+            raise ConflictError(msg)
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{check_name(name, what='scenario')}{SUFFIX}"
+
+    def _history(self, name: str) -> Path:
+        return self._folder / ".history" / check_name(name, what="scenario")
+
+
+def _is_name(name: str) -> bool:
+    try:
+        check_name(name)
+    except InputError:
+        return False
+    return True
+
+
+@contextmanager
+def _disk_errors() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        msg = f"scenarios: {error.strerror or error} ({error.filename or ''})"
+        raise WorkspaceError(msg) from error

@@ -1,0 +1,137 @@
+"""Edits by name: every function of :mod:`odscen.scenario.edits` as a message.
+
+The messages are made from the functions' signatures, so that there is no second list to keep: kind
+is the function's name, the other fields are its arguments. What the server knows itself (the
+scenario, the graph, the lights) is not among them.
+"""
+
+from __future__ import annotations
+
+import inspect
+import operator
+from functools import reduce
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from odscen.categories import Category
+from odscen.lanegraph.model import MapGraph
+from odscen.scenario import edits
+from odscen.scenario.document import (
+    Actor,
+    Control,
+    Flow,
+    JunctionTiming,
+    Part,
+    Scenario,
+    Simulation,
+)
+from odscen.scenario.signals import Light
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+_KNOWN = {"scenario", "graph", "lights"}
+_FIELDS_OF: Mapping[str, type[Part]] = {
+    "add_actor": Actor,
+    "change_actor": Actor,
+    "add_flow": Flow,
+    "change_flow": Flow,
+    "set_timing": JunctionTiming,
+    "set_simulation": Simulation,
+}
+"""Whose fields an edit with ``**fields`` takes."""
+_SUBJECTS = ("actor", "flow", "segment", "junction", "id", "category", "preset", "name")
+"""Arguments that tell one edit from another of its kind, for its label."""
+
+
+class EditBase(BaseModel):
+    """Base of all edits; ``kind`` is the name of the function."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    kind: str
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments that were given; those that were not keep the function's defaults."""
+        return {name: getattr(self, name) for name in self.model_fields_set - {"kind"}}
+
+    @property
+    def label(self) -> str:
+        """The edit in words, for undo and redo."""
+        words = self.kind.replace("_", " ").capitalize().replace("roi", "region")
+        given = self.arguments
+        subject = next((given[key] for key in _SUBJECTS if isinstance(given.get(key), str)), None)
+        return words if subject is None else f"{words} {subject}"
+
+
+def apply_edit(
+    edit: EditBase, scenario: Scenario, graph: MapGraph, lights: tuple[Light, ...]
+) -> Scenario:
+    """Return the scenario that the edit makes of another.
+
+    Raises
+    ------
+    InputError
+        If a rule forbids it.
+    """
+    function = FUNCTIONS[edit.kind]
+    known = {"graph": graph, "lights": lights}
+    ours = {name: known[name] for name in inspect.signature(function).parameters if name in known}
+    return function(scenario, **ours, **edit.arguments)
+
+
+def _functions() -> dict[str, Callable[..., Scenario]]:
+    found: dict[str, Callable[..., Scenario]] = {}
+    for name, function in inspect.getmembers(edits, inspect.isfunction):
+        if name.startswith("_") or function.__module__ != edits.__name__:
+            continue
+        signature = inspect.signature(function)
+        if next(iter(signature.parameters)) == "scenario" and (
+            signature.return_annotation == "Scenario"
+        ):
+            found[name] = function
+    return found
+
+
+def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
+    # JSON has lists and objects; an Iterable would be read only when it is used.
+    types = {"Iterable": list, "Sequence": list, "Mapping": dict, "MapGraph": MapGraph}
+    hints = get_type_hints(
+        function, localns={**types, "Light": Light, "Category": Category, "Control": Control}
+    )
+    fields: dict[str, Any] = {"kind": (Literal[name], ...)}
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.name in _KNOWN:
+            continue
+        if parameter.kind is parameter.VAR_KEYWORD:
+            for key, field in _FIELDS_OF[name].model_fields.items():
+                fields.setdefault(key, (Optional[field.annotation], None))  # noqa: UP045
+            continue
+        default = ... if parameter.default is parameter.empty else parameter.default
+        fields[parameter.name] = (hints[parameter.name], default)
+    doc = inspect.getdoc(function) or name
+    title = "".join(word.capitalize() for word in name.split("_"))
+    model: type[EditBase] = create_model(
+        f"{title}Edit", __base__=EditBase, __doc__=doc.split("\n")[0], **fields
+    )
+    return model
+
+
+FUNCTIONS = _functions()
+MESSAGES = tuple(_message(name, function) for name, function in FUNCTIONS.items())
+
+if TYPE_CHECKING:
+    AnyEdit = EditBase
+else:
+    AnyEdit = Annotated[reduce(operator.or_, MESSAGES), Field(discriminator="kind")]
+
+
+class EditRequest(BaseModel):
+    """One edit of one version."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Annotated[int, Field(ge=0, lt=2**53)]
+    edit: AnyEdit

@@ -1,0 +1,202 @@
+"""Routes for maps, jobs and assets."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from fastapi import APIRouter, File, Form, UploadFile
+from starlette.requests import Request
+from starlette.responses import Response
+
+from odscen.catalog.assets import shipped_assets
+from odscen.catalog.shipped import shipped_maps
+from odscen.catalog.store import check_name, name_from_file
+from odscen.categories import DEFAULT_BODY
+from odscen.errors import ConflictError
+from odscen.sumo.signals import scenario_lights
+from odscen.web.messages import (
+    AssetsInfo,
+    BlueprintInfo,
+    CategoryInfo,
+    JobInfo,
+    JobStarted,
+    LightInfo,
+    MapDetails,
+    MapInfo,
+    WeatherInfo,
+)
+from odscen.web.packed import answer, packed_drawing, packed_graph
+from odscen.web.services import Shared
+from odscen.workflow import load_map
+
+if TYPE_CHECKING:
+    from odscen.catalog.store import MapEntry, Progress
+
+router = APIRouter(prefix="/api")
+
+_DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
+"""Content security policy of a drawing that is opened by itself."""
+
+
+@router.get("/maps")
+def list_maps(shared: Shared) -> list[MapInfo]:
+    """All maps of the catalogue, by name."""
+    return [MapInfo(**_map_fields(entry)) for entry in shared.workspace.maps()]
+
+
+@router.get("/maps/{name}")
+def show_map(name: str, shared: Shared) -> MapDetails:
+    """One map, with what it means and its traffic lights."""
+    entry = shared.workspace.map(name)
+    lights = load_map(entry).sumo.lights
+    known = [
+        LightInfo(
+            id=light.id,
+            names=list(seen.names),
+            green=list(seen.green),
+            signals=[list(names) for names in light.signals],
+        )
+        for light, seen in zip(lights, scenario_lights(lights), strict=True)
+    ]
+    fields = _map_fields(entry)
+    return MapDetails(**fields, semantics=entry.info["semantics"], lights=known)
+
+
+@router.get("/maps/{name}/preview.svg", response_class=Response)
+def preview(name: str, shared: Shared) -> Response:
+    """Drawing of the map as SVG."""
+    content = shared.workspace.map(name).path("preview").read_bytes()
+    headers = {"Content-Security-Policy": _DRAWING, "Cache-Control": "no-cache"}
+    return Response(content, media_type="image/svg+xml", headers=headers)
+
+
+@router.get("/maps/{name}/drawing")
+def drawing(name: str, request: Request, shared: Shared) -> Any:
+    """What is drawn of the map, see ``docs/drawings.md``."""
+    return answer(request, packed_drawing(shared.workspace.map(name)))
+
+
+@router.get("/maps/{name}/graph")
+def graph(name: str, request: Request, shared: Shared) -> Any:
+    """Lane graph, segments and pedestrian graph as columns, see ``docs/server.md``."""
+    return answer(request, packed_graph(shared.workspace.map(name)))
+
+
+@router.get("/maps/{name}/report")
+def report(name: str, shared: Shared) -> dict[str, Any]:
+    """What became of each element of the map on the way to SUMO."""
+    found: dict[str, Any] = shared.workspace.map(name).info["report"]
+    return found
+
+
+@router.post("/maps", status_code=202)
+def add_map(
+    shared: Shared,
+    file: Annotated[UploadFile, File(description="An OpenDRIVE map.")],
+    name: Annotated[str | None, Form()] = None,
+) -> JobStarted:
+    """Add a map; it is built in the background."""
+    given = Path(file.filename or "map.xodr")
+    name = name_from_file(given) if name is None else check_name(name)
+    folder = Path(tempfile.mkdtemp(prefix="odscen-upload-"))
+    source = folder / f"{name_from_file(given)}.xodr"
+    try:
+        with source.open("wb") as target:
+            shutil.copyfileobj(file.file, target)
+        _refuse_other(shared, name, source)
+    except BaseException:
+        shutil.rmtree(folder)
+        raise
+
+    def work(progress: Progress) -> str:
+        try:
+            return shared.workspace.add_map(source, name=name, progress=progress).name
+        finally:
+            shutil.rmtree(folder)
+
+    return JobStarted(job=shared.jobs.start(work))
+
+
+@router.post("/maps/shipped", status_code=202)
+def add_shipped_maps(shared: Shared) -> JobStarted:
+    """Add the maps that ship with odscen."""
+
+    def work(progress: Progress) -> str:
+        paths = shipped_maps()
+        for number, path in enumerate(paths):
+
+            def step(what: str, share: float, path: Path = path, number: int = number) -> None:
+                progress(f"{path.stem}: {what}", (number + share) / len(paths))
+
+            shared.workspace.add_map(path, progress=step)
+        return ", ".join(path.stem for path in paths)
+
+    return JobStarted(job=shared.jobs.start(work))
+
+
+@router.delete("/maps/{name}", status_code=204)
+def remove_map(name: str, shared: Shared) -> None:
+    """Remove a map; scenarios made on it stay."""
+    shared.workspace.remove_map(name)
+
+
+@router.get("/jobs/{job}")
+def show_job(job: str, shared: Shared) -> JobInfo:
+    """How far a job is."""
+    return shared.jobs.info(job)
+
+
+@router.get("/assets")
+def assets() -> AssetsInfo:
+    """Categories, models and weather presets that a scenario can use."""
+    shipped = shipped_assets()
+    return AssetsInfo(
+        categories=[
+            CategoryInfo(category=category, **body._asdict())
+            for category, body in DEFAULT_BODY.items()
+        ],
+        blueprints=[
+            BlueprintInfo(
+                id=one.id,
+                category=one.category,
+                special_type=one.special_type,
+                age=one.age,
+                **one.body._asdict(),
+            )
+            for one in shipped.blueprints.values()
+        ],
+        weather=[
+            WeatherInfo(
+                name=one.name,
+                kind=one.kind,
+                time_of_day=one.time_of_day,
+                parameters=dict(one.parameters),
+            )
+            for one in shipped.presets.values()
+        ],
+    )
+
+
+def _refuse_other(shared: Shared, name: str, source: Path) -> None:
+    """Refuse to put another map in the place of one that scenarios may be made on."""
+    import hashlib
+
+    if name not in shared.workspace.map_names():
+        return
+    if shared.workspace.map(name).sha256 != hashlib.sha256(source.read_bytes()).hexdigest():
+        msg = f"there is another map named {name!r}; give this one another name, or remove that one"
+        raise ConflictError(msg)
+
+
+def _map_fields(entry: MapEntry) -> dict[str, Any]:
+    info = entry.info
+    keys = ("sha256", "source", "opendrive", "statistics", "graph", "sumo")
+    return {
+        "name": entry.name,
+        **{key: info[key] for key in keys},
+        "report_counts": info["report"]["counts"],
+        "preview": f"/api/maps/{entry.name}/preview.svg",
+    }

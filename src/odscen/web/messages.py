@@ -1,0 +1,274 @@
+"""What goes over the wire as JSON, with the types that the OpenAPI schema shows.
+
+Field names are those of the documents; units are SI; positions are in the OpenDRIVE frame.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from odscen.categories import Category
+from odscen.scenario.document import Scenario
+
+Name = Annotated[str, Field(min_length=1, max_length=64)]
+Version = Annotated[int, Field(ge=0, lt=2**53)]
+RunState = Literal["preparing", "running", "paused", "finishing", "completed", "stopped", "failed"]
+
+
+class Body(BaseModel):
+    """Base of what a client sends: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Answer(BaseModel):
+    """Base of what the server sends."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class ErrorInfo(Answer):
+    """What is wrong: the error's type, its words, and all reasons where there are several.
+
+    ``current`` is the newest version, where another one was expected.
+    """
+
+    kind: str
+    message: str
+    problems: list[str] = []
+    current: int | None = None
+
+
+class ErrorAnswer(Answer):
+    """Body of every answer with a status of 400 or more."""
+
+    error: ErrorInfo
+
+
+class Health(Answer):
+    """That the server is there."""
+
+    version: str
+    workspace: str
+
+
+class MapInfo(Answer):
+    """A map of the catalogue; see ``map.json`` for the fields within."""
+
+    name: str
+    sha256: str
+    source: str
+    opendrive: dict[str, Any]
+    statistics: dict[str, Any]
+    graph: dict[str, Any]
+    sumo: dict[str, Any]
+    report_counts: dict[str, int]
+    preview: str
+
+
+class MapDetails(MapInfo):
+    """The same with what the map means, and its traffic lights."""
+
+    semantics: Any
+    lights: list[LightInfo]
+
+
+class LightInfo(Answer):
+    """A traffic light: its SUMO id, by which live states are told, and what scenarios call it.
+
+    ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
+    of its state, the OpenDRIVE signals that show it.
+    """
+
+    id: str
+    names: list[str]
+    green: list[float]
+    signals: list[list[str]]
+
+
+class JobStarted(Answer):
+    """Work has been taken on; ask for the job."""
+
+    job: str
+
+
+class JobInfo(Answer):
+    """How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made."""
+
+    id: str
+    state: Literal["queued", "running", "done", "failed"]
+    step: str
+    share: float
+    error: ErrorInfo | None = None
+    result: str | None = None
+
+
+class BlueprintInfo(Answer):
+    """A model of road user; metres."""
+
+    id: str
+    category: Category
+    special_type: str
+    age: str | None
+    length: float
+    width: float
+    height: float
+
+
+class CategoryInfo(Answer):
+    """A category of road users and its usual body; metres."""
+
+    category: Category
+    length: float
+    width: float
+    height: float
+
+
+class WeatherInfo(Answer):
+    """A weather preset; parameters have CARLA's names and units."""
+
+    name: str
+    kind: str
+    time_of_day: str
+    parameters: dict[str, float]
+
+
+class AssetsInfo(Answer):
+    """The asset catalogue."""
+
+    categories: list[CategoryInfo]
+    blueprints: list[BlueprintInfo]
+    weather: list[WeatherInfo]
+
+
+class ProblemInfo(Answer):
+    """One thing that is wrong with a scenario, see ``docs/scenario-format.md`` for the codes."""
+
+    severity: Literal["error", "warning"]
+    code: str
+    where: str
+    message: str
+    nodes: list[str] = []
+    segments: list[str] = []
+
+
+class ScenarioRow(Answer):
+    """A scenario in the list; ``error`` if its file cannot be read."""
+
+    name: str
+    title: str | None = None
+    map: str | None = None
+    actors: int = 0
+    flows: int = 0
+    modified: float
+    version: int
+    error: str | None = None
+
+
+class ScenarioState(Answer):
+    """A scenario as it is now; ``undo`` and ``redo`` name the edit that they would take or give."""
+
+    name: str
+    version: int
+    document: Scenario
+    problems: list[ProblemInfo]
+    label: str
+    undo: str | None
+    redo: str | None
+
+
+class NewScenario(Body):
+    """Start a scenario on a map; a free name is found if none is given."""
+
+    map: Name
+    name: Name | None = None
+
+
+class OfVersion(Body):
+    """What is asked for holds for this version only."""
+
+    version: Version
+
+
+class NewName(Body):
+    """Another name."""
+
+    name: Name
+
+
+class Goals(Answer):
+    """Goal candidates of a spawn."""
+
+    spawn: str
+    goals: list[str]
+
+
+class Path(Answer):
+    """Shortest way inside the region, ``points`` are [x, y] of its nodes; empty if there is none."""
+
+    nodes: list[str]
+    points: list[tuple[float, float]]
+
+
+class RoiInfo(Answer):
+    """Segments of the region, and those that may be added now."""
+
+    inside: list[str]
+    candidates: list[str]
+
+
+class NewRun(Body):
+    """Run a scenario as it is now.
+
+    ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
+    simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
+    """
+
+    scenario: Name
+    until: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**31)] | None = None
+    step_length: Annotated[float, Field(ge=0.01, le=1)] | None = None
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+    paused: bool = False
+
+
+class RunStarted(Answer):
+    """The run's id."""
+
+    run: str
+
+
+class Control(Body):
+    """Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`."""
+
+    action: Literal["pause", "resume", "step", "speed", "stop"]
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+
+
+class RunProgress(Answer):
+    """How far a run is."""
+
+    time: float
+    until: float
+    running: int
+    departed: int
+    arrived: int
+    planned: int
+
+
+class RunInfo(Answer):
+    """A run, going on or finished; ``summary`` is that of ``summary.json``."""
+
+    run: str
+    state: RunState
+    scenario: str
+    map: str | None
+    speed: float | None = None
+    progress: RunProgress | None = None
+    summary: dict[str, Any] | None = None
+    error: str | None = None
+
+
+MapDetails.model_rebuild()

@@ -1,0 +1,122 @@
+"""Large answers: made once per map, compressed once, sent as they are."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import orjson
+from starlette.responses import Response
+
+from odscen.workflow import load_map
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from starlette.requests import Request
+
+    from odscen.catalog.store import MapEntry
+
+
+class Packed(NamedTuple):
+    """Bytes, compressed, and a tag that changes with them."""
+
+    content: bytes
+    tag: str
+
+
+def pack(content: bytes) -> Packed:
+    """Compress; the tag is a hash of the content."""
+    tag = f'"{hashlib.sha256(content).hexdigest()[:24]}"'
+    return Packed(gzip.compress(content, 5, mtime=0), tag)
+
+
+def answer(request: Request, packed: Packed, *, media_type: str = "application/json") -> Response:
+    """Send it, or only say that what the browser has is still right."""
+    headers = {"ETag": packed.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+    if request.headers.get("if-none-match") == packed.tag:
+        return Response(status_code=304, headers=headers)
+    content = packed.content
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        headers["Content-Encoding"] = "gzip"
+    else:
+        content = gzip.decompress(content)
+    return Response(content, media_type=media_type, headers=headers)
+
+
+@lru_cache(maxsize=8)
+def packed_drawing(entry: MapEntry) -> Packed:
+    """``drawing.json`` of a map."""
+    return pack(entry.path("drawing").read_bytes())
+
+
+@lru_cache(maxsize=8)
+def packed_graph(entry: MapEntry) -> Packed:
+    """Columns of a map's graphs."""
+    return pack(orjson.dumps(graph_columns(entry), option=orjson.OPT_SERIALIZE_NUMPY))
+
+
+def graph_columns(entry: MapEntry) -> dict[str, Any]:
+    """The lane graph, the segments and the pedestrian graph as columns.
+
+    Places to the millimetre, headings to 1e-5 rad; a missing speed limit is null. ``spawnable`` and
+    ``walkable`` are 1 where the simulator can place somebody exactly.
+    """
+    loaded = load_map(entry)
+    graph, usable = loaded.sumo.graph, loaded.usable
+    lanes, segments, walks = graph.lanes, graph.segments, graph.walks
+    beside: list[list[int]] = [[] for _ in segments.ids]
+    for one, other in segments.adjacency.tolist():
+        beside[one].append(other)
+        beside[other].append(one)
+    return {
+        "spacing": lanes.spacing,
+        "lane_keys": [str(key) for key in lanes.lanes.keys],
+        "lane_types": lanes.lanes.types,
+        "lane_junctions": lanes.lanes.junctions,
+        "first_node": lanes.lanes.first_node,
+        "lane": lanes.lane,
+        "s": np.round(lanes.s, 3),
+        **_places(lanes.x, lanes.y, lanes.hdg, lanes.width),
+        "speed_limit": [None if np.isnan(v) else round(v, 3) for v in lanes.speed_limit.tolist()],
+        "segment": lanes.segment,
+        "left_lane": lanes.left_lane,
+        "right_lane": lanes.right_lane,
+        "spawnable": _mask(usable.spawnable, len(lanes.x)),
+        "edges": {
+            "source": lanes.source,
+            "target": lanes.target,
+            "relation": lanes.relation.astype(np.int32),
+        },
+        "segments": [
+            {"id": name, "kind": kind, "neighbours": sorted(others)}
+            for name, kind, others in zip(segments.ids, segments.kinds, beside, strict=True)
+        ],
+        "walks": {
+            "lane_keys": [str(key) for key in walks.lane_keys],
+            "first_node": walks.first_node,
+            "lane": walks.lane,
+            **_places(walks.x, walks.y, walks.hdg, walks.width),
+            "segment": walks.segment,
+            "walkable": _mask(usable.walkable, len(walks.x)),
+            "source": walks.source,
+            "target": walks.target,
+            "kind": walks.kind.astype(np.int32),
+        },
+    }
+
+
+def _places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    x, y, hdg, width = columns
+    return {
+        "x": np.round(x, 3),
+        "y": np.round(y, 3),
+        "hdg": np.round(hdg, 5),
+        "width": np.round(width, 3),
+    }
+
+
+def _mask(mask: NDArray[np.bool_] | None, count: int) -> NDArray[np.int32]:
+    return np.ones(count, dtype=np.int32) if mask is None else mask.astype(np.int32)

@@ -1,0 +1,275 @@
+"""Runs that a page has started: one worker process and one thread each."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from odscen.catalog.assets import shipped_assets
+from odscen.catalog.folders import discard
+from odscen.catalog.store import check_name
+from odscen.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
+from odscen.scenario.problems import refuse_errors
+from odscen.sumo import layout
+from odscen.sumo.live import Live
+from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.progress import Command, Pace
+from odscen.sumo.runner import run_prepared
+from odscen.web.messages import RunInfo, RunProgress, RunState
+from odscen.workflow import check_scenario, load_map
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from odscen.catalog.store import Workspace
+    from odscen.results.records import Plan
+    from odscen.scenario.document import Scenario
+    from odscen.web.messages import Control, NewRun
+
+MOST = 8
+"""Runs that can go on at a time."""
+PATIENCE = 5.0
+"""Wall seconds that runs have for their end when the server ends."""
+
+
+@dataclass(slots=True, eq=False)
+class Active:
+    """A run that this server has started.
+
+    Attributes
+    ----------
+    plan
+        What is to happen; ``None`` while it is prepared.
+    """
+
+    id: str
+    scenario: Scenario
+    live: Live
+    plan: Plan | None = None
+    finishing: bool = False
+    error: str | None = None
+    ended: RunState | None = None
+    future: Future[None] = field(default_factory=Future)
+
+    @property
+    def state(self) -> RunState:
+        """What it does now."""
+        if self.ended is not None:
+            return self.ended
+        if self.finishing or self.live.ended:
+            return "finishing"
+        if self.live.progress is None and self.live.picture.number == 0:
+            return "preparing"
+        return "paused" if self.live.pace.paused else "running"
+
+    def end(self, state: RunState, error: str | None = None) -> None:
+        """Say how it has ended."""
+        self.error = error
+        self.ended = state
+        self.live.wake()
+
+
+class Runs:
+    """Runs in a workspace, going on and finished."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._pool = ThreadPoolExecutor(max_workers=MOST, thread_name_prefix="run")
+        self._lock = threading.Lock()
+        self._active: dict[str, Active] = {}
+
+    def start(self, name: str, scenario: Scenario, wish: NewRun) -> str:
+        """Start a run of a scenario; its id.
+
+        Raises
+        ------
+        ScenarioError
+            If the scenario has errors.
+        ConflictError
+            If too many are going on.
+        """
+        refuse_errors(check_scenario(self._workspace, scenario))
+        with self._lock:
+            if sum(one.ended is None for one in self._active.values()) >= MOST:
+                msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
+                raise ConflictError(msg)
+            pace = Pace(paused=wish.paused, speed=wish.speed)
+            active = Active(self._free_id(name), scenario, Live(pace))
+            self._active[active.id] = active
+        active.future = self._pool.submit(self._run, active, wish)
+        return active.id
+
+    def active(self, run: str) -> Active:
+        """Return a run that this server has started.
+
+        Raises
+        ------
+        NotFoundError
+            If it has not.
+        """
+        with self._lock:
+            if run not in self._active:
+                what = "run of this server"
+                raise NotFoundError(what, run, list(self._active))
+            return self._active[run]
+
+    def control(self, run: str, control: Control) -> RunInfo:
+        """Steer a run.
+
+        Raises
+        ------
+        ConflictError
+            If it has ended.
+        """
+        active = self.active(run)
+        if active.live.ended:
+            msg = f"run {run!r} has ended"
+            raise ConflictError(msg)
+        active.live.command(Command(control.action, control.speed))
+        return self.info(run)
+
+    def info(self, run: str) -> RunInfo:
+        """One run, going on or finished; :class:`NotFoundError` if there is none of that id."""
+        with self._lock:
+            active = self._active.get(run)
+        if active is None:
+            return self._finished(run)
+        progress = active.live.progress
+        summary = self._summary(run) if active.ended is not None else None
+        return RunInfo(
+            run=run,
+            state=active.state,
+            scenario=active.scenario.name,
+            map=active.scenario.map.name,
+            speed=active.live.pace.speed,
+            progress=None if progress is None else RunProgress(**asdict(progress)),
+            summary=summary,
+            error=active.error,
+        )
+
+    def rows(self) -> list[RunInfo]:
+        """All runs, without their summaries; the newest last."""
+        with self._lock:
+            names = dict.fromkeys(self._active)
+        folders = self._workspace.runs.iterdir() if self._workspace.runs.is_dir() else ()
+        done = [path for path in folders if (path / layout.SUMMARY_FILE).is_file()]
+        done.sort(key=lambda path: ((path / layout.SUMMARY_FILE).stat().st_mtime, path.name))
+        order = dict.fromkeys([*(p.name for p in done if p.name not in names), *names])
+        rows = []
+        for name in order:
+            with suppress(InputError):  # not a name of ours, or just removed
+                rows.append(self.info(name).model_copy(update={"summary": None}))
+        return rows
+
+    def folder(self, run: str) -> Path:
+        """Folder of a finished run.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none.
+        """
+        folder = self._workspace.runs / check_name(run, what="run")
+        if not (folder / layout.SUMMARY_FILE).is_file():
+            what = "finished run"
+            raise NotFoundError(what, run, [])
+        return folder
+
+    def remove(self, run: str) -> None:
+        """Remove a finished run."""
+        with self._lock:
+            active = self._active.get(run)
+            if active is not None and active.ended is None:
+                msg = f"run {run!r} is going on; stop it first"
+                raise ConflictError(msg)
+            self._active.pop(run, None)
+        folder = self.folder(run)
+        try:
+            discard(folder)
+        except OSError as error:
+            msg = f"run {run!r}: {error.strerror or error}"
+            raise WorkspaceError(msg) from error
+
+    def close(self) -> None:
+        """Stop everything that is going on; what does not stop in time is ended."""
+        with self._lock:
+            going = [one for one in self._active.values() if one.ended is None]
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for one in going:
+            one.live.command(Command("stop"))
+        for one in going:
+            try:
+                one.future.exception(timeout=PATIENCE)
+            except TimeoutError:
+                one.live.kill()
+
+    def _run(self, active: Active, wish: NewRun) -> None:
+        try:
+            state, error = self._simulate(active, wish)
+        except OdscenError as wrong:
+            active.end("failed", str(wrong))
+        except BaseException as wrong:
+            active.end("failed", f"{type(wrong).__name__}: {wrong}")
+            raise
+        else:
+            active.end(state, error)
+
+    def _simulate(self, active: Active, wish: NewRun) -> tuple[RunState, str | None]:
+        scenario = active.scenario
+        entry = self._workspace.map_for(scenario.map.name, scenario.map.sha256)
+        loaded = load_map(entry)
+        prepared = prepare(
+            scenario,
+            loaded.sumo,
+            entry.path("net"),
+            shipped_assets(),
+            seed=wish.seed,
+            until=wish.until,
+            step_length=wish.step_length,
+        )
+        active.plan = prepared.plan
+        active.live.wake()
+
+        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+            active.finishing = True
+            write_report(folder, summary, drawing=loaded.drawing)
+
+        out = self._workspace.runs / active.id
+        result = run_prepared(prepared, out, finish=finish, live=active.live)
+        if result.status == "failed":
+            return "failed", str(result.summary["error"])
+        return ("stopped" if result.summary["stopped"] else "completed"), None
+
+    def _free_id(self, name: str) -> str:
+        for number in itertools.count(1):
+            free = f"{name[:56]}-{number}"
+            if free not in self._active and not (self._workspace.runs / free).exists():
+                return free
+        raise AssertionError
+
+    def _finished(self, run: str) -> RunInfo:
+        folder = self.folder(run)
+        summary = self._summary(folder.name) or {}
+        failed = summary.get("status") != "completed"
+        return RunInfo(
+            run=run,
+            state="failed" if failed else "stopped" if summary.get("stopped") else "completed",
+            scenario=str(summary.get("scenario", run)),
+            map=summary.get("map"),
+            summary=summary,
+            error=summary.get("error"),
+        )
+
+    def _summary(self, run: str) -> dict[str, Any] | None:
+        try:
+            text = (self._workspace.runs / run / layout.SUMMARY_FILE).read_text(encoding="utf-8")
+            summary: dict[str, Any] = json.loads(text)
+        except (OSError, ValueError):
+            return None
+        return summary

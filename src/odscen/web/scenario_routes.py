@@ -1,0 +1,203 @@
+"""Routes for scenarios: the document, edits of it, and questions about it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from fastapi import APIRouter, File, Form, UploadFile
+from starlette.responses import Response
+
+from odscen.catalog.assets import shipped_assets
+from odscen.catalog.store import check_name, name_from_file
+from odscen.errors import InputError, NotFoundError
+from odscen.scenario.checks import check
+from odscen.scenario.document import Scenario
+from odscen.scenario.edits import eligible_segments, new_scenario
+from odscen.scenario.files import dumps, read_any
+from odscen.scenario.graphform import to_graphml
+from odscen.scenario.problems import Problem
+from odscen.scenario.region import Place as GraphPlace
+from odscen.scenario.region import name_of, place_of
+from odscen.web.edits import EditRequest, apply_edit
+from odscen.web.messages import (
+    Goals,
+    NewName,
+    NewScenario,
+    OfVersion,
+    Path,
+    ProblemInfo,
+    RoiInfo,
+    ScenarioRow,
+    ScenarioState,
+)
+from odscen.web.services import Services, Shared, region_of
+from odscen.workflow import SUFFIX, load_map
+
+if TYPE_CHECKING:
+    from odscen.scenario.region import Region
+    from odscen.web.drafts import Draft
+
+router = APIRouter(prefix="/api/scenarios")
+
+
+@router.get("")
+def list_scenarios(shared: Shared) -> list[ScenarioRow]:
+    """All scenarios, those changed last first."""
+    return shared.drafts.rows()
+
+
+@router.post("", status_code=201)
+def create(wish: NewScenario, shared: Shared) -> ScenarioState:
+    """Start an empty scenario on a map."""
+    if wish.name is not None:
+        check_name(wish.name, what="scenario")
+    entry = shared.workspace.map(wish.map)
+    scenario = new_scenario(load_map(entry).sumo.graph, name=wish.name or wish.map)
+    draft = shared.drafts.create(scenario, wish.name, stem=wish.map, label="New scenario")
+    return _state(shared, draft)
+
+
+@router.post("/upload", status_code=201)
+def upload(
+    shared: Shared,
+    file: Annotated[UploadFile, File(description="A scenario as JSON or GraphML.")],
+    name: Annotated[str | None, Form()] = None,
+) -> ScenarioState:
+    """Add a scenario from a file."""
+    given = (file.filename or "scenario").removesuffix(SUFFIX)
+    scenario = read_any(file.file.read(), file=file.filename)
+    from pathlib import Path as FilePath
+
+    stem = name_from_file(FilePath(given))
+    draft = shared.drafts.create(scenario, name, stem=stem, label="Upload")
+    return _state(shared, draft)
+
+
+@router.get("/{name}")
+def show(name: str, shared: Shared) -> ScenarioState:
+    """One scenario as it is now."""
+    return _state(shared, shared.drafts.get(name))
+
+
+@router.delete("/{name}", status_code=204)
+def remove(name: str, shared: Shared) -> None:
+    """Remove a scenario and its history; its runs stay."""
+    shared.drafts.remove(name)
+
+
+@router.put("/{name}/name")
+def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
+    """Give a scenario's file another name."""
+    return _state(shared, shared.drafts.rename(name, new.name))
+
+
+@router.post("/{name}/edits")
+def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
+    """Make one edit; each kind is a function of ``odscen.scenario.edits``."""
+    one = request.edit
+
+    def change(scenario: Scenario) -> Scenario:
+        loaded = shared.map_of(scenario)
+        return apply_edit(one, scenario, loaded.sumo.graph, loaded.lights)
+
+    return _state(shared, shared.drafts.change(name, request.version, one.label, change))
+
+
+@router.post("/{name}/undo")
+def undo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
+    """Take the last edit back."""
+    return _state(shared, shared.drafts.undo(name, request.version))
+
+
+@router.post("/{name}/redo")
+def redo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
+    """Make the edit again that was taken back last."""
+    return _state(shared, shared.drafts.redo(name, request.version))
+
+
+@router.get("/{name}/goals")
+def goals(name: str, spawn: str, shared: Shared) -> Goals:
+    """Nodes that an actor that starts at ``spawn`` can have as its goal."""
+    scenario = shared.drafts.get(name).scenario
+    graph = shared.map_of(scenario).sumo.graph
+    with shared.search:
+        region, start = _region(shared, scenario), _place(shared, scenario, spawn)
+        found = region.candidates(start)
+    names = [name_of(graph, GraphPlace(start.walk, node)) for node in found.tolist()]
+    return Goals(spawn=spawn, goals=list(names))
+
+
+@router.get("/{name}/path")
+def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
+    """Shortest way from ``spawn`` to ``goal`` inside the region."""
+    scenario = shared.drafts.get(name).scenario
+    graph = shared.map_of(scenario).sumo.graph
+    start, end = _place(shared, scenario, spawn), _place(shared, scenario, goal)
+    if start.walk != end.walk:
+        msg = f"no way leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
+        raise InputError(msg)
+    with shared.search:
+        region = _region(shared, scenario)
+        router = region.walk_router if start.walk else region.router
+        found = router.path(start.node, end.node).tolist()
+    nodes = region.nodes_of(start)
+    return Path(
+        nodes=[name_of(graph, GraphPlace(start.walk, node)) for node in found],
+        points=[(round(float(nodes.x[i]), 3), round(float(nodes.y[i]), 3)) for i in found],
+    )
+
+
+@router.get("/{name}/roi")
+def roi(name: str, shared: Shared) -> RoiInfo:
+    """Segments of the region of interest, and those that may be added now."""
+    scenario = shared.drafts.get(name).scenario
+    graph = shared.map_of(scenario).sumo.graph
+    candidates = eligible_segments(scenario, graph)
+    return RoiInfo(inside=list(scenario.roi), candidates=list(candidates))
+
+
+@router.get("/{name}/download", response_class=Response)
+def download(name: str, shared: Shared, form: Literal["json", "graphml"] = "json") -> Response:
+    """Download the scenario as its document or in its graph form."""
+    scenario = shared.drafts.get(name).scenario
+    if form == "json":
+        content, media_type, file = dumps(scenario), "application/json", f"{name}{SUFFIX}"
+    else:
+        content = to_graphml(scenario, shared.map_of(scenario).sumo.graph)
+        media_type, file = "application/xml", f"{name}.graphml"
+    headers = {"Content-Disposition": f'attachment; filename="{file}"'}
+    return Response(content, media_type=media_type, headers=headers)
+
+
+def _state(shared: Services, draft: Draft) -> ScenarioState:
+    history = draft.history
+    return ScenarioState(
+        name=draft.name,
+        version=history.version,
+        document=draft.scenario,
+        problems=[ProblemInfo(**asdict(one)) for one in _problems(shared, draft.scenario)],
+        label=history.label,
+        undo=history.undo,
+        redo=history.redo,
+    )
+
+
+def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
+    try:
+        loaded = shared.map_of(scenario)
+    except InputError as error:  # a scenario whose map was removed can still be looked at
+        return (Problem("error", "map_missing", "map", str(error)),)
+    return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights)
+
+
+def _region(shared: Services, scenario: Scenario) -> Region:
+    return region_of(shared.map_of(scenario), scenario.roi)
+
+
+def _place(shared: Services, scenario: Scenario, node: str) -> GraphPlace:
+    place = place_of(shared.map_of(scenario).sumo.graph, node)
+    if place is None:
+        what = "node"
+        raise NotFoundError(what, node, [])
+    return place

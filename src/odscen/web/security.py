@@ -1,0 +1,155 @@
+"""Who may ask: Host, Origin, token, and how much may be sent. One pure ASGI middleware.
+
+A page on the internet can make a browser send requests to a loopback address; its Origin gives it
+away, and where a browser sends none (a rebound DNS name), the Host does.
+"""
+
+from __future__ import annotations
+
+import hmac
+import re
+from http.cookies import CookieError, SimpleCookie
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qs, urlencode, urlsplit
+
+from fastapi import HTTPException
+from starlette.datastructures import Headers
+from starlette.responses import RedirectResponse
+
+from odscen.web.errors import error_response
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+COOKIE = "odscen_token"
+MAX_UPLOAD = 64 * 2**20
+"""Bytes of a request with a file in it; the largest CARLA town has 3.4 million."""
+MAX_BODY = 4 * 2**20
+"""Bytes of any other request."""
+
+_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"x-frame-options", b"SAMEORIGIN"),
+)
+_PORT = re.compile(r":\d*$")
+
+
+class Guard:
+    """Lets through what may come in.
+
+    Parameters
+    ----------
+    hosts
+        Host names that the server answers to; ``None`` for all, which needs a token.
+    token
+        What a client has to show, as bearer, cookie, or once in the address; ``None`` for nothing.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        hosts: Collection[str] | None,
+        token: str | None,
+        max_upload: int = MAX_UPLOAD,
+    ) -> None:
+        self._app = app
+        self._hosts = hosts
+        self._token = token
+        self._max_upload = max_upload
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer or refuse one request."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        refused = self._foreign(headers)
+        if refused is not None:
+            await _refuse(403, "ForeignRequest", refused, scope, receive, send)
+            return
+        if self._token is not None and not self._known(headers, scope):
+            message = "this server needs the token that it printed when it was started"
+            await _refuse(401, "TokenNeeded", message, scope, receive, send)
+            return
+        if self._token is not None and (clean := _without_token(scope)) is not None:
+            response = RedirectResponse(clean, 303)
+            response.set_cookie(COOKIE, self._token, httponly=True, samesite="strict", path="/")
+            await response(scope, receive, send)
+            return
+        if scope["type"] == "websocket":
+            await self._app(scope, receive, send)
+            return
+        await self._limited(headers, scope, receive, send)
+
+    def _foreign(self, headers: Headers) -> str | None:
+        host = headers.get("host", "")
+        name = _PORT.sub("", host).strip("[]").lower()
+        if self._hosts is not None and name not in self._hosts:
+            return f"this server does not answer to the name {name!r}"
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return f"a page of {origin!r} may not use this server"
+        return None
+
+    def _known(self, headers: Headers, scope: Scope) -> bool:
+        shown = [headers.get("authorization", "").removeprefix("Bearer ")]
+        shown += parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
+        try:
+            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        except CookieError:
+            cookie = None
+        if cookie is not None:
+            shown.append(cookie.value)
+        token = (self._token or "").encode()
+        return any(hmac.compare_digest(one.encode("utf-8", "replace"), token) for one in shown)
+
+    async def _limited(self, headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
+        multipart = headers.get("content-type", "").startswith("multipart/form-data")
+        limit = self._max_upload if multipart else min(MAX_BODY, self._max_upload)
+        words = f"more than {limit:,} bytes cannot be taken"
+        length = headers.get("content-length", "")
+        if length.isdigit() and int(length) > limit:
+            await _refuse(413, "TooLarge", words, scope, receive, send)
+            return
+        taken = 0
+
+        async def counted() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > limit:
+                raise HTTPException(413, words)
+            return message
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message["headers"], *_HEADERS]
+            await send(message)
+
+        await self._app(scope, counted, with_headers)
+
+
+async def _refuse(
+    status: int, kind: str, message: str, scope: Scope, receive: Receive, send: Send
+) -> None:
+    if scope["type"] == "websocket":  # before it is accepted: the server answers 403
+        await receive()
+        await send({"type": "websocket.close", "code": 1008, "reason": message[:120]})
+        return
+    await error_response(status, kind, message)(scope, receive, send)
+
+
+def _without_token(scope: Scope) -> str | None:
+    """Address of a page without the token that came with it; ``None`` if none came."""
+    query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+    if scope["type"] != "http" or scope["method"] != "GET" or "token" not in query:
+        return None
+    del query["token"]
+    path = "/" + str(scope["path"]).lstrip("/")
+    return f"{path}?{urlencode(query, doseq=True)}" if query else path

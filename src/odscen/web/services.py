@@ -1,0 +1,67 @@
+"""What the routes share: the workspace and what goes on in it."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from odscen.catalog.store import Workspace
+from odscen.scenario.region import Region
+from odscen.web.drafts import Drafts
+from odscen.web.jobs import Jobs
+from odscen.web.runs import Runs
+from odscen.workflow import LoadedMap, load_map
+
+if TYPE_CHECKING:
+    from odscen.scenario.document import Scenario
+
+
+@dataclass(slots=True)
+class Services:
+    """One of each for a server.
+
+    Attributes
+    ----------
+    search
+        Held while a way is searched: a region remembers its last search.
+    """
+
+    workspace: Workspace
+    drafts: Drafts
+    jobs: Jobs
+    runs: Runs
+    search: threading.Lock = field(default_factory=threading.Lock)
+
+    @classmethod
+    def of(cls, workspace: Workspace) -> Services:
+        """Make them for a workspace."""
+        return cls(workspace, Drafts(workspace), Jobs(), Runs(workspace))
+
+    def map_of(self, scenario: Scenario) -> LoadedMap:
+        """Map that a scenario was made on, loaded."""
+        return load_map(self.workspace.map_for(scenario.map.name, scenario.map.sha256))
+
+    def close(self) -> None:
+        """End everything that goes on."""
+        self.jobs.close()
+        self.runs.close()
+
+
+@lru_cache(maxsize=8)
+def region_of(loaded: LoadedMap, roi: tuple[str, ...]) -> Region:
+    """Region of a scenario; the last few are kept, with the ways searched in them."""
+    return Region.of(loaded.sumo.graph, roi)
+
+
+def services(connection: HTTPConnection) -> Services:
+    """Services of the app that a request is for."""
+    found: Services = connection.app.state.services
+    return found
+
+
+Shared = Annotated[Services, Depends(services)]

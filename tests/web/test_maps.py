@@ -1,0 +1,163 @@
+from __future__ import annotations
+
+import gzip
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from odscen.catalog.store import Workspace
+from odscen.lanegraph.query import node_ids
+from odscen.web.app import create_app
+from tests.web.conftest import CROSSING, SHIPPED, job
+
+BOMB = """<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "boom">%s]><OpenDRIVE>&b9;</OpenDRIVE>""" % (
+    "".join(f'<!ENTITY b{i} "{f"&b{i - 1 or str()};" * 10}">' for i in range(1, 10))
+)
+
+
+def upload(client: TestClient, content: bytes, file: str = "m.xodr", **form: str) -> object:
+    return client.post("/api/maps", files={"file": (file, content)}, data=form)
+
+
+def test_the_server_says_that_it_is_there_and_how_the_page_is_built(client: TestClient) -> None:
+    assert client.get("/api/health").json()["version"]
+    page = client.get("/")
+    assert page.status_code == 200
+    assert "npm run build" in page.text
+
+
+def test_a_built_page_is_served_for_its_own_addresses_and_not_for_missing_files(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    (tmp_path / "static").mkdir()
+    (tmp_path / "static" / "index.html").write_text("<title>the page</title>")
+    (tmp_path / "static" / "a.js").write_text("1")
+    with TestClient(
+        create_app(workspace, static=tmp_path / "static"), base_url="http://localhost"
+    ) as client:
+        assert "the page" in client.get("/").text
+        assert "the page" in client.get("/runs/7").text
+        assert client.get("/a.js").text == "1"
+        assert client.get("/b.js").status_code == 404
+        assert client.get("/api/nothing").json()["error"]["kind"] == "NotFound"
+        assert client.get("/..%2f..%2fmap.json").status_code == 404
+
+
+def test_maps_are_listed_with_what_the_catalogue_knows(
+    client: TestClient, workspace: Workspace
+) -> None:
+    (row,) = client.get("/api/maps").json()
+    info = workspace.map(CROSSING).info
+    assert row["name"] == CROSSING
+    assert row["statistics"] == json.loads(json.dumps(info["statistics"]))
+    assert row["report_counts"] == info["report"]["counts"]
+    assert client.get(row["preview"]).headers["content-type"] == "image/svg+xml"
+    assert client.get(f"/api/maps/{CROSSING}/report").json() == info["report"]
+    assert client.get(f"/api/maps/{CROSSING}/drawing").content == (
+        workspace.map(CROSSING).path("drawing").read_bytes()
+    )
+
+
+def test_a_map_tells_its_lights_as_the_live_view_names_them(client: TestClient) -> None:
+    (light,) = client.get(f"/api/maps/{CROSSING}").json()["lights"]
+    assert light["names"] == ["10001"]
+    assert len(light["green"]) > 1
+    assert [name for names in light["signals"] for name in names]
+
+
+def test_graph_columns_are_the_graph(client: TestClient, workspace: Workspace) -> None:
+    answer = client.get(f"/api/maps/{CROSSING}/graph")
+    columns, graph = answer.json(), workspace.map(CROSSING).graph()
+    names = [
+        f"{columns['lane_keys'][lane]}.{i - columns['first_node'][lane]}"
+        for i, lane in enumerate(columns["lane"])
+    ]
+    assert names == node_ids(graph)
+    assert np.allclose(columns["x"], graph.lanes.x, atol=1e-3)
+    assert columns["edges"]["target"] == graph.lanes.target.tolist()
+    assert columns["walks"]["source"] == graph.walks.source.tolist()
+    by_id = {one["id"]: one for one in columns["segments"]}
+    assert [columns["segments"][i]["id"] for i in by_id["j10001"]["neighbours"]] == [
+        "r1", "r2", "r3", "r4",
+    ]  # fmt: skip
+    again = client.get(
+        f"/api/maps/{CROSSING}/graph", headers={"If-None-Match": answer.headers["etag"]}
+    )
+    assert again.status_code == 304
+    plain = client.get(f"/api/maps/{CROSSING}/graph", headers={"Accept-Encoding": "identity"})
+    assert plain.json() == columns
+    assert "content-encoding" not in plain.headers
+
+
+def test_a_map_is_added_in_the_background_and_removed(client: TestClient) -> None:
+    content = (SHIPPED / "t_junction_signs.xodr").read_bytes()
+    done = job(client, upload(client, content, "t junction.xodr"))
+    assert (done["state"], done["result"], done["share"]) == ("done", "t_junction", 1.0)
+    assert [row["name"] for row in client.get("/api/maps").json()] == [CROSSING, "t_junction"]
+    same = upload(client, content, "x.xodr", name="t_junction")
+    assert job(client, same)["state"] == "done"
+    other = upload(client, (SHIPPED / f"{CROSSING}.xodr").read_bytes(), name="t_junction")
+    assert other.status_code == 409
+    assert client.delete("/api/maps/t_junction").status_code == 204
+    assert client.delete("/api/maps/t_junction").status_code == 404
+
+
+def test_a_map_that_cannot_be_read_is_a_failed_job_that_names_the_place(
+    client: TestClient,
+) -> None:
+    content = (
+        b'<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="-3"/></OpenDRIVE>'
+    )
+    failed = job(client, upload(client, content, "bad.xodr"))
+    assert failed["state"] == "failed"
+    assert failed["error"]["kind"] == "OpenDriveError"
+    assert failed["error"]["message"].startswith("bad.xodr: road 1")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        BOMB.encode(),
+        b'<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/passwd">]><OpenDRIVE>&x;</OpenDRIVE>',
+        b"<OpenDRIVE>" + b"<a>" * 200_000,
+        gzip.compress(b"<OpenDRIVE>" + b" " * 10_000_000),
+        os.urandom(1000),
+        b"",
+    ],
+    ids=["entity bomb", "external entity", "nesting", "zip bomb", "noise", "nothing"],
+)
+def test_a_malicious_file_is_refused_with_words_and_leaves_nothing(
+    client: TestClient, workspace: Workspace, content: bytes
+) -> None:
+    failed = job(client, upload(client, content))
+    assert failed["state"] == "failed"
+    assert failed["error"]["kind"] == "OpenDriveError"
+    assert "root:" not in failed["error"]["message"]
+    assert sorted(path.name for path in (workspace.root / "maps").iterdir()) == [CROSSING]
+
+
+def test_unknown_maps_and_jobs_are_not_found(client: TestClient) -> None:
+    for path in ("", "/graph", "/drawing", "/report", "/preview.svg"):
+        answer = client.get(f"/api/maps/nowhere{path}")
+        assert answer.status_code == 404
+        assert answer.json()["error"]["kind"] == "NotFoundError"
+    assert client.get("/api/jobs/job-99").status_code == 404
+
+
+def test_all_shipped_maps_can_be_added_at_once(client: TestClient) -> None:
+    started = client.post("/api/maps/shipped")
+    assert started.status_code == 202
+    assert client.get(f"/api/jobs/{started.json()['job']}").json()["state"] in ("queued", "running")
+
+
+def test_assets_list_seven_categories_models_and_weather(client: TestClient) -> None:
+    assets = client.get("/api/assets").json()
+    assert len(assets["categories"]) == 7
+    assert {one["category"] for one in assets["blueprints"]} == {
+        one["category"] for one in assets["categories"]
+    }
+    assert "ClearNoon" in [one["name"] for one in assets["weather"]]

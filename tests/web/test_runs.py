@@ -1,0 +1,403 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import httpx2
+import numpy as np
+import polars as pl
+import pytest
+from starlette.testclient import TestClient, WebSocketTestSession
+from starlette.websockets import WebSocketDisconnect
+from websockets.sync.client import connect
+
+from odscen.catalog.store import Workspace
+from odscen.frames import SumoPose, sumo_to_xodr
+from odscen.results.records import Plan
+from odscen.web import runs
+from tests.web.conftest import CROSSING, finished, wait_for
+
+
+class Seen(NamedTuple):
+    """What one client was shown."""
+
+    texts: list[dict[str, Any]]
+    frames: list[np.ndarray]
+
+    def of(self, kind: str) -> list[dict[str, Any]]:
+        return [text for text in self.texts if text["type"] == kind]
+
+    @property
+    def names(self) -> list[str]:
+        return [actor["id"] for actor in self.of("hello")[0]["actors"]]
+
+
+def start(client: TestClient, scenario: str, **wish: object) -> str:
+    answer = client.post("/api/runs", json={"scenario": scenario, **wish})
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["run"])
+
+
+def control(client: TestClient, run: str, action: str, **more: object) -> None:
+    answer = client.post(f"/api/runs/{run}/control", json={"action": action, **more})
+    assert answer.status_code == 200, answer.text
+
+
+def messages(socket: WebSocketTestSession) -> Iterator[dict[str, Any] | np.ndarray]:
+    """Yield what the server sends, answering each frame, until the end."""
+    while True:
+        message = socket.receive()
+        if message["type"] == "websocket.close":
+            return
+        if message.get("bytes"):
+            yield np.frombuffer(message["bytes"], "<f4")
+            socket.send_text("ack")
+        else:
+            yield json.loads(message["text"])
+
+
+def watch(client: TestClient, run: str) -> Seen:
+    seen = Seen([], [])
+    with client.websocket_connect(f"/api/runs/{run}/live") as socket:
+        for message in messages(socket):
+            if isinstance(message, np.ndarray):
+                seen.frames.append(message)
+            else:
+                seen.texts.append(message)
+    return seen
+
+
+def recorded(workspace: Workspace, run: str) -> dict[tuple[str, float], tuple[float, ...]]:
+    """Body centres by actor and time from the trajectories, straight from the file."""
+    folder = workspace.runs / run
+    plan = Plan.from_json((folder / "plan.json").read_text())
+    lengths = {actor.id: actor.length for actor in plan.actors}
+    table = pl.read_parquet(folder / "trajectories.parquet")
+    prefix = "vehicle" if "vehicle_id" in table.columns else "person"
+    found = {}
+    for row in table.filter(pl.col(f"{prefix}_id").is_not_null()).iter_rows(named=True):
+        name = row[f"{prefix}_id"]
+        front = SumoPose(row[f"{prefix}_x"], row[f"{prefix}_y"], 0, row[f"{prefix}_angle"])
+        pose = sumo_to_xodr(front, length=lengths[name], net_offset=plan.net_offset)
+        speed = row[f"{prefix}_speed"]
+        time_ = round(float(row["timestep_time"]), 2)
+        found[name, time_] = (float(pose.x), float(pose.y), float(pose.hdg), speed)
+    return found
+
+
+def test_a_whole_run_is_watched_and_frames_are_where_the_trajectories_say(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = start(client, sampled, speed=40)
+    seen = watch(client, run)
+    info = finished(client, run)
+    assert info["state"] == "completed"
+    assert seen.of("end") == [{"type": "end", "state": "completed", "error": None}]
+    truth = recorded(workspace, run)
+    assert len(seen.frames) > 20
+    steps = [frame[0] for frame in seen.frames]
+    assert steps == sorted(set(steps))
+    assert seen.frames[-1][4] == info["summary"]["actors"]["arrived"]
+    names, compared = seen.names, 0
+    for frame in seen.frames:
+        rows = frame[5:].reshape(-1, 6)
+        assert len(rows) == frame[2]
+        moment = round(float(frame[1]), 2)
+        assert {names[int(row[0])] for row in rows} == {n for n, t in truth if t == moment}
+        for row in rows:
+            x, y, hdg, speed = truth[names[int(row[0])], moment]
+            assert np.hypot(row[1] - x, row[2] - y) < 0.02
+            assert abs((row[3] - hdg + np.pi) % (2 * np.pi) - np.pi) < 1e-3
+            assert abs(row[4] - speed) < 0.01
+            compared += 1
+    assert compared > 200
+    lights = seen.of("lights")
+    assert set(lights[0]["lights"]) == {
+        light["id"] for light in client.get(f"/api/maps/{CROSSING}").json()["lights"]
+    }
+    assert len(lights) > 1
+
+
+def test_watching_changes_nothing_in_what_is_recorded(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    alone = start(client, sampled)
+    finished(client, alone)
+    watched = start(client, sampled, speed=60)
+    watch(client, watched)
+    finished(client, watched)
+    for name in ("trajectories.parquet", "events.json", "actors.json"):
+        assert (workspace.runs / alone / name).read_bytes() == (
+            workspace.runs / watched / name
+        ).read_bytes()
+
+
+def test_a_run_is_paused_stepped_sped_up_and_stopped(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = start(client, sampled, paused=True, seed=3)
+    with client.websocket_connect(f"/api/runs/{run}/live") as socket:
+        steps: list[int] = []
+        for message in messages(socket):
+            if isinstance(message, np.ndarray):
+                steps.append(int(message[0]))
+                if len(steps) <= 3:
+                    control(client, run, "step")
+                elif len(steps) == 4:
+                    assert client.get(f"/api/runs/{run}").json()["state"] == "paused"
+                    control(client, run, "speed", speed=20)
+                    control(client, run, "resume")
+                elif len(steps) == 8:
+                    control(client, run, "stop")
+            elif message["type"] == "end":
+                assert message["state"] == "stopped"
+    assert steps[:4] == [1, 2, 3, 4]
+    info = finished(client, run)
+    assert info["state"] == "stopped"
+    assert info["summary"]["stopped"]
+    assert info["summary"]["seed"] == 3
+    assert info["summary"]["steps"] < 60
+    assert (workspace.runs / run / "report.html").is_file()
+    late = client.post(f"/api/runs/{run}/control", json={"action": "pause"})
+    assert late.status_code == 409
+
+
+def test_the_pace_is_kept(client: TestClient, sampled: str) -> None:
+    run = start(client, sampled, speed=10, until=20)
+    times = []
+    with client.websocket_connect(f"/api/runs/{run}/live") as socket:
+        for message in messages(socket):
+            if isinstance(message, np.ndarray):
+                times.append((time.monotonic(), float(message[1])))
+    wall, simulated = times[-2][0] - times[2][0], times[-2][1] - times[2][1]
+    assert simulated / wall == pytest.approx(10, rel=0.15)
+
+
+def test_a_finished_run_has_figures_a_report_and_a_replay(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = start(client, sampled)
+    info = finished(client, run)
+    assert client.get(f"/api/runs/{run}/summary").json() == info["summary"]
+    assert "<html" in client.get(f"/api/runs/{run}/report.html").text
+    truth = recorded(workspace, run)
+    for every in (1, 4):
+        replay = client.get(f"/api/runs/{run}/trajectories?every={every}").json()
+        assert len(replay["first"]) == len(replay["times"]) + 1
+        rows = 0
+        for i, moment in enumerate(replay["times"]):
+            for row in range(replay["first"][i], replay["first"][i + 1]):
+                name = replay["actors"][replay["actor"][row]]["id"]
+                x, y, hdg, _ = truth[name, round(moment, 2)]
+                assert abs(replay["x"][row] - x) < 0.011
+                assert abs(replay["y"][row] - y) < 0.011
+                assert abs(replay["hdg"][row] - hdg) < 1e-3
+                rows += 1
+        assert rows == len(replay["x"])
+        assert rows == len(truth) if every == 1 else rows < len(truth) / 2
+    assert [row["run"] for row in client.get("/api/runs").json()] == [run]
+    assert client.delete(f"/api/runs/{run}").status_code == 204
+    assert client.get(f"/api/runs/{run}").status_code == 404
+
+
+def test_a_scenario_with_errors_is_not_run(client: TestClient) -> None:
+    client.post("/api/scenarios", json={"map": CROSSING, "name": "empty"})
+    answer = client.post("/api/runs", json={"scenario": "empty"})
+    assert answer.status_code == 422
+    assert "region of interest is empty" in answer.json()["error"]["message"]
+    assert client.get("/api/runs").json() == []
+
+
+def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_other(
+    client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = start(client, sampled, speed=5)
+    real = runs.prepare
+
+    def spoiled(*arguments: Any, **more: Any) -> Any:
+        prepared = real(*arguments, **more)
+        files = dict(prepared.sumo_files)
+        files["routes.rou.xml"] = (
+            '<routes><vehicle id="a" depart="0"><route edges="nowhere"/></vehicle></routes>'
+        )
+        object.__setattr__(prepared, "sumo_files", files)
+        return prepared
+
+    monkeypatch.setattr(runs, "prepare", spoiled)
+    bad = start(client, sampled)
+    seen = watch(client, bad)
+    assert seen.of("end")[0]["state"] == "failed"
+    assert "nowhere" in seen.of("end")[0]["error"]
+    info = finished(client, bad)
+    assert (info["state"], info["summary"]["status"]) == ("failed", "failed")
+    assert "nowhere" in info["error"]
+    assert client.get(f"/api/runs/{good}").json()["state"] in ("preparing", "running")
+    control(client, good, "stop")
+    assert finished(client, good)["state"] == "stopped"
+
+
+def test_a_worker_that_is_killed_is_a_failed_run(client: TestClient, sampled: str) -> None:
+    run = start(client, sampled, speed=1)
+    with client.websocket_connect(f"/api/runs/{run}/live") as socket:
+        said = []
+        for message in messages(socket):
+            if isinstance(message, np.ndarray):
+                client.app.state.services.runs.active(run).live.kill()
+            else:
+                said.append(message)
+    assert said[-1]["state"] == "failed"
+    assert "SIGKILL" in said[-1]["error"]
+
+
+def test_a_socket_for_an_unknown_run_is_refused(client: TestClient) -> None:
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect("/api/runs/nothing-1/live"),
+    ):
+        pass
+
+
+def test_a_client_that_never_reads_costs_the_others_nothing(served: str, sampled: str) -> None:
+    url = f"http://{served}/api"
+    run = httpx2.post(f"{url}/runs", json={"scenario": sampled, "speed": 20}).json()["run"]
+    address = f"ws://{served}/api/runs/{run}/live"
+    deaf = [connect(address) for _ in range(3)]
+    steps, frames = [], 0
+    with connect(address) as socket:
+        for message in socket:
+            if isinstance(message, bytes):
+                frames += 1
+                steps.append(int(np.frombuffer(message, "<f4")[0]))
+                socket.send("ack")
+                if frames == 40:
+                    httpx2.post(f"{url}/runs/{run}/control", json={"action": "stop"})
+            else:
+                last = json.loads(message)
+    assert last["type"] == "end"
+    # Every step of a run of 40 steps a second, but for the odd one that a busy machine skips.
+    assert steps[-1] - steps[0] < 1.3 * len(steps)
+    for socket in deaf:
+        socket.socket.close()
+    assert httpx2.get(f"{url}/health").status_code == 200
+
+
+def test_a_slow_client_gets_the_newest_frame_and_only_that(served: str, sampled: str) -> None:
+    url = f"http://{served}/api"
+    wish = {"scenario": sampled, "speed": 20}
+    run = httpx2.post(f"{url}/runs", json=wish).json()["run"]
+    with connect(f"ws://{served}/api/runs/{run}/live") as socket:
+        steps = []
+        for message in socket:
+            if isinstance(message, bytes):
+                steps.append(int(np.frombuffer(message, "<f4")[0]))
+                if len(steps) == 4:
+                    break
+                time.sleep(0.5)
+                socket.send("ack")
+    httpx2.post(f"{url}/runs/{run}/control", json={"action": "stop"})
+    assert all(b - a > 8 for a, b in zip(steps[1:], steps[2:], strict=False))
+
+
+def test_several_run_at_once_and_the_end_of_the_server_is_their_end(
+    client: TestClient, sampled: str
+) -> None:
+    names = [start(client, sampled, speed=0.5) for _ in range(3)]
+    assert len(set(names)) == 3
+    shared = client.app.state.services
+    for name in names:
+        wait_for(lambda name=name: client.get(f"/api/runs/{name}").json()["state"] == "running")
+    begun = time.monotonic()
+    shared.close()
+    assert time.monotonic() - begun < 10
+    assert {shared.runs.info(name).state for name in names} == {"stopped"}
+
+
+def test_at_most_so_many_go_on_at_a_time(
+    client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "MOST", 1)
+    run = start(client, sampled, speed=1)
+    answer = client.post("/api/runs", json={"scenario": sampled})
+    assert answer.status_code == 409
+    assert client.delete(f"/api/runs/{run}").status_code == 409
+    control(client, run, "stop")
+    finished(client, run)
+
+
+def test_the_server_never_imports_libsumo(workspace: Workspace, sampled: str) -> None:
+    script = """
+import sys, time
+from pathlib import Path
+from starlette.testclient import TestClient
+from odscen.catalog.store import Workspace
+from odscen.web.app import create_app
+with TestClient(create_app(Workspace.open(Path(sys.argv[1]))), base_url="http://localhost") as c:
+    run = c.post("/api/runs", json={"scenario": sys.argv[2]}).json()["run"]
+    while c.get(f"/api/runs/{run}").json()["state"] not in ("completed", "failed"):
+        time.sleep(0.05)
+    print(c.get(f"/api/runs/{run}").json()["state"], "libsumo" in sys.modules)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, workspace.root, sampled],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.split() == ["completed", "False"]
+
+
+def test_a_worker_ends_when_the_program_that_started_it_is_gone(
+    workspace: Workspace, sampled: str, tmp_path: Path
+) -> None:
+    script = """
+import os, sys, threading, time
+from pathlib import Path
+from odscen import workflow
+from odscen.catalog.store import Workspace
+from odscen.sumo.live import Live
+from odscen.sumo.prepare import prepare
+from odscen.sumo.progress import Pace
+from odscen.sumo.runner import run_prepared
+workspace = Workspace.open(Path(sys.argv[1]))
+scenario = workflow.read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
+entry = workspace.map("signal_crossing")
+prepared = prepare(scenario, workflow.load_map(entry).sumo, entry.path("net"))
+live = Live(Pace(speed=0.1))
+threading.Thread(
+    target=run_prepared, args=(prepared, Path(sys.argv[3]) / "run"), kwargs={"live": live},
+    daemon=True,
+).start()
+while live.progress is None:
+    time.sleep(0.01)
+print(live._process.pid, flush=True)
+os._exit(0)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script, workspace.root, sampled, tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    pid = int(done.stdout)
+    wait_for(lambda: not _alive(pid), seconds=10)
+
+
+def _alive(pid: int) -> bool:
+    import psutil
+
+    return psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+
+
+def test_threads_end_with_the_server(client: TestClient, sampled: str) -> None:
+    run = start(client, sampled)
+    finished(client, run)
+    client.app.state.services.close()
+    wait_for(lambda: not any(t.name.startswith(("run", "job")) for t in threading.enumerate()))

@@ -1,0 +1,282 @@
+from __future__ import annotations
+
+import inspect
+import json
+import threading
+
+import pytest
+from starlette.testclient import TestClient
+
+from odscen import workflow
+from odscen.catalog.store import Workspace
+from odscen.scenario import edits
+from odscen.scenario.files import dumps, loads, read_any
+from odscen.scenario.region import Region, name_of, place_of
+from odscen.web.app import create_app
+from odscen.web.edits import FUNCTIONS
+from tests.web.conftest import CROSSING
+
+ALL = (
+    ("grow_roi", {"segment": "j10001"}),
+    ("grow_roi", {"segment": "r1"}),
+    ("grow_roi", {"segment": "r2"}),
+    ("grow_roi", {"segment": "r3"}),
+    ("add_actor", {"category": "car", "spawn": "SPAWN0", "speed": 12.5, "style": "sporty"}),
+    ("add_actor", {"category": "truck", "spawn": "SPAWN1", "id": "big", "depart": 3}),
+    ("add_actor", {"category": "pedestrian", "spawn": "WALK0"}),
+    ("move_actor", {"actor": "car-1", "spawn": "SPAWN2"}),
+    ("set_goal", {"actor": "car-1", "goal": "GOAL2"}),
+    ("set_goal", {"actor": "car-1", "goal": None}),
+    ("change_actor", {"actor": "car-1", "lateral_offset": 0.2, "speed": None}),
+    ("change_actor", {"actor": "big", "category": "bus"}),
+    ("copy_actors", {"copies": {"SPAWN3": "car-1", "SPAWN4": "big"}}),
+    ("set_ego", {"actor": "car-1"}),
+    ("add_flow", {"spawn": "SPAWN5", "per_hour": 300, "mix": {"car": 2, "bus": 1}}),
+    ("change_flow", {"flow": "flow-1", "end": 900}),
+    ("set_environment", {"preset": "HardRainNoon"}),
+    ("set_environment", {"parameters": {"wetness": 20}, "affects_driving": False}),
+    ("set_signal_control", {"control": "actuated"}),
+    ("set_timing", {"junction": "10001", "offset": 5}),
+    ("clear_timing", {"junction": "10001"}),
+    ("set_simulation", {"duration": 120}),
+    ("set_seed", {"seed": 9}),
+    ("rename", {"name": "My crossing", "description": "Two\nlines"}),
+    ("shrink_roi", {"segment": "r3", "with_actors": True}),
+    ("remove_flow", {"flow": "flow-1"}),
+    ("remove_actors", {"actors": ["car-1", "big"]}),
+)
+
+
+@pytest.fixture
+def new(client: TestClient) -> str:
+    answer = client.post("/api/scenarios", json={"map": CROSSING, "name": "mine"})
+    assert answer.status_code == 201
+    return "mine"
+
+
+@pytest.fixture
+def places(workspace: Workspace) -> dict[str, str]:
+    """Node names for the placeholders above: spawns far apart, a goal, and a walk."""
+    loaded = workflow.load_map(workspace.map(CROSSING))
+    graph = loaded.sumo.graph
+    region = Region.of(graph, ["j10001", "r1", "r2", "r3"])
+    inside = [
+        i
+        for i in range(0, len(graph.lanes.x), 8)
+        if region.lanes[i] and region.router.goal_candidates(i).size
+    ]
+    names = {}
+    for number, node in enumerate(inside[:8]):
+        place = place_of(graph, _node(graph, node))
+        assert place is not None
+        names[f"SPAWN{number}"] = name_of(graph, place)
+        names[f"GOAL{number}"] = _node(graph, int(region.candidates(place)[0]))
+    walk = next(i for i in range(len(graph.walks.x)) if region.walks[i])
+    return {**names, "WALK0": name_of(graph, type(place)(True, walk))}
+
+
+def _node(graph, i: int) -> str:
+    from odscen.lanegraph.query import node_id
+
+    return node_id(graph, i)
+
+
+def _filled(value, places):
+    if isinstance(value, str):
+        return places.get(value, value)
+    if isinstance(value, dict):
+        return {_filled(k, places): _filled(v, places) for k, v in value.items()}
+    return [_filled(one, places) for one in value] if isinstance(value, list) else value
+
+
+def post_edit(client: TestClient, name: str, version: int, kind: str, /, **arguments: object):
+    body = {"version": version, "edit": {"kind": kind, **arguments}}
+    return client.post(f"/api/scenarios/{name}/edits", json=body)
+
+
+def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
+    public = {
+        name
+        for name, function in inspect.getmembers(edits, inspect.isfunction)
+        if not name.startswith("_") and function.__module__ == edits.__name__
+    }
+    assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments"}
+    assert {kind for kind, _ in ALL} == set(FUNCTIONS)
+
+
+def test_edits_over_the_wire_give_the_same_documents_as_in_python(
+    client: TestClient, workspace: Workspace, new: str, places: dict[str, str]
+) -> None:
+    loaded = workflow.load_map(workspace.map(CROSSING))
+    graph = loaded.sumo.graph
+    ours = edits.new_scenario(graph, name="mine")
+    state = client.get(f"/api/scenarios/{new}").json()
+    for kind, template in ALL:
+        arguments = _filled(template, places)
+        answer = post_edit(client, new, state["version"], kind, **arguments)
+        assert answer.status_code == 200, (kind, answer.text)
+        known = {"graph": graph, "lights": loaded.lights}
+        function = getattr(edits, kind)
+        wanted = inspect.signature(function).parameters
+        ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
+        assert answer.json()["version"] == state["version"] + 1
+        state = answer.json()
+        file = workspace.scenarios / "mine.scenario.json"
+        assert file.read_text(encoding="utf-8") == dumps(ours), kind
+        assert loads(json.dumps(state["document"])) == ours
+        checked = workflow.check_scenario(workspace, ours)
+        assert [p["code"] for p in state["problems"]] == [p.code for p in checked]
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments"),
+    [
+        ("grow_roi", {"segment": "r99"}),
+        ("grow_roi", {}),
+        ("grow_roi", {"segment": "r1", "graph": {}}),
+        ("add_actor", {"category": "car", "spawn": "1.0.-1.0"}),
+        ("add_actor", {"category": "tank", "spawn": "1.0.-1.0"}),
+        ("add_actor", {"category": "car", "spawn": "1.0.-1.0", "wings": 2}),
+        ("remove_actors", {"actors": "car-1"}),
+        ("copy_actors", {"copies": ["car-1"]}),
+        ("set_environment", {"parameters": {"fog": "x"}}),
+        ("eligible_segments", {}),
+        ("_with", {"name": "x"}),
+        ("__class__", {}),
+    ],
+)
+def test_what_an_edit_refuses_changes_nothing(
+    client: TestClient, new: str, kind: str, arguments: dict[str, object]
+) -> None:
+    before = client.get(f"/api/scenarios/{new}").json()
+    answer = post_edit(client, new, before["version"], kind, **arguments)
+    assert answer.status_code in (404, 422), answer.text
+    assert answer.json()["error"]["message"]
+    assert client.get(f"/api/scenarios/{new}").json() == before
+
+
+def test_a_stale_version_is_refused_and_told_the_newest(client: TestClient, new: str) -> None:
+    first = post_edit(client, new, 1, "set_seed", seed=3)
+    assert first.json()["version"] == 2
+    for answer in (
+        post_edit(client, new, 1, "set_seed", seed=4),
+        client.post(f"/api/scenarios/{new}/undo", json={"version": 1}),
+    ):
+        assert answer.status_code == 409
+        assert answer.json()["error"]["current"] == 2
+    assert client.get(f"/api/scenarios/{new}").json()["document"]["seed"] == 3
+
+
+def test_of_two_tabs_that_edit_at_once_exactly_one_wins(client: TestClient, new: str) -> None:
+    codes: list[int] = []
+
+    def edit(seed: int) -> None:
+        codes.append(post_edit(client, new, 1, "set_seed", seed=seed).status_code)
+
+    threads = [threading.Thread(target=edit, args=(seed,)) for seed in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(codes) == [200] + [409] * 7
+
+
+def test_undo_and_redo_are_named_and_survive_a_restart(
+    client: TestClient, workspace: Workspace, new: str
+) -> None:
+    state = client.get(f"/api/scenarios/{new}").json()
+    assert (state["undo"], state["redo"]) == (None, None)
+    for segment in ("r1", "j10001"):
+        state = post_edit(client, new, state["version"], "grow_roi", segment=segment).json()
+    assert state["undo"] == "Grow region j10001"
+    state = client.post(f"/api/scenarios/{new}/undo", json={"version": state["version"]}).json()
+    assert state["document"]["roi"] == ["r1"]
+    assert (state["undo"], state["redo"]) == ("Grow region r1", "Grow region j10001")
+    with TestClient(create_app(workspace), base_url="http://localhost") as again:
+        reopened = again.get(f"/api/scenarios/{new}").json()
+        assert reopened == state
+        redone = again.post(f"/api/scenarios/{new}/redo", json={"version": state["version"]})
+        assert redone.json()["document"]["roi"] == ["r1", "j10001"]
+        nothing = again.post(
+            f"/api/scenarios/{new}/redo", json={"version": redone.json()["version"]}
+        )
+        assert nothing.status_code == 409
+        branched = post_edit(again, new, redone.json()["version"], "set_seed", seed=1).json()
+        assert branched["redo"] is None
+
+
+def test_a_file_that_another_program_changed_is_a_new_version_that_can_be_undone(
+    client: TestClient, workspace: Workspace, new: str
+) -> None:
+    file = workspace.scenarios / "mine.scenario.json"
+    scenario = edits.set_seed(loads(file.read_text()), seed=77)
+    file.write_text(dumps(scenario))
+    state = client.get(f"/api/scenarios/{new}").json()
+    assert (state["version"], state["document"]["seed"]) == (2, 77)
+    assert post_edit(client, new, 1, "set_seed", seed=4).status_code == 409
+    back = client.post(f"/api/scenarios/{new}/undo", json={"version": 2}).json()
+    assert back["document"]["seed"] == 0
+
+
+def test_scenarios_are_listed_renamed_downloaded_uploaded_and_removed(
+    client: TestClient, sampled: str
+) -> None:
+    (row,) = client.get("/api/scenarios").json()
+    assert (row["name"], row["map"]) == (sampled, CROSSING)
+    assert row["actors"] > 5
+    assert client.put(f"/api/scenarios/{sampled}/name", json={"name": "kept"}).status_code == 200
+    assert client.get(f"/api/scenarios/{sampled}").status_code == 404
+    document = client.get("/api/scenarios/kept").json()["document"]
+    for form in ("json", "graphml"):
+        content = client.get(f"/api/scenarios/kept/download?form={form}").content
+        assert read_any(content).model_dump(mode="json") == document
+        back = client.post("/api/scenarios/upload", files={"file": (f"up.{form}", content)})
+        assert back.json()["document"] == document
+    names = [row["name"] for row in client.get("/api/scenarios").json()]
+    assert sorted(names) == ["kept", "up-1", "up-2"]
+    taken = client.put("/api/scenarios/up-1/name", json={"name": "kept"})
+    assert taken.status_code == 409
+    assert client.delete("/api/scenarios/kept").status_code == 204
+    assert client.delete("/api/scenarios/kept").status_code == 404
+
+
+def test_a_broken_file_is_listed_as_such_and_harms_no_other(
+    client: TestClient, workspace: Workspace, new: str
+) -> None:
+    (workspace.scenarios / "bad.scenario.json").write_text("{}")
+    (workspace.scenarios / "not a name.scenario.json").write_text("{}")
+    rows = {row["name"]: row for row in client.get("/api/scenarios").json()}
+    assert set(rows) == {"mine", "bad"}
+    assert rows["bad"]["error"]
+    assert client.get("/api/scenarios/bad").status_code == 422
+
+
+def test_a_scenario_whose_map_is_gone_can_still_be_looked_at(client: TestClient, new: str) -> None:
+    client.delete(f"/api/maps/{CROSSING}")
+    state = client.get(f"/api/scenarios/{new}").json()
+    assert [problem["code"] for problem in state["problems"]] == ["map_missing"]
+    assert client.get(f"/api/scenarios/{new}/roi").status_code == 404
+
+
+def test_goals_ways_and_neighbours_are_those_of_the_graph(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    scenario = loads((workspace.scenarios / f"{sampled}{workflow.SUFFIX}").read_text())
+    graph = workflow.load_map(workspace.map(CROSSING)).sumo.graph
+    region = Region.of(graph, scenario.roi)
+    for category in ("car", "pedestrian"):
+        actor = next(a for a in scenario.actors if a.category == category)
+        place = place_of(graph, actor.spawn)
+        assert place is not None
+        query = {"spawn": actor.spawn}
+        goals = client.get(f"/api/scenarios/{sampled}/goals", params=query).json()["goals"]
+        assert [place_of(graph, goal).node for goal in goals] == region.candidates(place).tolist()
+        query["goal"] = goals[0]
+        way = client.get(f"/api/scenarios/{sampled}/path", params=query).json()
+        assert (way["nodes"][0], way["nodes"][-1]) == (actor.spawn, goals[0])
+        assert len(way["points"]) == len(way["nodes"])
+    answer = client.get(f"/api/scenarios/{sampled}/goals", params={"spawn": "7.0.-1.0"})
+    assert answer.status_code == 404
+    roi = client.get(f"/api/scenarios/{sampled}/roi").json()
+    assert roi["inside"] == list(scenario.roi)
+    assert roi["candidates"] == list(edits.eligible_segments(scenario, graph))

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from odscen.catalog.store import Workspace
+from odscen.web.app import create_app
+
+TRAVERSALS = (
+    "..", "../x", "..%2fx", "%2e%2e%2fmaps", "..%5cx", "/etc/passwd", ".history", "a%00b", "a%0ab",
+    "%2fetc%2fpasswd", "C:x", "x" * 65,
+)  # fmt: skip
+
+
+@pytest.fixture
+def guarded(workspace: Workspace) -> Iterator[TestClient]:
+    app = create_app(workspace, token="s3cret", hosts=None, max_upload=1000)
+    with TestClient(app, base_url="http://box") as client:
+        yield client
+
+
+@pytest.mark.parametrize("name", TRAVERSALS)
+def test_names_never_become_paths(client: TestClient, workspace: Workspace, name: str) -> None:
+    before = sorted(path for path in workspace.root.rglob("*"))
+    new = {"map": "signal_crossing", "name": name}
+    answers = [
+        client.get(f"/api/scenarios/{name}"),
+        client.delete(f"/api/scenarios/{name}"),
+        client.get(f"/api/maps/{name}"),
+        client.delete(f"/api/maps/{name}"),
+        client.get(f"/api/runs/{name}/report.html"),
+        client.delete(f"/api/runs/{name}"),
+        client.post("/api/scenarios", json=new),
+        client.post("/api/maps", files={"file": ("m.xodr", b"x")}, data={"name": name}),
+    ]
+    assert all(answer.status_code in (404, 405, 422) for answer in answers), answers
+    assert sorted(path for path in workspace.root.rglob("*")) == before
+
+
+def test_a_file_name_never_becomes_a_path(client: TestClient, workspace: Workspace) -> None:
+    document = client.post("/api/scenarios", json={"map": "signal_crossing"}).json()["document"]
+    import json
+
+    for name in ("../../evil.scenario.json", "/etc/evil.json", "..", ".history"):
+        files = {"file": (name, json.dumps(document))}
+        saved = client.post("/api/scenarios/upload", files=files)
+        assert saved.status_code == 201, saved.text
+        assert (workspace.scenarios / f"{saved.json()['name']}.scenario.json").is_file()
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999"])
+def test_a_foreign_page_is_refused_also_where_it_opens_a_socket(
+    client: TestClient, origin: str
+) -> None:
+    answer = client.post("/api/maps/shipped", headers={"Origin": origin})
+    assert answer.status_code == 403
+    assert answer.json()["error"]["kind"] == "ForeignRequest"
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect("/api/runs/a-1/live", headers={"Origin": origin}),
+    ):
+        pass
+
+
+def test_the_own_page_is_served(client: TestClient) -> None:
+    assert client.get("/api/maps", headers={"Origin": "http://testserver"}).status_code == 200
+    headers = {"Host": "localhost:8420", "Origin": "http://localhost:8420"}
+    assert client.get("/api/maps", headers=headers).status_code == 200
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "localhost.evil"])
+def test_another_host_name_is_refused(client: TestClient, host: str) -> None:
+    assert client.get("/api/maps", headers={"Host": host}).status_code == 403
+
+
+def test_a_token_is_asked_for_and_kept_in_a_cookie_that_scripts_cannot_read(
+    guarded: TestClient,
+) -> None:
+    assert guarded.get("/api/maps").status_code == 401
+    assert guarded.get("/api/maps?token=wrong").status_code == 401
+    assert guarded.get("/api/maps", headers={"Authorization": "Bearer s3cret"}).status_code == 200
+    assert guarded.get("/api/maps").status_code == 401
+    first = guarded.get("/?token=s3cret&x=1", follow_redirects=False)
+    assert (first.status_code, first.headers["location"]) == (303, "/?x=1")
+    cookie = first.headers["set-cookie"].lower()
+    assert "httponly" in cookie
+    assert "samesite=strict" in cookie
+    assert guarded.get("/api/maps").status_code == 200
+
+
+def test_a_token_is_not_a_way_to_be_sent_elsewhere(guarded: TestClient) -> None:
+    away = guarded.get("//evil.example/?token=s3cret", follow_redirects=False)
+    assert away.headers.get("location", "/").startswith("/")
+    assert not away.headers.get("location", "/").startswith("//")
+
+
+def test_an_oversized_upload_is_refused_announced_or_not(guarded: TestClient) -> None:
+    headers = {"Authorization": "Bearer s3cret"}
+    announced = guarded.post("/api/maps", files={"file": ("m.xodr", b"x" * 2000)}, headers=headers)
+    assert announced.status_code == 413
+    assert "1,000 bytes" in announced.json()["error"]["message"]
+
+    def endless() -> Iterator[bytes]:
+        yield b'--b\r\nContent-Disposition: form-data; name="file"; filename="m"\r\n\r\n'
+        for _ in range(1000):
+            yield b"x" * 1000
+
+    for content_type in ("multipart/form-data; boundary=b", "application/json"):
+        typed = {**headers, "Content-Type": content_type}
+        for path in ("/api/maps", "/api/scenarios"):
+            answer = guarded.post(path, content=endless(), headers=typed)
+            assert answer.status_code in (413, 422), answer.text
+            if content_type.startswith("multipart") == (path == "/api/maps"):
+                assert answer.status_code == 413
+
+
+@pytest.mark.parametrize("body", [b"[" * 100_000, b"{", b"\xff", b"null", b'{"map": 1e999}'])
+def test_broken_json_is_an_error_in_the_usual_shape(client: TestClient, body: bytes) -> None:
+    answer = client.post(
+        "/api/scenarios", content=body, headers={"Content-Type": "application/json"}
+    )
+    assert answer.status_code in (400, 422)
+    assert answer.json()["error"]["message"]
+
+
+def test_an_entity_bomb_as_scenario_is_refused(client: TestClient) -> None:
+    entities = '<!ENTITY a0 "x">' + "".join(
+        f'<!ENTITY a{i} "{f"&a{i - 1};" * 10}">' for i in range(1, 10)
+    )
+    bomb = f'<?xml version="1.0"?><!DOCTYPE g [{entities}]><graphml>&a9;</graphml>'
+    for content in (bomb, "<a>" * 100_000, "[" * 100_000, "\x00"):
+        answer = client.post("/api/scenarios/upload", files={"file": ("s.graphml", content)})
+        assert answer.status_code == 422, answer.text
+        assert answer.json()["error"]["kind"] == "ScenarioError"
