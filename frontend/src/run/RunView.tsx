@@ -1,0 +1,1 @@
+export const RunView = (_: { scenario: string; run: string }) => null;
