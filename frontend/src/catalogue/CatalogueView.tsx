@@ -6,12 +6,14 @@ import { useState } from "react";
 
 import { api } from "../api/client";
 import type { MapInfo, ScenarioEntry } from "../api/types";
+import { forgetMaps } from "../map/loaded";
 import { IconSearch, IconTrash } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
 import { go, hashOf } from "../ui/route";
 import { useLoaded } from "../ui/useLoaded";
 import { count, mapFacts } from "../ui/words";
 import { AddMap } from "./AddMap";
+import { Preview } from "./Preview";
 import { arranged, type Order, ORDERS } from "./order";
 
 /** The first screen: choose a map, or go on with a scenario. */
@@ -35,7 +37,7 @@ export function CatalogueView() {
     const { what, name } = removing;
     setRemoving(null);
     (what === "map" ? api.removeMap(name) : api.removeScenario(name)).then(
-      () => { tell(`${name} is removed.`); maps.reload(); scenarios.reload(); },
+      () => { tell(`${name} is removed.`); if (what === "map") forgetMaps(); maps.reload(); scenarios.reload(); },
       tellError,
     );
   };
@@ -70,7 +72,7 @@ export function CatalogueView() {
         {found.map((map) => (
           <li key={map.name}>
             <Card withBorder padding={0} className="card">
-              <img className="card-picture" src={map.preview} alt={`The map ${map.name} seen from above`} loading="lazy" />
+              <Preview name={map.name} picture={map.preview} />
               <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
                 <Group justify="space-between" wrap="nowrap">
                   <Title order={2} size="h4">{map.name}</Title>

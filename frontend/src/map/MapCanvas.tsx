@@ -34,6 +34,8 @@ interface Props {
   picker: Picker | null;
   scene: Scene;
   label: string;
+  /** Whether a click chooses something, so that the pointer is a cross. */
+  aim?: boolean;
   handle?: RefObject<MapHandle | null>;
   onPick?: (at: Pointed) => void;
   onPoint?: (at: Pointed | null) => void;
@@ -45,7 +47,7 @@ const TOUCH = 14;
 
 /** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
 export function MapCanvas({
-  drawing, graph, picker, scene, label, handle, onPick, onPoint, children,
+  drawing, graph, picker, scene, label, aim = false, handle, onPick, onPoint, children,
 }: Props) {
   const host = useRef<HTMLDivElement>(null);
   const layers = useRef<HTMLDivElement>(null);
@@ -163,6 +165,7 @@ export function MapCanvas({
     <div
       ref={host}
       className="map"
+      data-aim={aim}
       role="application"
       tabIndex={0}
       aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
