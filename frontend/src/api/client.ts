@@ -81,9 +81,10 @@ export const api = {
   downloadUrl: (name: string, form: "json" | "graphml") =>
     `${BASE}/scenarios/${enc(name)}/download?form=${form}`,
   uploadScenario: (file: File) => upload<ScenarioState>("/scenarios/upload", file),
-  startRun: (scenario: string) => send<{ run: string }>("POST", "/runs", { scenario }),
+  /** At real speed: a person watches. */
+  startRun: (scenario: string) => send<{ run: string }>("POST", "/runs", { scenario, speed: 1 }),
   run: (id: string) => ask<RunInfo>(`/runs/${enc(id)}`),
-  control: (id: string, action: string, speed?: number) =>
+  control: (id: string, action: string, speed?: number | null) =>
     send<unknown>("POST", `/runs/${enc(id)}/control`, speed === undefined ? { action } : { action, speed }),
   reportUrl: (id: string) => `${BASE}/runs/${enc(id)}/report.html`,
   liveUrl: (id: string) => {

@@ -77,7 +77,7 @@ export interface WeatherPreset {
 }
 
 export interface Assets {
-  categories: Category[];
+  categories: { category: Category; length: number; width: number }[];
   blueprints: Blueprint[];
   weather: WeatherPreset[];
 }
@@ -128,6 +128,8 @@ export interface Problem {
 }
 
 export interface ScenarioState {
+  /** What the server files it under. */
+  name: string;
   version: number;
   document: ScenarioDocument;
   problems: Problem[];
@@ -139,10 +141,13 @@ export interface ScenarioState {
 
 export interface ScenarioEntry {
   name: string;
-  map: string;
+  title: string | null;
+  map: string | null;
   actors: number;
-  modified: string | number;
+  /** Seconds since 1970. */
+  modified: number;
   version: number;
+  error: string | null;
 }
 
 export interface Job {
@@ -160,6 +165,8 @@ export interface ApiErrorBody {
 
 export interface RunInfo {
   state: string;
+  speed?: number | null;
+  progress?: { time: number; until: number; running: number; arrived: number; planned: number } | null;
   summary?: Record<string, unknown> | null;
   error?: ApiErrorBody | string | null;
 }

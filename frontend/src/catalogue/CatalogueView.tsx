@@ -28,7 +28,7 @@ export function CatalogueView() {
   const start = (map: MapInfo): void => {
     setStarting(map.name);
     api.newScenario(map.name).then(
-      (made) => go({ view: "editor", scenario: made.document.name }),
+      (made) => go({ view: "editor", scenario: made.name }),
       (error: unknown) => { tellError(error); setStarting(null); },
     );
   };
@@ -122,8 +122,8 @@ function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove: (name:
         <Table.Tbody>
           {list.map((one) => (
             <Table.Tr key={one.name}>
-              <Table.Td><a href={hashOf({ view: "editor", scenario: one.name })}>{one.name}</a></Table.Td>
-              <Table.Td><Badge variant="default" tt="none">{one.map}</Badge></Table.Td>
+              <Table.Td><a href={hashOf({ view: "editor", scenario: one.name })}>{one.title ?? one.name}</a>{one.error && <Text size="xs" c="red">{one.error}</Text>}</Table.Td>
+              <Table.Td><Badge variant="default" tt="none">{one.map ?? "?"}</Badge></Table.Td>
               <Table.Td>{one.actors}</Table.Td>
               <Table.Td>{when(one.modified)}</Table.Td>
               <Table.Td ta="right">
@@ -137,9 +137,6 @@ function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove: (name:
   );
 }
 
-function when(modified: string | number): string {
-  const date = new Date(typeof modified === "number" ? modified * 1000 : modified);
-  return Number.isNaN(date.getTime())
-    ? String(modified)
-    : date.toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
+function when(modified: number): string {
+  return new Date(modified * 1000).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
 }

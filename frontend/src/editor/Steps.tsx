@@ -1,4 +1,4 @@
-import type { ReactNode } from "react";
+import { type ReactNode, useEffect, useRef } from "react";
 
 import { IconCheck } from "../ui/icons";
 import { type Step, STEPS } from "./scene";
@@ -14,8 +14,13 @@ export interface StepText {
 export function Steps({ open, onOpen, steps }: {
   open: Step; onOpen: (step: Step) => void; steps: Record<Step, StepText>;
 }) {
+  const list = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    list.current?.querySelector("[aria-expanded=true]")?.scrollIntoView({ block: "nearest" });
+    list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+  }, [open]);
   return (
-    <div className="steps">
+    <div className="steps" ref={list}>
       {STEPS.map((step, n) => {
         const { title, note, done, body } = steps[step];
         const expanded = open === step;

@@ -1,4 +1,4 @@
-import type { Actor, Assets, Bounds, Category, Problem, ScenarioDocument } from "../api/types";
+import type { Actor, Assets, Bounds, Problem, ScenarioDocument } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SegmentStyle } from "../map/scene";
@@ -25,15 +25,11 @@ export function insideRows(graph: Graph, roi: readonly string[]): Set<number> {
   return new Set(roi.flatMap((id) => graph.segmentRow.get(id) ?? []));
 }
 
-/** Usual bodies, for actors whose model is left open; metres. */
-const USUAL: Record<Category, [length: number, width: number]> = {
-  car: [5, 1.8], van: [6.5, 2.16], truck: [7.1, 2.4], bus: [12, 2.5], motorcycle: [2.2, 0.9],
-  bicycle: [1.6, 0.65], pedestrian: [0.5, 0.5],
-};
-
+/** Length and width in metres: of the model, or what is usual for the kind. */
 export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets | null): [number, number] {
-  const model = assets?.blueprints.find((one) => one.id === actor.model);
-  return model ? [model.length, model.width] : USUAL[actor.category];
+  const found = assets?.blueprints.find((one) => one.id === actor.model)
+    ?? assets?.categories.find((one) => one.category === actor.category);
+  return found ? [found.length, found.width] : [4, 1.8];
 }
 
 /** Index of the actor that a problem is about, from a place such as `actors[3].goal`. */

@@ -28,7 +28,7 @@ export function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
   const own = useMemo(() => fit(bounds, box, 0.04), [bounds, box]);
 
   useEffect(() => {
-    if (canvas.current) renderer.drawOverview(canvas.current, own, box, window.devicePixelRatio || 1);
+    if (canvas.current) renderer.drawOverview(canvas.current, own, box, window.devicePixelRatio || 1, dark);
   }, [renderer, own, box, dark]);
 
   const seen = visible(view, size);

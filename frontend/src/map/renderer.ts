@@ -17,7 +17,7 @@ export interface MapRenderer {
   setMoving(moving: Moving | null): void;
   setLights(lights: ReadonlyMap<string, string>): void;
   /** Draws the whole map small, for the minimap. */
-  drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number): void;
+  drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
   destroy(): void;
 }
 
@@ -99,11 +99,13 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("moving");
   }
 
-  drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number): void {
+  drawOverview(
+    canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean,
+  ): void {
     canvas.width = Math.round(size.width * pixelRatio);
     canvas.height = Math.round(size.height * pixelRatio);
     const context = canvas.getContext("2d");
-    if (context) this.base.draw(context, view, size, pixelRatio, this.palette, false);
+    if (context) this.base.draw(context, view, size, pixelRatio, dark ? DARK : LIGHT, false);
   }
 
   destroy(): void {
