@@ -29,6 +29,9 @@ export interface MapInfo {
   graph: Record<string, number>;
   report_counts: Record<string, number> | null;
   preview: string;
+  /** Only of one map asked for by name: where signals stand, and which light steers them. */
+  semantics?: { signals: { id: string; x: number; y: number }[] };
+  lights?: { id: string; signals: string[][] }[];
 }
 
 export interface GraphColumns {

@@ -24,6 +24,7 @@ export interface Pointed {
 
 export interface MapHandle {
   setMoving(moving: Moving | null): void;
+  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
   show(bounds: Bounds): void;
   centre(x: number, y: number): void;
 }
@@ -109,6 +110,7 @@ export function MapCanvas({
 
   useImperativeHandle(handle, () => ({
     setMoving: (moving) => renderer.current?.setMoving(moving),
+    setLamps: (lamps) => renderer.current?.setLamps(lamps),
     show: (bounds) => apply(fit(bounds, size.current, 0.15)),
     centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
   }), [apply]);

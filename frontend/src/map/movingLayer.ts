@@ -3,9 +3,10 @@ import { CATEGORY_COLOR, EGO, type Palette } from "./colors";
 import type { Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
 
-export const FLAG_BRAKE = 1;
-export const FLAG_LEFT = 2;
-export const FLAG_RIGHT = 4;
+/** As the server numbers them. */
+export const FLAG_LEFT = 1;
+export const FLAG_RIGHT = 2;
+export const FLAG_BRAKE = 4;
 
 /** No road user is drawn shorter than this many pixels, so that a whole town can be watched. */
 const LEAST = 5;
@@ -14,7 +15,7 @@ const DETAIL_FROM = 6;
 
 /** Road users of a run, drawn many at once: one path per category. */
 export class MovingLayer {
-  lights: ReadonlyMap<string, string> = new Map();
+  lamps: readonly { x: number; y: number; color: string }[] = [];
 
   draw(
     context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
@@ -22,8 +23,9 @@ export class MovingLayer {
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, context.canvas.width, context.canvas.height);
-    if (!moving) return;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.drawLamps(context, view, size);
+    if (!moving) return;
     const rows = byCategory(moving, view, size);
     rows.forEach((of, n) => {
       if (of.length === 0) return;
@@ -42,6 +44,22 @@ export class MovingLayer {
     });
     if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
     if (moving.followed >= 0) mark(context, moving, moving.followed, view, size, palette.ink);
+  }
+
+  private drawLamps(context: CanvasRenderingContext2D, view: View, size: Size): void {
+    const radius = Math.min(Math.max(view.scale * 1.3, 3), 11);
+    for (const { x, y, color } of this.lamps) {
+      context.beginPath();
+      context.arc(
+        (x - view.x) * view.scale + size.width / 2, (view.y - y) * view.scale + size.height / 2,
+        radius, 0, 2 * Math.PI,
+      );
+      context.fillStyle = color;
+      context.fill();
+      context.lineWidth = 1.5;
+      context.strokeStyle = "#22262b";
+      context.stroke();
+    }
   }
 }
 

@@ -15,7 +15,7 @@ export interface MapRenderer {
   setView(view: View): void;
   setScene(scene: Scene): void;
   setMoving(moving: Moving | null): void;
-  setLights(lights: ReadonlyMap<string, string>): void;
+  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
   /** Draws the whole map small, for the minimap. */
   drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
   destroy(): void;
@@ -94,8 +94,8 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("moving");
   }
 
-  setLights(lights: ReadonlyMap<string, string>): void {
-    this.moving.lights = lights;
+  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void {
+    this.moving.lamps = lamps;
     this.mark("moving");
   }
 

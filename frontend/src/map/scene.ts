@@ -46,7 +46,7 @@ export const EMPTY_SCENE: Scene = {
 export interface Moving {
   count: number;
   /** Five numbers each: x, y, hdg, length, width. */
-  pose: Float32Array;
+  pose: Float64Array;
   category: Uint8Array;
   flags: Uint8Array;
   /** Row of the road user to be marked as ego, or -1. */

@@ -2,7 +2,7 @@ import { Alert, Button, Group, Loader, Paper, Progress, Select, Text, Title } fr
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { api } from "../api/client";
-import { CATEGORIES, type RunInfo, type ScenarioDocument } from "../api/types";
+import { CATEGORIES, type MapInfo, type RunInfo, type ScenarioDocument } from "../api/types";
 import type { PackedDrawing } from "../map/drawing";
 import { CATEGORY_COLOR } from "../map/colors";
 import { insideRows, segmentsBounds } from "../editor/scene";
@@ -15,6 +15,7 @@ import { go } from "../ui/route";
 import { CATEGORY_WORD, clock } from "../ui/words";
 import { hasEnded, keyFigures, SPEEDS, STATE_WORD } from "./figures";
 import type { Crowd, Frame } from "./frames";
+import { lamps } from "./lights";
 import { Live } from "./live";
 
 const POLL = 700;
@@ -37,6 +38,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const [speed, setSpeed] = useState("1");
   const [followed, setFollowed] = useState<string | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
+  const mapInfo = useRef<MapInfo | null>(null);
   const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
   const watching = useRef<{ ego: string | null; followed: string | null }>({ ego: null, followed: null });
   const state = info?.state ?? "preparing";
@@ -47,6 +49,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
     api.scenario(scenario).then(async ({ document: found }) => {
       setDocument(found);
       watching.current.ego = found.actors.find((actor) => actor.ego)?.id ?? null;
+      mapInfo.current = await api.map(found.map.name);
       setDrawing(await loadDrawing(found.map.name));
       setLoaded(await loadGraph(found.map.name));
     }).catch(fail);
@@ -80,6 +83,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   useEffect(() => {
     if (ended || !drawing) return;
     let shown = 0;
+    const states = new Map<string, string>();
     const live = new Live(run, {
       onFrame: (frame, crowd) => {
         last.current = { frame, crowd, moving: last.current?.moving ?? crowd.arrange(frame, null, null) };
@@ -88,7 +92,10 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
         shown = performance.now();
         setNow({ time: frame.time, pace: frame.pace, running: frame.count, arrived: frame.arrived });
       },
-      onLights: () => undefined,
+      onLights: (changed) => {
+        for (const [id, state] of Object.entries(changed)) states.set(id, state);
+        if (mapInfo.current) handle.current?.setLamps(lamps(mapInfo.current, states));
+      },
       onState: (next) => setInfo((old) => (old ? { ...old, state: next } : { state: next })),
       onClose: () => undefined,
     });

@@ -50,6 +50,8 @@ function floats(data: ArrayBuffer): Float32Array {
 export class Crowd {
   private readonly known = new Map<number, Introduced>();
   private readonly rowOf = new Map<string, number>();
+  /** Added to all places of frames, which are too short for maps far from zero; metres. */
+  origin: readonly [number, number] = [0, 0];
 
   introduce(actors: readonly Introduced[]): void {
     for (const actor of actors) this.known.set(actor.index, actor);
@@ -66,7 +68,7 @@ export class Crowd {
 
   /** The frame as it is drawn; whoever has not been introduced yet is left out. */
   arrange(frame: Frame, ego: string | null, followed: string | null): Moving {
-    const pose = new Float32Array(5 * frame.count);
+    const pose = new Float64Array(5 * frame.count);
     const category = new Uint8Array(frame.count);
     const flags = new Uint8Array(frame.count);
     let count = 0;
@@ -75,8 +77,8 @@ export class Crowd {
       const at = ROW * i;
       const who = this.known.get(frame.rows[at]);
       if (!who) continue;
-      pose[5 * count] = frame.rows[at + 1];
-      pose[5 * count + 1] = frame.rows[at + 2];
+      pose[5 * count] = frame.rows[at + 1] + this.origin[0];
+      pose[5 * count + 1] = frame.rows[at + 2] + this.origin[1];
       pose[5 * count + 2] = frame.rows[at + 3];
       pose[5 * count + 3] = who.length;
       pose[5 * count + 4] = who.width;

@@ -10,6 +10,7 @@ export interface LiveEvents {
 }
 
 interface Message {
+  origin?: [number, number];
   actors?: Introduced[];
   lights?: Record<string, string>;
   state?: string;
@@ -41,6 +42,7 @@ export class Live {
 
   private read(text: string): void {
     const message = JSON.parse(text) as Message;
+    if (message.origin) this.crowd.origin = message.origin;
     if (message.actors) this.crowd.introduce(message.actors);
     if (message.lights) this.events.onLights(message.lights);
     if (message.state) this.events.onState(message.state);
