@@ -16,10 +16,11 @@ interface Props {
   onArm: (category: Category | null) => void;
   onEdit: (edit: Edit) => void;
   onSelect: (ids: string[]) => void;
+  onShowGoals: () => void;
 }
 
 /** Choose who, place them on the map, then say where they go and how. */
-export function ActorStep({ assets, selected, armed, goals, onArm, onEdit, onSelect }: Props) {
+export function ActorStep({ assets, selected, armed, goals, onArm, onEdit, onSelect, onShowGoals }: Props) {
   const one = selected.length === 1 ? selected[0] : null;
   return (
     <>
@@ -37,7 +38,7 @@ export function ActorStep({ assets, selected, armed, goals, onArm, onEdit, onSel
           ? `Now click where the ${CATEGORY_WORD[armed].toLowerCase()} starts: a ${armed === "pedestrian" ? "yellow" : "blue"} point on the map. Escape stops placing.`
           : "Choose a kind, then click on the map to place it."}
       </Text>
-      {one && <ActorForm key={one.id} actor={one} assets={assets} goals={goals} onEdit={onEdit} />}
+      {one && <ActorForm key={one.id} actor={one} assets={assets} goals={goals} onEdit={onEdit} onShowGoals={onShowGoals} />}
       {selected.length > 1 && (
         <Group justify="space-between">
           <Text size="sm" fw={600}>{selected.length} selected</Text>
@@ -50,8 +51,8 @@ export function ActorStep({ assets, selected, armed, goals, onArm, onEdit, onSel
   );
 }
 
-function ActorForm({ actor, assets, goals, onEdit }: {
-  actor: Actor; assets: Assets | null; goals: number | null; onEdit: (edit: Edit) => void;
+function ActorForm({ actor, assets, goals, onEdit, onShowGoals }: {
+  actor: Actor; assets: Assets | null; goals: number | null; onEdit: (edit: Edit) => void; onShowGoals: () => void;
 }) {
   const change = (fields: Partial<Actor>): void => onEdit({ kind: "change_actor", actor: actor.id, ...fields });
   const walks = actor.category === "pedestrian";
@@ -74,6 +75,7 @@ function ActorForm({ actor, assets, goals, onEdit }: {
           : goals === null ? "Goal: by chance"
           : goals === 0 ? "No goal can be reached from here; move the start or grow the region."
           : `Goal: by chance among ${goals}; click a light-blue point to choose`}</Text>
+        {goals !== null && goals > 0 && <Button size="compact-xs" variant="default" onClick={onShowGoals}>Show goals</Button>}
         {actor.goal && <Button size="compact-xs" variant="subtle" onClick={() => onEdit({ kind: "set_goal", actor: actor.id, goal: null })}>By chance</Button>}
       </Group>
       <Select label="Model" searchable clearable placeholder="Any" data={models} value={actor.model} nothingFoundMessage="No such model"

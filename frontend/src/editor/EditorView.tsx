@@ -11,7 +11,7 @@ import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { MapCanvas, type MapHandle, type Pointed } from "../map/MapCanvas";
 import type { Scene } from "../map/scene";
 import { IconDown, IconKeys, IconPlay, IconRedo, IconUndo, IconWarn } from "../ui/icons";
-import { tellError } from "../ui/notices";
+import { tell, tellError } from "../ui/notices";
 import { go } from "../ui/route";
 import { CATEGORY_WORD, count, mapFacts, weatherWord } from "../ui/words";
 import { useLoaded } from "../ui/useLoaded";
@@ -89,7 +89,8 @@ function Editor({ store, drawing, loaded, assets }: {
       segments: segmentStyles(graph, document.roi, candidates, step === "region"),
       hoverSegment: step === "region" ? hoverSegment : null,
       nodes: {
-        vehicles: !placing || wants !== "pedestrian", walks: !placing || wants === null || wants === "pedestrian",
+        vehicles: step !== "region" && (!placing || wants !== "pedestrian"),
+        walks: step !== "region" && (!placing || wants === null || wants === "pedestrian"),
         inside: placing ? inside : null,
       },
       actors,
@@ -122,11 +123,19 @@ function Editor({ store, drawing, loaded, assets }: {
       const place = placeAt(at);
       if (place) change({ kind: "add_actor", category: armed, spawn: place.id });
       else if (!document.roi.length) setStep("region");
+      else tell("Nobody can start here. Click on one of the points inside the region.");
     } else select([]);
   };
   const choose = (id: string, more: boolean): void => {
     if (!more) select([id]);
     else select(selection.includes(id) ? selection.filter((other) => other !== id) : [...selection, id]);
+  };
+  const showGoals = (): void => {
+    const start = one && graph.place(one.spawn);
+    const seen = start ? [start, ...(goals ?? [])] : [];
+    if (seen.length === 0) return;
+    const [xs, ys] = [seen.map((place) => place.x), seen.map((place) => place.y)];
+    handle.current?.show([Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)]);
   };
   const showProblem = (problem: Problem): void => {
     const actor = actorOfProblem(problem, document.actors);
@@ -184,6 +193,7 @@ function Editor({ store, drawing, loaded, assets }: {
               ? <><Text size="sm">Road users start inside the region. Choose the region first.</Text>
                 <Button onClick={() => openStep("region")}>Choose the region</Button></>
               : <><ActorStep assets={assets} actors={document.actors} selected={selected} armed={armed} goals={goals ? goals.length : null}
+                  onShowGoals={showGoals}
                   onArm={(category) => { setArmed(category); if (category) select([]); }} onEdit={change} onSelect={select} />
                 {document.actors.length > 0 && <Button variant="default" onClick={() => openStep("run")}>Next: run</Button>}</>,
           },

@@ -19,6 +19,8 @@ import { lamps } from "./lights";
 import { Live } from "./live";
 
 const POLL = 700;
+/** How often results are asked for after the end; a stopped run may have none. */
+const ENOUGH = 20;
 
 interface Now {
   time: number;
@@ -43,6 +45,8 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const watching = useRef<{ ego: string | null; followed: string | null }>({ ego: null, followed: null });
   const state = info?.state ?? "preparing";
   const ended = hasEnded(state);
+  // The live picture may tell of the end before the results are there.
+  const complete = ended && (info?.summary != null || state === "failed");
 
   useEffect(() => {
     const fail = (error: unknown): void => setFailure(String((error as Error).message));
@@ -57,9 +61,11 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
 
   // How the run stands; asked rarely, as the picture comes by itself.
   useEffect(() => {
-    if (ended) return;
+    if (complete) return;
     let current = true;
+    let left = ENOUGH;
     const ask = (): void => {
+      if (ended && left-- <= 0) return;
       api.run(run).then(
         (found) => { if (current) setInfo(found); },
         (error: unknown) => { if (current) setFailure(String((error as Error).message)); });
@@ -67,7 +73,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
     ask();
     const timer = setInterval(ask, POLL);
     return () => { current = false; clearInterval(timer); };
-  }, [run, ended]);
+  }, [run, ended, complete]);
 
   const draw = useCallback(() => {
     if (!last.current) return;
