@@ -40,7 +40,7 @@ test("who has left the road is followed no more", () => {
 });
 
 test("key figures that a run has not are left out", () => {
-  const figures = keyFigures({ counts: { planned: 3, arrived: 2 }, key_figures: { mean_speed: 10, mean_delay: null } });
+  const figures = keyFigures({ actors: { planned: 3, arrived: 2 }, figures: { mean_speed: 10, mean_delay: null } });
   expect(figures).toEqual([
     { label: "Planned", value: "3" }, { label: "Arrived", value: "2" }, { label: "Mean speed", value: "36 km/h" }]);
   expect(keyFigures({})).toEqual([]);

@@ -45,6 +45,9 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const watching = useRef<{ ego: string | null; followed: string | null }>({ ego: null, followed: null });
   const state = info?.state ?? "preparing";
   const ended = hasEnded(state);
+  // The last picture is still sent after the end: the connection is left to close itself.
+  const over = useRef(false);
+  useEffect(() => { over.current = ended; }, [ended]);
   // The live picture may tell of the end before the results are there.
   const complete = ended && (info?.summary != null || state === "failed");
 
@@ -87,7 +90,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   }, []);
 
   useEffect(() => {
-    if (ended || !drawing) return;
+    if (over.current || !drawing) return;
     let shown = 0;
     const states = new Map<string, string>();
     const live = new Live(run, {
@@ -106,7 +109,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
       onClose: () => undefined,
     });
     return () => live.close();
-  }, [run, ended, drawing, draw]);
+  }, [run, drawing, draw]);
 
   const bounds = useMemo(
     () => loaded && document ? segmentsBounds(loaded.graph, document.roi) : null, [loaded, document]);

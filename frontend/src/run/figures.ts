@@ -16,16 +16,17 @@ export function keyFigures(summary: Record<string, unknown>): Figure[] {
   };
   const plain = (n: number): string => n.toLocaleString("en");
   const seconds = (n: number): string => `${n.toFixed(1)} s`;
-  put("Planned", get(summary, "counts", "planned"), plain);
-  put("Arrived", get(summary, "counts", "arrived"), plain);
-  put("Still on the way", get(summary, "counts", "running"), plain);
-  put("Never got on the road", get(summary, "counts", "waiting"), plain);
-  put("Collisions", get(summary, "counts", "collisions"), plain);
-  put("Emergency stops", get(summary, "counts", "emergency_stopped"), plain);
-  put("Mean speed", get(summary, "key_figures", "mean_speed"), kmh);
-  put("Mean trip", get(summary, "key_figures", "mean_travel_time"), clock);
-  put("Mean delay", get(summary, "key_figures", "mean_delay"), seconds);
-  put("Mean walk", get(summary, "key_figures", "pedestrian_mean_travel_time"), clock);
+  put("Simulated time", get(summary, "sim_seconds"), clock);
+  put("Planned", get(summary, "actors", "planned"), plain);
+  put("Arrived", get(summary, "actors", "arrived"), plain);
+  put("Still on the way", get(summary, "actors", "running"), plain);
+  put("Never got on the road", get(summary, "actors", "waiting"), plain);
+  put("In collisions", get(summary, "actors", "collided"), plain);
+  put("Had to brake hard", get(summary, "actors", "emergency_stopped"), plain);
+  put("Mean speed", get(summary, "figures", "mean_speed"), kmh);
+  put("Mean trip", get(summary, "figures", "mean_travel_time"), clock);
+  put("Mean delay", get(summary, "figures", "mean_delay"), seconds);
+  put("Mean walk", get(summary, "figures", "pedestrian_mean_travel_time"), clock);
   return found;
 }
 
