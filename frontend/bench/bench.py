@@ -21,7 +21,15 @@ def main(server: str, name: str) -> None:
     """Serve the sources, draw, print."""
     frontend = Path(__file__).parents[1]
     vite = subprocess.Popen(
-        ["node", "node_modules/vite/bin/vite.js", "--port", str(PORT), "--strictPort", "--host", "127.0.0.1"],  # noqa: S607
+        [
+            "node",
+            "node_modules/vite/bin/vite.js",
+            "--port",
+            str(PORT),
+            "--strictPort",
+            "--host",
+            "127.0.0.1",
+        ],  # noqa: S607
         cwd=frontend,
         env={**os.environ, "ODSCEN_SERVER": server},
         stdout=subprocess.DEVNULL,

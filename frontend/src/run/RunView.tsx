@@ -111,6 +111,14 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
     return () => live.close();
   }, [run, drawing, draw]);
 
+  // A fast run may end between two pictures: nobody stays on the road who has arrived.
+  const cleared = ended && info?.progress?.running === 0;
+  useEffect(() => {
+    if (!cleared) return;
+    last.current = null;
+    handle.current?.setMoving(null);
+  }, [cleared]);
+
   const bounds = useMemo(
     () => loaded && document ? segmentsBounds(loaded.graph, document.roi) : null, [loaded, document]);
   useEffect(() => { if (bounds) handle.current?.show(bounds); }, [bounds]);
