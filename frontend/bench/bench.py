@@ -29,7 +29,7 @@ def main(server: str, name: str) -> None:
             "--strictPort",
             "--host",
             "127.0.0.1",
-        ],  # noqa: S607
+        ],
         cwd=frontend,
         env={**os.environ, "ODSCEN_SERVER": server},
         stdout=subprocess.DEVNULL,
