@@ -1,0 +1,104 @@
+import type { GraphColumns } from "../src/api/types";
+import type { PackedDrawing } from "../src/map/drawing";
+import { Graph } from "../src/map/graph";
+import { Picker } from "../src/map/picking";
+import { CanvasRenderer } from "../src/map/renderer";
+import { EMPTY_SCENE, type Moving } from "../src/map/scene";
+import { fit, panBy, type Size, type View, zoomAt } from "../src/map/view";
+
+/** Draws the map that the address names, with vehicles that move 20 times a second; see bench.py. */
+const options = new URLSearchParams(location.search);
+const map = options.get("map") ?? "Town04";
+const vehicles = Number(options.get("vehicles") ?? 2000);
+const seconds = Number(options.get("seconds") ?? 4);
+
+async function load<T>(path: string): Promise<T> {
+  return (await (await fetch(`/api/maps/${encodeURIComponent(map)}/${path}`)).json()) as T;
+}
+
+/** Vehicles on nodes of the graph, each moved along its heading. */
+function crowd(columns: GraphColumns, time: number): Moving {
+  const pose = new Float64Array(5 * vehicles);
+  const category = new Uint8Array(vehicles);
+  for (let i = 0; i < vehicles; i++) {
+    const node = Math.floor(i * 7.919 + time * 5) % columns.x.length;
+    pose.set([columns.x[node], columns.y[node], columns.hdg[node], 4.8, 1.9], 5 * i);
+    category[i] = i % 6;
+  }
+  return { count: vehicles, pose, category, flags: new Uint8Array(vehicles).fill(3), ego: 0, followed: -1 };
+}
+
+interface Figures { fps: number; busy: number; worst: number }
+
+async function during(renderer: CanvasRenderer, columns: GraphColumns, move: (k: number) => void): Promise<Figures> {
+  const began = performance.now();
+  const start = { ...renderer.stats };
+  let last = began;
+  let worst = 0;
+  let frames = 0;
+  let sent = 0;
+  return new Promise((done) => {
+    const tick = (now: number): void => {
+      if (frames > 0) worst = Math.max(worst, now - last);
+      last = now;
+      frames += 1;
+      if (now - sent >= 50) {
+        sent = now;
+        renderer.setMoving(crowd(columns, (now - began) / 1000));
+      }
+      move(frames);
+      if (now - began < 1000 * seconds) requestAnimationFrame(tick);
+      else {
+        const drawn = renderer.stats.frames - start.frames;
+        done({ fps: (1000 * frames) / (now - began), busy: (renderer.stats.busy - start.busy) / drawn, worst });
+      }
+    };
+    requestAnimationFrame(tick);
+  });
+}
+
+async function main(): Promise<void> {
+  const began = performance.now();
+  const [drawing, columns] = await Promise.all([load<PackedDrawing>("drawing"), load<GraphColumns>("graph")]);
+  const fetched = performance.now();
+  const graph = new Graph(columns);
+  const picker = new Picker(graph);
+  const host = document.getElementById("host");
+  if (!host) return;
+  const size: Size = { width: host.clientWidth, height: host.clientHeight };
+  const renderer = new CanvasRenderer(host, drawing, graph, picker);
+  renderer.setTheme(false);
+  renderer.setSize(size, 1);
+  renderer.setScene({ ...EMPTY_SCENE });
+  const whole = fit(drawing.bounds, size);
+  renderer.setView(whole);
+  const ready = performance.now();
+
+  const at = (scale: number): View => ({ x: columns.x[4000], y: columns.y[4000], scale });
+  const results: Record<string, Figures> = {};
+  const sway = (view: View) => (k: number): void => renderer.setView(panBy(view, 160 * Math.sin(k / 25), 110 * Math.sin(k / 40)));
+  results["still, whole map"] = await during(renderer, columns, () => undefined);
+  results["panning, whole map"] = await during(renderer, columns, sway(whole));
+  results["panning, 3 px/m"] = await during(renderer, columns, sway(at(3)));
+  results["panning, 12 px/m"] = await during(renderer, columns, sway(at(12)));
+  results["zooming"] = await during(renderer, columns, (k) =>
+    renderer.setView(zoomAt(at(3), size, Math.exp(1.8 * Math.sin(k / 30)), 300, 300, whole.scale)));
+
+  const picks: number[] = [];
+  for (let i = 0; i < 500; i++) {
+    const node = (i * 37) % columns.x.length;
+    const from = performance.now();
+    picker.place(columns.x[node] + 1, columns.y[node] - 1, 20, { vehicles: true, walks: true });
+    picker.segment(columns.x[node] + 3, columns.y[node] - 3, 20);
+    picks.push(performance.now() - from);
+  }
+  picks.sort((a, b) => a - b);
+  Object.assign(window, {
+    odscenBench: {
+      map, vehicles, nodes: columns.x.length, fetched: fetched - began, ready: ready - fetched, results,
+      pick: { median: picks[250], worst: picks[499] },
+    },
+  });
+}
+
+void main();

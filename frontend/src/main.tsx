@@ -1,0 +1,17 @@
+import "@mantine/core/styles.css";
+import "./ui/app.css";
+
+import { MantineProvider } from "@mantine/core";
+import { createRoot } from "react-dom/client";
+
+import { App } from "./App";
+import { theme } from "./ui/theme";
+
+const root = document.getElementById("root");
+if (root) {
+  createRoot(root).render(
+    <MantineProvider theme={theme} defaultColorScheme="auto">
+      <App />
+    </MantineProvider>,
+  );
+}

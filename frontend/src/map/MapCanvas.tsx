@@ -1,0 +1,232 @@
+import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
+import {
+  type KeyboardEvent, type PointerEvent, type ReactNode, type RefObject, useCallback, useEffect,
+  useImperativeHandle, useRef, useState,
+} from "react";
+
+import type { Bounds } from "../api/types";
+import type { PackedDrawing } from "./drawing";
+import type { Graph } from "./graph";
+import { Minimap } from "./Minimap";
+import type { Picker } from "./picking";
+import { CanvasRenderer, type MapRenderer } from "./renderer";
+import type { Moving, Scene } from "./scene";
+import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, zoomAt } from "./view";
+import { IconFit, IconMinus, IconPlus } from "../ui/icons";
+
+/** Where the pointer is, in metres, and how far a touch reaches. */
+export interface Pointed {
+  x: number;
+  y: number;
+  reach: number;
+  shift: boolean;
+}
+
+export interface MapHandle {
+  setMoving(moving: Moving | null): void;
+  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  show(bounds: Bounds): void;
+  centre(x: number, y: number): void;
+}
+
+interface Props {
+  drawing: PackedDrawing;
+  graph: Graph | null;
+  picker: Picker | null;
+  scene: Scene;
+  label: string;
+  /** Whether a click chooses something, so that the pointer is a cross. */
+  aim?: boolean;
+  handle?: RefObject<MapHandle | null>;
+  onPick?: (at: Pointed) => void;
+  onPoint?: (at: Pointed | null) => void;
+  children?: ReactNode;
+}
+
+const CLICK_SLACK = 4;
+const TOUCH = 14;
+
+/** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
+export function MapCanvas({
+  drawing, graph, picker, scene, label, aim = false, handle, onPick, onPoint, children,
+}: Props) {
+  const host = useRef<HTMLDivElement>(null);
+  const layers = useRef<HTMLDivElement>(null);
+  const renderer = useRef<MapRenderer | null>(null);
+  const view = useRef<View>({ x: 0, y: 0, scale: 1 });
+  const size = useRef<Size>({ width: 1, height: 1 });
+  const least = useRef(0.01);
+  const drag = useRef<{ x: number; y: number; moved: boolean } | null>(null);
+  const [shown, setShown] = useState<View>(view.current);
+  const [crosshair, setCrosshair] = useState(false);
+  const [ready, setReady] = useState<MapRenderer | null>(null);
+  const dark = useComputedColorScheme("light") === "dark";
+  const queued = useRef(0);
+
+  const apply = useCallback((next: View) => {
+    view.current = clampTo(next, drawing.bounds);
+    renderer.current?.setView(view.current);
+    if (!queued.current) {
+      queued.current = requestAnimationFrame(() => {
+        queued.current = 0;
+        setShown(view.current);
+      });
+    }
+  }, [drawing]);
+
+  const showAll = useCallback(() => apply(fit(drawing.bounds, size.current)), [apply, drawing]);
+
+  useEffect(() => {
+    if (!layers.current || !host.current) return;
+    const made = new CanvasRenderer(layers.current, drawing, graph, picker);
+    renderer.current = made;
+    let first = view.current.scale === 1;
+    const measure = (): void => {
+      const box = host.current?.getBoundingClientRect();
+      if (!box || box.width < 2) return;
+      size.current = { width: box.width, height: box.height };
+      made.setSize(size.current, window.devicePixelRatio || 1);
+      least.current = fit(drawing.bounds, size.current).scale * 0.6;
+      if (first) showAll();
+      else made.setView(view.current);
+      first = false;
+    };
+    const observer = new ResizeObserver(measure);
+    observer.observe(host.current);
+    measure();
+    setReady(made);
+    if (import.meta.env.MODE !== "production" || location.hash.includes("bench")) {
+      Object.assign(window, { odscenRenderer: made, odscenApply: apply });
+    }
+    return () => {
+      observer.disconnect();
+      made.destroy();
+      renderer.current = null;
+    };
+  }, [drawing, graph, picker, showAll, apply]);
+
+  useEffect(() => ready?.setTheme(dark), [ready, dark]);
+  useEffect(() => ready?.setScene(scene), [ready, scene]);
+
+  useImperativeHandle(handle, () => ({
+    setMoving: (moving) => renderer.current?.setMoving(moving),
+    setLamps: (lamps) => renderer.current?.setLamps(lamps),
+    show: (bounds) => apply(fit(bounds, size.current, 0.15)),
+    centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
+  }), [apply]);
+
+  // React's wheel listener is passive; the page must not scroll along.
+  useEffect(() => {
+    const element = host.current;
+    if (!element) return;
+    const wheel = (event: WheelEvent): void => {
+      event.preventDefault();
+      const box = element.getBoundingClientRect();
+      const step = event.deltaMode === 1 ? event.deltaY * 24 : event.deltaY;
+      const factor = Math.exp(-step * (event.ctrlKey ? 0.01 : 0.0016));
+      apply(zoomAt(view.current, size.current, factor, event.clientX - box.left, event.clientY - box.top, least.current));
+    };
+    element.addEventListener("wheel", wheel, { passive: false });
+    return () => element.removeEventListener("wheel", wheel);
+  }, [apply]);
+
+  const pointed = (sx: number, sy: number, shift: boolean): Pointed => {
+    const [x, y] = toWorld(view.current, size.current, sx, sy);
+    return { x, y, reach: TOUCH / view.current.scale, shift };
+  };
+  const local = (event: PointerEvent): [number, number] => {
+    const box = host.current?.getBoundingClientRect();
+    return [event.clientX - (box?.left ?? 0), event.clientY - (box?.top ?? 0)];
+  };
+  const zoom = (factor: number): void => {
+    const { width, height } = size.current;
+    apply(zoomAt(view.current, size.current, factor, width / 2, height / 2, least.current));
+  };
+
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.target !== event.currentTarget || event.ctrlKey || event.metaKey || event.altKey) return;
+    const step = event.shiftKey ? 12 : 60;
+    const moves: Record<string, [number, number]> = {
+      ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step],
+    };
+    const middle = (): Pointed => pointed(size.current.width / 2, size.current.height / 2, event.shiftKey);
+    if (moves[event.key]) {
+      apply(panBy(view.current, ...moves[event.key]));
+      onPoint?.(middle());
+    } else if (event.key === "+" || event.key === "=") zoom(1.4);
+    else if (event.key === "-") zoom(1 / 1.4);
+    else if (event.key === "0" || event.key === "Home") showAll();
+    else if (event.key === "Enter" || event.key === " ") onPick?.(middle());
+    else return;
+    setCrosshair(true);
+    event.preventDefault();
+  };
+
+  const bar = scaleBar(shown.scale, 110);
+  return (
+    <div
+      ref={host}
+      className="map"
+      data-aim={aim}
+      role="application"
+      tabIndex={0}
+      aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
+      onKeyDown={onKeyDown}
+      onBlur={() => setCrosshair(false)}
+      onPointerDown={(event) => {
+        if (event.button > 1) return;
+        setCrosshair(false);
+        event.currentTarget.setPointerCapture(event.pointerId);
+        const [x, y] = local(event);
+        drag.current = { x, y, moved: false };
+      }}
+      onPointerMove={(event) => {
+        const [x, y] = local(event);
+        const held = drag.current;
+        if (!held) {
+          onPoint?.(pointed(x, y, event.shiftKey));
+          return;
+        }
+        if (!held.moved && Math.hypot(x - held.x, y - held.y) < CLICK_SLACK) return;
+        apply(panBy(view.current, x - held.x, y - held.y));
+        drag.current = { x, y, moved: true };
+      }}
+      onPointerUp={(event) => {
+        const held = drag.current;
+        drag.current = null;
+        if (held && !held.moved && event.button === 0) onPick?.(pointed(held.x, held.y, event.shiftKey));
+      }}
+      onPointerCancel={() => { drag.current = null; }}
+      onPointerLeave={() => { if (!drag.current) onPoint?.(null); }}
+    >
+      <div ref={layers} className="map-layers" />
+      {crosshair && <div className="map-crosshair" aria-hidden="true" />}
+      {/* Controls lie on the map but are not the map. */}
+      <div
+        className="map-controls"
+        onPointerDown={(event) => event.stopPropagation()}
+        onPointerMove={(event) => { event.stopPropagation(); }}
+      >
+        {ready && <Minimap renderer={ready} bounds={drawing.bounds} view={shown} size={size.current} dark={dark}
+          onMove={(x, y) => apply({ ...view.current, x, y })} />}
+        <div className="map-buttons">
+          <MapButton label="Zoom in" onClick={() => zoom(1.5)}><IconPlus /></MapButton>
+          <MapButton label="Zoom out" onClick={() => zoom(1 / 1.5)}><IconMinus /></MapButton>
+          <MapButton label="Show the whole map" onClick={showAll}><IconFit /></MapButton>
+        </div>
+      </div>
+      <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
+        {bar >= 1000 ? `${bar / 1000} km` : `${bar} m`}
+      </div>
+      {children}
+    </div>
+  );
+}
+
+function MapButton({ label, onClick, children }: { label: string; onClick: () => void; children: ReactNode }) {
+  return (
+    <Tooltip label={label} position="left">
+      <ActionIcon variant="default" size="lg" aria-label={label} onClick={onClick}>{children}</ActionIcon>
+    </Tooltip>
+  );
+}

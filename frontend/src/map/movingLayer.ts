@@ -1,0 +1,153 @@
+import { CATEGORIES } from "../api/types";
+import { CATEGORY_COLOR, EGO, type Palette } from "./colors";
+import type { Moving } from "./scene";
+import { type Size, type View, visible } from "./view";
+
+/** As the server numbers them. */
+export const FLAG_LEFT = 1;
+export const FLAG_RIGHT = 2;
+export const FLAG_BRAKE = 4;
+
+/** No road user is drawn shorter than this many pixels, so that a whole town can be watched. */
+const LEAST = 5;
+const OUTLINE_FROM = 4;
+const DETAIL_FROM = 6;
+
+/** Road users of a run, drawn many at once: one path per category. */
+export class MovingLayer {
+  lamps: readonly { x: number; y: number; color: string }[] = [];
+
+  draw(
+    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    moving: Moving | null,
+  ): void {
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, context.canvas.width, context.canvas.height);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.drawLamps(context, view, size);
+    if (!moving) return;
+    const rows = byCategory(moving, view, size);
+    rows.forEach((of, n) => {
+      if (of.length === 0) return;
+      context.fillStyle = CATEGORY_COLOR[CATEGORIES[n]];
+      context.beginPath();
+      for (const row of of) outline(context, moving, row, view, size);
+      context.fill();
+      if (view.scale >= OUTLINE_FROM) {
+        context.strokeStyle = palette.paper;
+        context.lineWidth = 1;
+        context.stroke();
+      }
+      if (view.scale >= DETAIL_FROM && CATEGORIES[n] !== "pedestrian") {
+        for (const row of of) details(context, moving, row, view, size);
+      }
+    });
+    if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
+    if (moving.followed >= 0) mark(context, moving, moving.followed, view, size, palette.ink);
+  }
+
+  private drawLamps(context: CanvasRenderingContext2D, view: View, size: Size): void {
+    const radius = Math.min(Math.max(view.scale * 1.3, 3), 11);
+    for (const { x, y, color } of this.lamps) {
+      context.beginPath();
+      context.arc(
+        (x - view.x) * view.scale + size.width / 2, (view.y - y) * view.scale + size.height / 2,
+        radius, 0, 2 * Math.PI,
+      );
+      context.fillStyle = color;
+      context.fill();
+      context.lineWidth = 1.5;
+      context.strokeStyle = "#22262b";
+      context.stroke();
+    }
+  }
+}
+
+function byCategory(moving: Moving, view: View, size: Size): number[][] {
+  const [x0, y0, x1, y1] = visible(view, size);
+  const slack = 12;
+  const rows: number[][] = CATEGORIES.map(() => []);
+  for (let i = 0; i < moving.count; i++) {
+    const x = moving.pose[5 * i];
+    const y = moving.pose[5 * i + 1];
+    if (x > x0 - slack && x < x1 + slack && y > y0 - slack && y < y1 + slack) {
+      rows[moving.category[i]].push(i);
+    }
+  }
+  return rows;
+}
+
+/** A body seen from above, its front cut to a blunt wedge so that the heading shows. */
+function outline(
+  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+): void {
+  const { pose } = moving;
+  const p = 5 * row;
+  const hdg = pose[p + 2];
+  const k = Math.max(view.scale, LEAST / Math.max(pose[p + 3], 0.9));
+  const half = (pose[p + 3] / 2) * k;
+  const side = (pose[p + 4] / 2) * k;
+  const x = (pose[p] - view.x) * view.scale + size.width / 2;
+  const y = (view.y - pose[p + 1]) * view.scale + size.height / 2;
+  const cos = Math.cos(hdg);
+  const sin = Math.sin(hdg);
+  const nose = half - Math.min(side * 0.7, half);
+  context.moveTo(x - half * cos - side * sin, y + half * sin - side * cos);
+  context.lineTo(x + nose * cos - side * sin, y - nose * sin - side * cos);
+  context.lineTo(x + half * cos - side * 0.45 * sin, y - half * sin - side * 0.45 * cos);
+  context.lineTo(x + half * cos + side * 0.45 * sin, y - half * sin + side * 0.45 * cos);
+  context.lineTo(x + nose * cos + side * sin, y - nose * sin + side * cos);
+  context.lineTo(x - half * cos + side * sin, y + half * sin + side * cos);
+  context.closePath();
+}
+
+/** Windscreen, brake lights and indicators. */
+function details(
+  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+): void {
+  const { pose } = moving;
+  const p = 5 * row;
+  const half = pose[p + 3] / 2;
+  const side = pose[p + 4] / 2;
+  const flags = moving.flags[row];
+  context.save();
+  context.translate(
+    (pose[p] - view.x) * view.scale + size.width / 2,
+    (view.y - pose[p + 1]) * view.scale + size.height / 2,
+  );
+  context.rotate(-pose[p + 2]);
+  context.scale(view.scale, view.scale);
+  if (side > 0.6) {
+    context.fillStyle = "#10202caa";
+    context.fillRect(half * 0.35, -side * 0.8, Math.min(0.9, half * 0.3), side * 1.6);
+  }
+  const lamp = Math.min(0.45, side * 0.6);
+  if (flags & FLAG_BRAKE) {
+    context.fillStyle = "#ff2a1f";
+    context.fillRect(-half, -side, lamp * 0.7, lamp);
+    context.fillRect(-half, side - lamp, lamp * 0.7, lamp);
+  }
+  context.fillStyle = "#ffab00";
+  if (flags & FLAG_LEFT) corners(context, half, -side, lamp);
+  if (flags & FLAG_RIGHT) corners(context, half, side - lamp, lamp);
+  context.restore();
+}
+
+function corners(context: CanvasRenderingContext2D, half: number, y: number, lamp: number): void {
+  context.fillRect(half - lamp, y, lamp, lamp);
+  context.fillRect(-half, y, lamp, lamp);
+}
+
+function mark(
+  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  color: string,
+): void {
+  const p = 5 * row;
+  const x = (moving.pose[p] - view.x) * view.scale + size.width / 2;
+  const y = (view.y - moving.pose[p + 1]) * view.scale + size.height / 2;
+  context.strokeStyle = color;
+  context.lineWidth = 2.5;
+  context.beginPath();
+  context.arc(x, y, Math.max(11, moving.pose[p + 3] * 0.75 * view.scale), 0, 2 * Math.PI);
+  context.stroke();
+}

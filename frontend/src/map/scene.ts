@@ -1,0 +1,55 @@
+import type { Category } from "../api/types";
+import type { Place } from "./graph";
+
+export type SegmentStyle = "base" | "member" | "eligible" | "problem";
+
+export interface SceneActor {
+  id: string;
+  category: Category;
+  x: number;
+  y: number;
+  hdg: number;
+  length: number;
+  width: number;
+  ego: boolean;
+  selected: boolean;
+  problem: boolean;
+}
+
+/** Everything of a scenario that is drawn on the map, ready to draw. */
+export interface Scene {
+  segments: ReadonlyMap<number, SegmentStyle>;
+  hoverSegment: number | null;
+  /** Which places are shown when near. */
+  nodes: { vehicles: boolean; walks: boolean; inside: ReadonlySet<number> | null };
+  actors: readonly SceneActor[];
+  goals: readonly Place[];
+  chosenGoal: Place | null;
+  path: readonly (readonly [number, number])[];
+  hover: Place | null;
+  hoverCategory: Category | null;
+}
+
+export const EMPTY_SCENE: Scene = {
+  segments: new Map(),
+  hoverSegment: null,
+  nodes: { vehicles: true, walks: true, inside: null },
+  actors: [],
+  goals: [],
+  chosenGoal: null,
+  path: [],
+  hover: null,
+  hoverCategory: null,
+};
+
+/** Road users at one moment: columns, so that thousands cost little. */
+export interface Moving {
+  count: number;
+  /** Five numbers each: x, y, hdg, length, width. */
+  pose: Float64Array;
+  category: Uint8Array;
+  flags: Uint8Array;
+  /** Row of the road user to be marked as ego, or -1. */
+  ego: number;
+  followed: number;
+}

@@ -1,0 +1,310 @@
+import {
+  CATEGORY_COLOR, EGO, ELIGIBLE, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, RELATION, ROI_BASE,
+  ROI_MEMBER, VEHICLE_NODE,
+} from "./colors";
+import { GLYPHS } from "./glyphs";
+import { type Graph, type Place, segmentBounds, strips } from "./graph";
+import type { Picker } from "./picking";
+import type { Scene, SceneActor, SegmentStyle } from "./scene";
+import { overlaps, type Size, type View, visible, worldTransform } from "./view";
+import type { Bounds, Category } from "../api/types";
+
+const NODES_FROM = 2.6;
+const EDGES_FROM = 7;
+
+const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
+  base: { fill: ROI_BASE, alpha: 0.72 },
+  member: { fill: ROI_MEMBER, alpha: 0.55 },
+  eligible: { fill: ELIGIBLE, alpha: 0.55 },
+  problem: { fill: PROBLEM, alpha: 0.6 },
+};
+
+/** What the user has made of the map: region, places, actors, goals and ways. */
+export class SceneLayer {
+  private readonly segments: Path2D[] = [];
+  private readonly bounds: Bounds[] = [];
+  private readonly glyphs: Record<Category, Path2D>;
+
+  constructor(private readonly graph: Graph | null, private readonly picker: Picker | null) {
+    this.glyphs = Object.fromEntries(
+      Object.entries(GLYPHS).map(([name, path]) => [name, new Path2D(path)]),
+    ) as Record<Category, Path2D>;
+    if (!graph) return;
+    this.bounds = segmentBounds(graph.columns);
+    this.segments = graph.columns.segments.map(() => new Path2D());
+    for (const { segment, ring } of strips(graph.columns)) addRing(this.segments[segment], ring);
+  }
+
+  draw(
+    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    scene: Scene,
+  ): void {
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, context.canvas.width, context.canvas.height);
+    worldTransform(context, view, size, ratio);
+    this.drawSegments(context, view, size, scene);
+    if (this.graph && this.picker && view.scale >= NODES_FROM) {
+      this.drawGraph(context, view, size, scene, palette);
+    }
+    drawPath(context, view, scene);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const at = (x: number, y: number): [number, number] => [
+      (x - view.x) * view.scale + size.width / 2,
+      (view.y - y) * view.scale + size.height / 2,
+    ];
+    for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
+    if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
+    if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
+    for (const actor of scene.actors) this.drawActor(context, at(actor.x, actor.y), view, actor, palette);
+  }
+
+  private drawSegments(
+    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene,
+  ): void {
+    const seen = visible(view, size);
+    for (const [row, style] of scene.segments) {
+      if (!this.segments[row] || !overlaps(this.bounds[row], seen)) continue;
+      context.globalAlpha = SEGMENT[style].alpha;
+      context.fillStyle = SEGMENT[style].fill;
+      context.fill(this.segments[row]);
+    }
+    context.globalAlpha = 1;
+    if (scene.hoverSegment !== null && this.segments[scene.hoverSegment]) {
+      context.fillStyle = "#ffffff55";
+      context.strokeStyle = ROI_BASE;
+      context.lineWidth = 1.5 / view.scale;
+      context.fill(this.segments[scene.hoverSegment]);
+      context.stroke(this.segments[scene.hoverSegment]);
+    }
+  }
+
+  private drawGraph(
+    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene, palette: Palette,
+  ): void {
+    if (!this.graph || !this.picker) return;
+    const { columns } = this.graph;
+    const { inside } = scene.nodes;
+    const seen = visible(view, size);
+    if (scene.nodes.vehicles) {
+      const rows = this.picker.within(...seen, false)
+        .filter((i) => !inside || inside.has(columns.segment[i]));
+      if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette);
+      dots(context, view, columns, rows, VEHICLE_NODE);
+    }
+    if (scene.nodes.walks) {
+      const { walks } = columns;
+      const rows = this.picker.within(...seen, true)
+        .filter((i) => !inside || inside.has(walks.segment[i]));
+      if (view.scale >= EDGES_FROM) drawWalkEdges(context, view, this.graph, new Set(rows));
+      dots(context, view, walks, rows, PEDESTRIAN_NODE);
+    }
+  }
+
+  private drawEdges(
+    context: CanvasRenderingContext2D, view: View, rows: Set<number>, palette: Palette,
+  ): void {
+    if (!this.graph) return;
+    const { columns } = this.graph;
+    const { source, target, relation } = columns.edges;
+    const paths = RELATION.map(() => new Path2D());
+    for (let e = 0; e < source.length; e++) {
+      if (!rows.has(source[e])) continue;
+      const path = paths[relation[e]];
+      path.moveTo(columns.x[source[e]], columns.y[source[e]]);
+      path.lineTo(columns.x[target[e]], columns.y[target[e]]);
+    }
+    context.lineWidth = 1.1 / view.scale;
+    paths.forEach((path, n) => {
+      context.strokeStyle = n === 0 ? palette.successor : RELATION[n];
+      context.globalAlpha = 0.75;
+      context.stroke(path);
+    });
+    context.globalAlpha = 1;
+  }
+
+  private drawHover(
+    context: CanvasRenderingContext2D, at: (x: number, y: number) => [number, number], view: View,
+    place: Place, category: Category | null,
+  ): void {
+    const [x, y] = at(place.x, place.y);
+    const color = place.walk ? PEDESTRIAN_NODE : VEHICLE_NODE;
+    context.save();
+    context.translate(x, y);
+    context.rotate(-place.hdg);
+    context.strokeStyle = color;
+    context.fillStyle = `${color}66`;
+    context.lineWidth = 2.5;
+    context.beginPath();
+    context.arc(0, 0, 9, 0, 2 * Math.PI);
+    context.fill();
+    context.stroke();
+    if (!place.walk) {
+      const tip = Math.max(26, 4 * view.scale);
+      context.beginPath();
+      context.moveTo(9, 0);
+      context.lineTo(tip, 0);
+      context.moveTo(tip - 7, -5);
+      context.lineTo(tip, 0);
+      context.lineTo(tip - 7, 5);
+      context.stroke();
+    }
+    context.restore();
+    if (category) {
+      context.globalAlpha = 0.85;
+      badge(context, this.glyphs[category], x, y - 26, 13, CATEGORY_COLOR[category], category);
+      context.globalAlpha = 1;
+    }
+  }
+
+  private drawActor(
+    context: CanvasRenderingContext2D, [x, y]: [number, number], view: View, actor: SceneActor,
+    palette: Palette,
+  ): void {
+    const color = CATEGORY_COLOR[actor.category];
+    const near = actor.length * view.scale > 10;
+    if (near) body(context, x, y, view, actor, color);
+    const lift = near ? Math.max(20, actor.width * view.scale * 0.5 + 18) : 0;
+    const radius = actor.selected ? 14 : 12;
+    if (actor.selected || actor.ego || actor.problem) {
+      context.beginPath();
+      context.arc(x, y - lift, radius + 3, 0, 2 * Math.PI);
+      context.fillStyle = actor.problem ? PROBLEM : actor.ego ? EGO : palette.ink;
+      context.fill();
+    }
+    badge(context, this.glyphs[actor.category], x, y - lift, radius, color, actor.category);
+    if (actor.ego) tag(context, "EGO", x, y - lift - radius - 11);
+    else if (actor.selected) tag(context, actor.id, x, y - lift - radius - 11);
+  }
+}
+
+function addRing(path: Path2D, ring: Float64Array): void {
+  path.moveTo(ring[0], ring[1]);
+  for (let i = 2; i < ring.length; i += 2) path.lineTo(ring[i], ring[i + 1]);
+  path.closePath();
+}
+
+function dots(
+  context: CanvasRenderingContext2D, view: View, at: { x: number[]; y: number[] }, rows: number[],
+  color: string,
+): void {
+  const r = Math.min(Math.max(1.5, view.scale * 0.3), 6) / view.scale;
+  context.fillStyle = color;
+  context.beginPath();
+  for (const i of rows) {
+    if (view.scale < 5) context.rect(at.x[i] - r, at.y[i] - r, 2 * r, 2 * r);
+    else {
+      context.moveTo(at.x[i] + r, at.y[i]);
+      context.arc(at.x[i], at.y[i], r, 0, 2 * Math.PI);
+    }
+  }
+  context.fill();
+}
+
+function drawWalkEdges(
+  context: CanvasRenderingContext2D, view: View, graph: Graph, rows: Set<number>,
+): void {
+  const { walks } = graph.columns;
+  context.beginPath();
+  for (let e = 0; e < walks.source.length; e++) {
+    if (!rows.has(walks.source[e])) continue;
+    context.moveTo(walks.x[walks.source[e]], walks.y[walks.source[e]]);
+    context.lineTo(walks.x[walks.target[e]], walks.y[walks.target[e]]);
+  }
+  context.strokeStyle = "#a58a00";
+  context.lineWidth = 1.1 / view.scale;
+  context.stroke();
+}
+
+function drawPath(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
+  if (scene.path.length < 2) return;
+  context.beginPath();
+  scene.path.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.lineCap = "round";
+  context.lineJoin = "round";
+  context.strokeStyle = "#ffffff";
+  context.lineWidth = Math.max(1.3, 7 / view.scale);
+  context.stroke();
+  context.strokeStyle = "#1f9bf0";
+  context.lineWidth = Math.max(0.8, 4 / view.scale);
+  context.stroke();
+}
+
+function drawGoal(
+  context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean,
+): void {
+  context.beginPath();
+  context.arc(x, y, chosen ? 10 : 7, 0, 2 * Math.PI);
+  context.fillStyle = GOAL;
+  context.fill();
+  context.lineWidth = 2.5;
+  context.strokeStyle = chosen ? ROI_BASE : "#ffffff";
+  context.stroke();
+  if (!chosen) return;
+  context.beginPath();
+  context.moveTo(x - 2.500, y + 5);
+  context.lineTo(x - 2.500, y - 6);
+  context.lineTo(x + 5, y - 3);
+  context.lineTo(x - 2.500, y);
+  context.fillStyle = ROI_BASE;
+  context.fill();
+  context.lineWidth = 1.500;
+  context.stroke();
+}
+
+function body(
+  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, color: string,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.rotate(-actor.hdg);
+  const l = actor.length * view.scale;
+  const w = actor.width * view.scale;
+  context.fillStyle = color;
+  context.strokeStyle = "#ffffff";
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(-l / 2, -w / 2);
+  context.lineTo(l / 2 - w * 0.35, -w / 2);
+  context.lineTo(l / 2, -w * 0.22);
+  context.lineTo(l / 2, w * 0.22);
+  context.lineTo(l / 2 - w * 0.35, w / 2);
+  context.lineTo(-l / 2, w / 2);
+  context.closePath();
+  context.fill();
+  context.stroke();
+  context.restore();
+}
+
+function badge(
+  context: CanvasRenderingContext2D, glyph: Path2D, x: number, y: number, radius: number,
+  color: string, category: Category,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.beginPath();
+  context.arc(0, 0, radius, 0, 2 * Math.PI);
+  context.fillStyle = color;
+  context.fill();
+  context.lineWidth = 1.5;
+  context.strokeStyle = "#ffffff";
+  context.stroke();
+  const k = (radius * 1.45) / 24;
+  context.scale(k, k);
+  context.translate(-12, -12);
+  context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
+  context.fill(glyph, "evenodd");
+  context.restore();
+}
+
+function tag(context: CanvasRenderingContext2D, text: string, x: number, y: number): void {
+  context.font = "600 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const width = context.measureText(text).width + 10;
+  context.fillStyle = "#22282e";
+  context.beginPath();
+  context.roundRect(x - width / 2, y - 8, width, 16, 8);
+  context.fill();
+  context.fillStyle = "#ffffff";
+  context.fillText(text, x, y + 0.5);
+}

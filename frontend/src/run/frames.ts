@@ -1,0 +1,92 @@
+import { CATEGORIES, type Category } from "../api/types";
+import type { Moving } from "../map/scene";
+
+/** A road user as the server introduces it, once. */
+export interface Introduced {
+  index: number;
+  id: string;
+  category: Category;
+  length: number;
+  width: number;
+  ego?: boolean;
+}
+
+/** One moment of a run; `rows` holds six numbers for each: index, x, y, hdg, speed, flags. */
+export interface Frame {
+  step: number;
+  time: number;
+  count: number;
+  /** Simulated seconds per second. */
+  pace: number;
+  arrived: number;
+  rows: Float32Array;
+}
+
+const HEADER = 5;
+const ROW = 6;
+
+/** Reads a binary frame: little-endian float32, a header of five numbers, then six for each. */
+export function decodeFrame(data: ArrayBuffer): Frame {
+  if (data.byteLength % 4 !== 0 || data.byteLength < 4 * HEADER) {
+    throw new Error(`a frame of ${data.byteLength} bytes cannot be read`);
+  }
+  const all = floats(data);
+  const count = all[2];
+  if (all.length !== HEADER + ROW * count) {
+    throw new Error(`a frame for ${count} road users has ${all.length} numbers`);
+  }
+  return { step: all[0], time: all[1], count, pace: all[3], arrived: all[4], rows: all.subarray(HEADER) };
+}
+
+const LITTLE = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1;
+
+function floats(data: ArrayBuffer): Float32Array {
+  if (LITTLE) return new Float32Array(data);
+  const view = new DataView(data);
+  return Float32Array.from({ length: data.byteLength / 4 }, (_, i) => view.getFloat32(4 * i, true));
+}
+
+/** Joins frames with what is known of each road user. */
+export class Crowd {
+  private readonly known = new Map<number, Introduced>();
+  private readonly rowOf = new Map<string, number>();
+  /** Added to all places of frames, which are too short for maps far from zero; metres. */
+  origin: readonly [number, number] = [0, 0];
+
+  introduce(actors: readonly Introduced[]): void {
+    for (const actor of actors) this.known.set(actor.index, actor);
+  }
+
+  named(index: number): Introduced | undefined {
+    return this.known.get(index);
+  }
+
+  /** Row of a road user in the last frame that was {@link arrange}d. */
+  row(id: string | null): number {
+    return id === null ? -1 : (this.rowOf.get(id) ?? -1);
+  }
+
+  /** The frame as it is drawn; whoever has not been introduced yet is left out. */
+  arrange(frame: Frame, ego: string | null, followed: string | null): Moving {
+    const pose = new Float64Array(5 * frame.count);
+    const category = new Uint8Array(frame.count);
+    const flags = new Uint8Array(frame.count);
+    let count = 0;
+    this.rowOf.clear();
+    for (let i = 0; i < frame.count; i++) {
+      const at = ROW * i;
+      const who = this.known.get(frame.rows[at]);
+      if (!who) continue;
+      pose[5 * count] = frame.rows[at + 1] + this.origin[0];
+      pose[5 * count + 1] = frame.rows[at + 2] + this.origin[1];
+      pose[5 * count + 2] = frame.rows[at + 3];
+      pose[5 * count + 3] = who.length;
+      pose[5 * count + 4] = who.width;
+      category[count] = Math.max(CATEGORIES.indexOf(who.category), 0);
+      flags[count] = frame.rows[at + 5];
+      this.rowOf.set(who.id, count);
+      count += 1;
+    }
+    return { count, pose, category, flags, ego: this.row(ego), followed: this.row(followed) };
+  }
+}

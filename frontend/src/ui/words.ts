@@ -1,0 +1,68 @@
+import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types";
+
+/** Words for people: no term of any standard or simulator on the page. */
+export const CATEGORY_WORD: Record<Category, string> = {
+  car: "Car", van: "Van", truck: "Truck", bus: "Bus", motorcycle: "Motorcycle",
+  bicycle: "Bicycle", pedestrian: "Pedestrian",
+};
+
+export const STYLE_WORD: Record<Style, string> = {
+  cautious: "Cautious", normal: "Normal", sporty: "Sporty",
+};
+
+const KIND_WORD: Record<string, string> = {
+  clear: "Clear", cloudy: "Cloudy", wet: "Wet roads", rain_light: "Light rain",
+  rain_medium: "Rain", rain_heavy: "Heavy rain", fog: "Fog", dust: "Dust",
+};
+const TIME_WORD = { day: "day", sunset: "sunset", night: "night" } as const;
+
+export const weatherWord = (preset: WeatherPreset): string =>
+  `${kindWord(preset.kind)}, ${TIME_WORD[preset.time_of_day]}`;
+export const kindWord = (kind: string): string => KIND_WORD[kind] ?? kind.replaceAll("_", " ");
+
+const PARAMETER_WORD: Record<string, string> = {
+  cloudiness: "Clouds", precipitation: "Rain", precipitation_deposits: "Puddles",
+  wind_intensity: "Wind", sun_azimuth_angle: "Direction of the sun",
+  sun_altitude_angle: "Height of the sun", fog_density: "Fog", fog_distance: "Fog begins after",
+  wetness: "Wetness of the road", dust_storm: "Dust",
+};
+/** Parameters that a person can imagine, in this order; the others only matter to a picture. */
+export const PARAMETERS = Object.entries(PARAMETER_WORD).map(([name, word]) => ({ name, word }));
+
+export const modelWord = (id: string): string =>
+  id.replace(/^(vehicle|walker)\.(pedestrian\.)?/, "").replaceAll(/[._]/g, " ")
+    .replace(/^0/, "Person 0").replace(/\b\w/g, (c) => c.toUpperCase());
+
+export function length(metres: number): string {
+  if (metres >= 10_000) return `${(metres / 1000).toFixed(0)} km`;
+  return metres >= 1000 ? `${(metres / 1000).toFixed(1)} km` : `${metres.toFixed(0)} m`;
+}
+
+export const kmh = (speed: number): string => `${Math.round(speed * 3.6)} km/h`;
+
+export function clock(seconds: number): string {
+  const s = Math.max(0, seconds);
+  const minutes = Math.floor(s / 60);
+  return `${minutes}:${(s - 60 * minutes).toFixed(1).padStart(4, "0")}`;
+}
+
+export const count = (n: number, one: string, many = `${one}s`): string =>
+  `${n.toLocaleString("en")} ${n === 1 ? one : many}`;
+
+export function mapFacts(s: MapStatistics): string[] {
+  const [x0, y0, x1, y1] = s.bounds;
+  const facts = [
+    `${length(x1 - x0)} × ${length(y1 - y0)}`,
+    `${length(s.driving_lane_length)} of lanes`,
+    count(s.junctions, "junction"),
+    count(s.crosswalks, "crosswalk"),
+    count(s.traffic_lights, "traffic light"),
+  ];
+  if (s.stop_signs) facts.push(count(s.stop_signs, "stop sign"));
+  if (s.speed_limit_min !== null && s.speed_limit_max !== null) {
+    const [low, high] = [kmh(s.speed_limit_min), kmh(s.speed_limit_max)];
+    facts.push(low === high ? `limit ${low}` : `limits ${Math.round(s.speed_limit_min * 3.6)}–${high}`);
+  }
+  if (s.rule === "LHT") facts.push("left-hand traffic");
+  return facts;
+}

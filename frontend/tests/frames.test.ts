@@ -1,0 +1,52 @@
+import { expect, test } from "vitest";
+
+import { hasEnded, keyFigures } from "../src/run/figures";
+import { Crowd, decodeFrame } from "../src/run/frames";
+
+const frame = (...numbers: number[]): ArrayBuffer => new Float32Array(numbers).buffer;
+const two = frame(7, 3.5, 2, 1.25, 4, 11, 100, 200, 1.5, 8, 1, 12, -5, 6, 0, 1, 0);
+
+test("a frame is read as it was sent", () => {
+  const found = decodeFrame(two);
+  expect(found).toMatchObject({ step: 7, time: 3.5, count: 2, pace: 1.25, arrived: 4 });
+  expect([...found.rows.subarray(0, 6)]).toEqual([11, 100, 200, 1.5, 8, 1]);
+});
+
+test("an empty road is a frame too", () => {
+  expect(decodeFrame(frame(0, 0, 0, 0, 0)).count).toBe(0);
+});
+
+test("a frame that does not add up is refused", () => {
+  expect(() => decodeFrame(frame(7, 3.5, 2, 1, 4, 11))).toThrow("2 road users");
+  expect(() => decodeFrame(new ArrayBuffer(7))).toThrow("7 bytes");
+});
+
+test("who has not been introduced is not drawn, the others have their true size", () => {
+  const crowd = new Crowd();
+  crowd.introduce([{ index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25 }]);
+  const moving = crowd.arrange(decodeFrame(two), null, "walker");
+  expect(moving.count).toBe(1);
+  expect([...moving.pose.subarray(0, 5)]).toEqual([-5, 6, 0, 0.5, 0.25]);
+  expect(moving.category[0]).toBe(6);
+  expect(moving.followed).toBe(0);
+  expect(moving.ego).toBe(-1);
+});
+
+test("who has left the road is followed no more", () => {
+  const crowd = new Crowd();
+  crowd.introduce([{ index: 11, id: "car-1", category: "car", length: 5, width: 2 }]);
+  expect(crowd.arrange(decodeFrame(two), "car-1", null).ego).toBe(0);
+  expect(crowd.arrange(decodeFrame(frame(8, 4, 0, 1, 5)), "car-1", null).ego).toBe(-1);
+});
+
+test("key figures that a run has not are left out", () => {
+  const figures = keyFigures({ actors: { planned: 3, arrived: 2 }, figures: { mean_speed: 10, mean_delay: null } });
+  expect(figures).toEqual([
+    { label: "Planned", value: "3" }, { label: "Arrived", value: "2" }, { label: "Mean speed", value: "36 km/h" }]);
+  expect(keyFigures({})).toEqual([]);
+});
+
+test("only final states end a run", () => {
+  expect(["completed", "stopped", "failed"].every(hasEnded)).toBe(true);
+  expect(["preparing", "running", "paused", "finishing"].some(hasEnded)).toBe(false);
+});
