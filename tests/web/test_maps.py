@@ -14,9 +14,8 @@ from odscen.lanegraph.query import node_ids
 from odscen.web.app import create_app
 from tests.web.conftest import CROSSING, SHIPPED, job
 
-BOMB = """<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "boom">%s]><OpenDRIVE>&b9;</OpenDRIVE>""" % (
-    "".join(f'<!ENTITY b{i} "{f"&b{i - 1 or str()};" * 10}">' for i in range(1, 10))
-)
+_ENTITIES = "".join(f'<!ENTITY b{i} "{f"&b{i - 1};" * 10}">' for i in range(1, 10))
+BOMB = f'<!DOCTYPE a [<!ENTITY b0 "boom">{_ENTITIES}]><OpenDRIVE>&b9;</OpenDRIVE>'
 
 
 def upload(client: TestClient, content: bytes, file: str = "m.xodr", **form: str) -> object:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -170,11 +171,12 @@ def test_a_run_is_paused_stepped_sped_up_and_stopped(
 
 def test_the_pace_is_kept(client: TestClient, sampled: str) -> None:
     run = start(client, sampled, speed=10, until=20)
-    times = []
     with client.websocket_connect(f"/api/runs/{run}/live") as socket:
-        for message in messages(socket):
-            if isinstance(message, np.ndarray):
-                times.append((time.monotonic(), float(message[1])))
+        times = [
+            (time.monotonic(), float(message[1]))
+            for message in messages(socket)
+            if isinstance(message, np.ndarray)
+        ]
     wall, simulated = times[-2][0] - times[2][0], times[-2][1] - times[2][1]
     assert simulated / wall == pytest.approx(10, rel=0.15)
 
@@ -301,7 +303,7 @@ def test_a_slow_client_gets_the_newest_frame_and_only_that(served: str, sampled:
                 time.sleep(0.5)
                 socket.send("ack")
     httpx2.post(f"{url}/runs/{run}/control", json={"action": "stop"})
-    assert all(b - a > 8 for a, b in zip(steps[1:], steps[2:], strict=False))
+    assert all(b - a > 8 for a, b in itertools.pairwise(steps[1:]))
 
 
 def test_several_run_at_once_and_the_end_of_the_server_is_their_end(

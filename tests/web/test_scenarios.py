@@ -240,8 +240,9 @@ def test_scenarios_are_listed_renamed_downloaded_uploaded_and_removed(
     assert client.delete("/api/scenarios/kept").status_code == 404
 
 
+@pytest.mark.usefixtures("new")
 def test_a_broken_file_is_listed_as_such_and_harms_no_other(
-    client: TestClient, workspace: Workspace, new: str
+    client: TestClient, workspace: Workspace
 ) -> None:
     (workspace.scenarios / "bad.scenario.json").write_text("{}")
     (workspace.scenarios / "not a name.scenario.json").write_text("{}")

@@ -206,7 +206,7 @@ class Goals(Answer):
 
 
 class Path(Answer):
-    """Shortest way inside the region, ``points`` are [x, y] of its nodes; empty if there is none."""
+    """Shortest way inside the region, with [x, y] of its nodes; empty if there is none."""
 
     nodes: list[str]
     points: list[tuple[float, float]]

@@ -1,0 +1,75 @@
+"""The OpenAPI schema against the server: no 5xx, and no answer that is not in the schema."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, settings
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import (
+    content_type_conformance,
+    response_schema_conformance,
+    status_code_conformance,
+)
+
+from odscen import workflow
+from odscen.catalog.store import Workspace
+from odscen.web.app import create_app
+from tests.web.conftest import CROSSING
+
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_schema_conformance,
+]
+OPERATIONS = [
+    (path, method)
+    for path, methods in create_app(Workspace(Path("nowhere"))).openapi()["paths"].items()
+    for method in methods
+    if path != "/api/maps/shipped"  # would build seven maps, again and again
+]
+
+
+@asynccontextmanager
+async def _kept(_app: object) -> AsyncIterator[None]:
+    yield
+
+
+@pytest.fixture(scope="module")
+def schema(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    root = tmp_path_factory.mktemp("schema") / "workspace"
+    shutil.copytree(built, root)
+    workspace = Workspace.open(root)
+    workflow.generate(workspace, map_name=CROSSING, seed=1, fill=0.1)
+    app = create_app(workspace, hosts=None)
+    app.router.lifespan_context = _kept  # schemathesis starts and ends the app for each request
+    yield schemathesis.openapi.from_asgi("/api/openapi.json", app)
+    app.state.services.close()
+
+
+@pytest.mark.filterwarnings("default")  # of schemathesis itself
+@pytest.mark.parametrize(("path", "method"), OPERATIONS)
+def test_the_server_keeps_to_its_schema(schema: Any, path: str, method: str) -> None:
+    known = {"name": f"{CROSSING}-0001", "run": "x-1", "job": "job-1"}
+    if path.startswith("/api/maps/"):
+        known["name"] = CROSSING
+    operation = schema[path][method]
+
+    @settings(
+        max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+    )
+    @given(case=operation.as_strategy())
+    def check(case: schemathesis.Case) -> None:
+        case.call_and_validate(checks=CHECKS)
+        if method != "delete":  # once more where there is something
+            case.path_parameters = {k: known[k] for k in case.path_parameters or {}}
+            case.call_and_validate(checks=CHECKS)
+
+    check()
