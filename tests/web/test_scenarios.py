@@ -44,6 +44,7 @@ ALL = (
     ("shrink_roi", {"segment": "r3", "with_actors": True}),
     ("remove_flow", {"flow": "flow-1"}),
     ("remove_actors", {"actors": ["car-1", "big"]}),
+    ("fill_roi", {"share": 0.3, "seed": 4}),
 )
 
 
@@ -115,7 +116,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         arguments = _filled(template, places)
         answer = post_edit(client, new, state["version"], kind, **arguments)
         assert answer.status_code == 200, (kind, answer.text)
-        known = {"graph": graph, "lights": loaded.lights}
+        known = {"graph": graph, "lights": loaded.lights, "usable": loaded.usable}
         function = getattr(edits, kind)
         wanted = inspect.signature(function).parameters
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
@@ -140,6 +141,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         ("remove_actors", {"actors": "car-1"}),
         ("copy_actors", {"copies": ["car-1"]}),
         ("set_environment", {"parameters": {"fog": "x"}}),
+        ("fill_roi", {"share": 0.3}),  # the region is empty
         ("eligible_segments", {}),
         ("_with", {"name": "x"}),
         ("__class__", {}),

@@ -63,7 +63,7 @@ def test_the_server_keeps_to_its_schema(schema: Any, path: str, method: str) -> 
     operation = schema[path][method]
 
     @settings(
-        max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
+        max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
     )
     @given(case=operation.as_strategy())
     def check(case: schemathesis.Case) -> None:

@@ -17,6 +17,7 @@ from odscen.ids import SegmentId
 from odscen.lanegraph.query import is_connected, neighbours
 from odscen.scenario.actor_checks import Subject, goal_problems, spawn_problems
 from odscen.scenario.checks import duplicate_ids, roi_problems, shared_nodes
+from odscen.scenario.config import SamplingConfig, overridden
 from odscen.scenario.document import (
     Actor,
     Environment,
@@ -29,6 +30,7 @@ from odscen.scenario.document import (
 from odscen.scenario.files import validated
 from odscen.scenario.problems import Problem, refuse_errors
 from odscen.scenario.region import Region, on_foot
+from odscen.scenario.sampling import sample_scenario
 from odscen.scenario.signals import find_light, signal_problems
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.model import MapGraph
     from odscen.scenario.document import Control
     from odscen.scenario.signals import Light
+    from odscen.scenario.supply import Usable
 
 _One = TypeVar("_One", bound=Actor | Flow)
 _Document = TypeVar("_Document", bound=Part)
@@ -330,6 +333,40 @@ def copy_actors(scenario: Scenario, graph: MapGraph, copies: Mapping[str, str]) 
         grown = _with(scenario, actors=(*scenario.actors, copy))
         scenario = move_actor(grown, graph, copy.id, spawn=spawn)
     return scenario
+
+
+def fill_roi(
+    scenario: Scenario, graph: MapGraph, usable: Usable, *, share: float, seed: int | None = None
+) -> Scenario:
+    """Put a random crowd into the region in the place of all actors (R47); flows stay.
+
+    Parameters
+    ----------
+    usable
+        What the simulator that will run it can use of the map.
+    share
+        Of the largest number of actors that fits, 0 to 1.
+    seed
+        Of the crowd; the scenario's if not given.
+
+    Raises
+    ------
+    ScenarioError
+        If the region is not usable, the share is not possible, or nobody fits.
+    """
+    refuse_errors(roi_problems(scenario, graph))
+    crowd = sample_scenario(
+        graph,
+        overridden(SamplingConfig(), fill=share),
+        seed=scenario.seed if seed is None else seed,
+        name=scenario.name,
+        usable=usable,
+        roi=scenario.roi,
+    ).actors
+    nodes = {flow.spawn for flow in scenario.flows}
+    ids = {flow.id for flow in scenario.flows}
+    free = tuple(one for one in crowd if one.spawn not in nodes and one.id not in ids)
+    return _with(scenario, actors=free)
 
 
 def set_ego(scenario: Scenario, actor: str | None) -> Scenario:

@@ -27,11 +27,14 @@ from odscen.scenario.document import (
     Simulation,
 )
 from odscen.scenario.signals import Light
+from odscen.scenario.supply import Usable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-_KNOWN = {"scenario", "graph", "lights"}
+    from odscen.workflow import LoadedMap
+
+_KNOWN = {"scenario", "graph", "lights", "usable"}
 _FIELDS_OF: Mapping[str, type[Part]] = {
     "add_actor": Actor,
     "change_actor": Actor,
@@ -66,9 +69,7 @@ class EditBase(BaseModel):
         return words if subject is None else f"{words} {subject}"
 
 
-def apply_edit(
-    edit: EditBase, scenario: Scenario, graph: MapGraph, lights: tuple[Light, ...]
-) -> Scenario:
+def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenario:
     """Return the scenario that the edit makes of another.
 
     Raises
@@ -77,7 +78,7 @@ def apply_edit(
         If a rule forbids it.
     """
     function = FUNCTIONS[edit.kind]
-    known = {"graph": graph, "lights": lights}
+    known = {"graph": loaded.sumo.graph, "lights": loaded.lights, "usable": loaded.usable}
     ours = {name: known[name] for name in inspect.signature(function).parameters if name in known}
     return function(scenario, **ours, **edit.arguments)
 
@@ -99,7 +100,14 @@ def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
     # JSON has lists and objects; an Iterable would be read only when it is used.
     types = {"Iterable": list, "Sequence": list, "Mapping": dict, "MapGraph": MapGraph}
     hints = get_type_hints(
-        function, localns={**types, "Light": Light, "Category": Category, "Control": Control}
+        function,
+        localns={
+            **types,
+            "Light": Light,
+            "Usable": Usable,
+            "Category": Category,
+            "Control": Control,
+        },
     )
     fields: dict[str, Any] = {"kind": (Literal[name], ...)}
     for parameter in inspect.signature(function).parameters.values():

@@ -98,8 +98,7 @@ def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
     one = request.edit
 
     def change(scenario: Scenario) -> Scenario:
-        loaded = shared.map_of(scenario)
-        return apply_edit(one, scenario, loaded.sumo.graph, loaded.lights)
+        return apply_edit(one, scenario, shared.map_of(scenario))
 
     return _state(shared, shared.drafts.change(name, request.version, one.label, change))
 

@@ -85,6 +85,7 @@ def _bind(host: str, port: int) -> socket.socket:
         bound = socket.socket(family, socket.SOCK_STREAM)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind(address)
+        bound.listen()  # whoever comes before the application is ready waits
     except OSError as error:
         msg = f"cannot listen on {host}:{port}: {error.strerror or error}; try another --port"
         raise WorkspaceError(msg) from error
