@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# A busy machine is no failure: timings are for benchmarks.
+settings.register_profile("odscen", deadline=None)
+settings.load_profile("odscen")
 
 _DEFAULT_MAPS = Path(__file__).parents[2] / "shared" / "maps"
 
