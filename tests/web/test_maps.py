@@ -26,7 +26,7 @@ def test_the_server_says_that_it_is_there_and_how_the_page_is_built(client: Test
     assert client.get("/api/health").json()["version"]
     page = client.get("/")
     assert page.status_code == 200
-    assert "npm run build" in page.text
+    assert "npm run build" in page.text or '<div id="root">' in page.text
 
 
 def test_a_built_page_is_served_for_its_own_addresses_and_not_for_missing_files(

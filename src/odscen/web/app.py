@@ -88,8 +88,9 @@ def create_app(
     for routes in (map_routes, scenario_routes, run_routes):
         app.include_router(routes.router)
 
+    @app.get("/api", include_in_schema=False)
     @app.get("/api/{path:path}", include_in_schema=False)
-    def nothing(path: str) -> Response:
+    def nothing(path: str = "") -> Response:
         return error_response(404, "NotFound", f"there is no /api/{path}")
 
     if (static / "index.html").is_file():
