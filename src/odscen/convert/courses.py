@@ -94,10 +94,7 @@ def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
     start = np.array([stretch.start for stretch in flat])
     end = np.array([stretch.end for stretch in flat])
     step = max(DENSE, float(np.abs(end - start).sum()) / MOST_PLACES)
-    counts = np.maximum(1, np.ceil(np.abs(end - start) / step)).astype(np.intp) + 1
-    first = np.concatenate(([0], np.cumsum(counts))).astype(np.intp)
-    owner = np.repeat(np.arange(len(counts)), counts)
-    share = (np.arange(first[-1]) - first[owner]) / (counts[owner] - 1)
+    first, owner, share = spread(np.abs(end - start), step)
     s = start[owner] + share * (end - start)[owner]
     found = table.lane_points(rows[owner], s, at=np.array([x.at for x in flat])[owner])
     out = np.array([x.beside for x in flat])[owner] * np.sign(table.lane_id[rows[owner]])
@@ -125,6 +122,27 @@ def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
             )
         )
     return lines
+
+
+def spread(extents: FloatArray, step: float) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Places along stretches, both ends of each included.
+
+    Parameters
+    ----------
+    extents
+        Shape ``(L,)``: length of each stretch, metres.
+    step
+        Metres between places, at most.
+
+    Returns
+    -------
+    Shape ``(L + 1,)``: first place of each stretch; shapes ``(N,)``: the stretch of each place and
+    how far along it is, from 0 to 1.
+    """
+    counts = np.maximum(1, np.ceil(extents / step)).astype(np.intp) + 1
+    first = np.concatenate(([0], np.cumsum(counts))).astype(np.intp)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    return first, owner, (np.arange(first[-1]) - first[owner]) / (counts[owner] - 1)
 
 
 def drawn_length(shape: FloatArray) -> float:

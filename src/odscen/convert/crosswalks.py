@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from odscen.convert.access import allowed
-from odscen.convert.courses import DENSE
+from odscen.convert.courses import DENSE, spread
 from odscen.convert.gaps import Gap
 from odscen.opendrive.objects import crosswalks
 
@@ -52,10 +52,7 @@ def place_crosswalks(
     usable = [bool(allowed(kind)) for kind in table.lane_type]
     rows = np.flatnonzero(np.array(usable) & (table.lane_s1 - table.lane_s0 > 1e-3))
     extent = (table.lane_s1 - table.lane_s0)[rows]
-    counts = np.maximum(1, np.ceil(extent / DENSE)).astype(np.intp) + 1
-    first = np.concatenate(([0], np.cumsum(counts)))
-    owner = np.repeat(np.arange(len(rows)), counts)
-    share = (np.arange(first[-1]) - first[owner]) / (counts[owner] - 1)
+    _, owner, share = spread(extent, DENSE)
     s = table.lane_s0[rows][owner] + share * extent[owner]
     points = table.lane_points(rows[owner], s)
     tree = shapely.STRtree(shapely.points(points.x, points.y))

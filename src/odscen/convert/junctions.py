@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from odscen.convert.net import (
     INTERNAL,
+    LEAST_LENGTH,
     NetEdge,
     NetJunction,
     NetLane,
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
     from odscen.convert.walks import PlacedCrossing
 
 FloatArray = NDArray[np.float64]
-
-LEAST_LENGTH = 0.1
-"""Metres of a lane, at least, as SUMO wants it."""
 
 BUS_LENGTH = 12.0
 """Metres of the longest body that turns are made for."""

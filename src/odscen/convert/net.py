@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ WALKING_AREA = "walkingarea"
 
 DIGITS = 4
 """Decimals of lengths and positions in the file."""
+
+LEAST_LENGTH = 0.1
+"""Metres of a lane, at least, as SUMO wants it."""
 
 VERSION = "1.20"
 """Version of the network format."""
@@ -313,6 +317,6 @@ def _bits(indices: Iterable[int], count: int) -> str:
 
 
 def _quoted(text: str) -> str:
-    for sign, entity in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
-        text = text.replace(sign, entity)
-    return "".join(c if c.isprintable() else " " for c in text)
+    """Text of an attribute on one line."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return escape(plain, {'"': "&quot;"})

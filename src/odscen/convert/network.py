@@ -20,7 +20,7 @@ from odscen.convert.edges import plan_edges
 from odscen.convert.findings import findings
 from odscen.convert.gaps import merge_gaps, side_gaps
 from odscen.convert.junctions import Passage, Surroundings, build_junction, outline
-from odscen.convert.net import NORMAL, Net, NetEdge, NetJunction, NetLane
+from odscen.convert.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.nodes import find_nodes, plain_ids
 from odscen.convert.report import ConversionReport, Entry, Fate
 from odscen.convert.right_of_way import Movement, wrapped
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from odscen.opendrive.model import OpenDrive
 
 FloatArray = NDArray[np.float64]
-
-LEAST_LENGTH = 0.1
-"""Metres of a lane, at least, as SUMO wants it."""
 
 SIDEWAYS = 5.5
 """m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""
@@ -150,6 +147,11 @@ class _Builder:
             for controller in odr.controllers.values()
             for signal, _ in controller.controls
         }
+        self._starting = _by_value(nodes.starts)
+        self._ending = _by_value(nodes.ends)
+        self._walked: dict[str, list[SumoLaneId]] = {}
+        for walk in walks.lanes:
+            self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
         self.ruled = self._rule()
         self._via: dict[int, NetLane] = {}
 
@@ -193,16 +195,14 @@ class _Builder:
     def _junction(self, name: str) -> BuiltJunction:
         numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._ways[n][:4])
         crossings = self._walks.crossings.get(name, ())
-        ends = [n for n, node in enumerate(self._nodes.ends) if node == name]
-        built = build_junction(
-            name, [self._passage(n) for n in numbers], crossings, self._around(name, ends)
-        )
+        passages = [self._passage(number) for number in numbers]
+        built = build_junction(name, passages, crossings, self._around(name))
         for number, lane in zip(numbers, built.lanes, strict=True):
             self._via[number] = lane
         return built
 
-    def _around(self, name: str, ends: Sequence[int]) -> Surroundings:
-        starts = [n for n, node in enumerate(self._nodes.starts) if node == name]
+    def _around(self, name: str) -> Surroundings:
+        starts, ends = self._starting.get(name, []), self._ending.get(name, [])
         lanes = [
             (lane.shape, lane.width, is_end)
             for edges, is_end in ((ends, True), (starts, False))
@@ -214,14 +214,13 @@ class _Builder:
             (c.walkway.axis, c.walkway.width, which) for c in crossings for which in (True, False)
         ]
         shape = outline(lanes)
-        walked = [walk.edge.lanes[0].id for walk in self._walks.lanes if walk.edge.end == name]
         incoming = [lane.id for edge in ends for lane in self._net_edges[edge].lanes]
         x, y, z = (float(value) for value in shape.mean(axis=0))
         junctions = self._nodes.xodr.get(name, ())
         return Surroundings(
             (x, y, z),
             shape,
-            (*incoming, *walked),
+            (*incoming, *self._walked.get(name, ())),
             frozenset(
                 (str(priority.high), str(priority.low))
                 for junction in junctions
@@ -342,8 +341,15 @@ class _Builder:
     # Persons
 
     def _walk_junctions(self) -> list[NetJunction]:
-        known: dict[str, list[SumoLaneId]] = {j.id: [] for j in self._walks.junctions}
-        for walk in self._walks.lanes:
-            if walk.edge.end in known:
-                known[walk.edge.end].append(walk.edge.lanes[0].id)
-        return [replace(j, incoming=tuple(known[j.id])) for j in self._walks.junctions]
+        return [
+            replace(junction, incoming=tuple(self._walked.get(junction.id, ())))
+            for junction in self._walks.junctions
+        ]
+
+
+def _by_value(values: Sequence[str]) -> dict[str, list[int]]:
+    """Positions of each value."""
+    found: dict[str, list[int]] = {}
+    for position, value in enumerate(values):
+        found.setdefault(value, []).append(position)
+    return found

@@ -20,6 +20,7 @@ from odscen.convert.access import PEDESTRIAN, WALKING_SPEED
 from odscen.convert.courses import Course, Line, Stretch, evaluate
 from odscen.convert.net import (
     CROSSING,
+    LEAST_LENGTH,
     NORMAL,
     WALKING_AREA,
     NetEdge,
@@ -50,9 +51,6 @@ APART = 1.0
 
 TOGETHER = 2.5
 """Metres between the ends of crosswalks of one junction that share a walking area."""
-
-LEAST_LENGTH = 0.1
-"""Metres of a pedestrian edge, at least."""
 
 
 class WalkLane(NamedTuple):
