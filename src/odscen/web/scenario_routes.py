@@ -201,7 +201,9 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
         loaded = shared.map_of(scenario)
     except InputError as error:  # a scenario whose map was removed can still be looked at
         return (Problem("error", "map_missing", "map", str(error)),)
-    return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights)
+    with shared.search:
+        region = region_of(loaded, scenario.roi)
+        return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights, region=region)
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:
