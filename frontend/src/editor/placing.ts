@@ -6,7 +6,8 @@ import type { Picker } from "../map/picking";
 export type Tool =
   | { does: "place"; category: Category }
   | { does: "stream"; walk: boolean }
-  | { does: "copy" | "move"; ids: readonly string[] };
+  | { does: "copy"; ids: readonly string[] }
+  | { does: "move"; ids: readonly string[] };
 
 /** Where each of several goes: its id and its new start. */
 export type Moves = readonly (readonly [id: string, spawn: string])[];

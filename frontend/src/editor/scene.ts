@@ -1,5 +1,5 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
-import type { Graph } from "../map/graph";
+import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
@@ -122,4 +122,9 @@ const join = (a: Bounds, b: Bounds): Bounds => [
 export function firstStep(document: ScenarioDocument): Step {
   if (document.roi.length === 0) return "region";
   return "actors";
+}
+
+/** A rectangle around places, which must be some. */
+export function boundsOfPlaces(places: readonly Place[]): Bounds {
+  return places.map(({ x, y }): Bounds => [x, y, x, y]).reduce(join);
 }

@@ -42,7 +42,6 @@ export function selectionAfter(
   const old = new Set(everyone(before).map((one) => one.id));
   const now = everyone(after).map((one) => one.id);
   const fresh = now.filter((id) => !old.has(id));
-  if (fresh.length > 0 && old.size > 0 && fresh.length === now.length) return [];
   if (fresh.length > 0) return fresh;
   const there = new Set(now);
   return selection.every((id) => there.has(id)) ? selection : selection.filter((id) => there.has(id));

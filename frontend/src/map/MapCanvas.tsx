@@ -27,6 +27,8 @@ export interface MapHandle {
   setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
   show(bounds: Bounds): void;
   centre(x: number, y: number): void;
+  /** Acts on the middle, as Enter does. */
+  pickMiddle(): void;
 }
 
 interface Props {
@@ -128,7 +130,8 @@ export function MapCanvas({
     setLamps: (lamps) => renderer.current?.setLamps(lamps),
     show: (bounds) => apply(fit(bounds, size.current, 0.15)),
     centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
-  }), [apply]);
+    pickMiddle: () => onPick?.({ x: view.current.x, y: view.current.y, reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale, shift: false }),
+  }), [apply, onPick]);
 
   // React's wheel listener is passive; the page must not scroll along.
   useEffect(() => {
