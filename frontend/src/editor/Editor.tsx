@@ -27,7 +27,7 @@ import { RunStep } from "./RunStep";
 import { boundsOfPlaces, boundsOfProblem, firstStep, inFrame, nearestOne, ofProblem, segmentsBounds, segmentStyles, type Step } from "./scene";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
-import { firstVisit, Tour } from "./Tour";
+import { firstVisit, Tour, tourSeen } from "./Tour";
 import { useChanges } from "./useChanges";
 import { useShown } from "./useShown";
 
@@ -103,6 +103,10 @@ export function Editor({ store, drawing, loaded, assets }: {
     if (next?.does === "place" || next?.does === "stream") select([]);
   };
   const applyTool = (used: Tool, to: Place): void => { if (changes.use(used, to)) arm(null); };
+  const closeTour = (): void => {
+    tourSeen();
+    setTour(false);
+  };
   const choose = (id: string, more: boolean): void => {
     if (!more) select([id]);
     else select(selection.includes(id) ? selection.filter((other) => other !== id) : [...selection, id]);
@@ -172,7 +176,7 @@ export function Editor({ store, drawing, loaded, assets }: {
   useKeys({
     undo: () => void undo(), redo: () => void redo(), sheet: () => setKeys(true),
     remove: () => changes.remove(selection),
-    escape: () => { if (tool) arm(null); else if (tour) setTour(false); else select([]); },
+    escape: () => { if (tool) arm(null); else if (tour) closeTour(); else select([]); },
     copy: copyTool,
     move: () => { if (selection.length > 0) { setStep("actors"); arm({ does: "move", ids: selection }); } },
     selectAll: () => { setStep("actors"); select(ones.map((each) => each.id)); },
@@ -245,7 +249,7 @@ export function Editor({ store, drawing, loaded, assets }: {
             {hint && <div className="map-hint" role="status">{hint}</div>}
             <Legend step={step} />
           </MapCanvas>
-          {tour && <Tour onClose={() => setTour(false)} />}
+          {tour && <Tour onClose={closeTour} />}
         </div>
         {ones.length > 0 && (step === "actors" || step === "run") && (
           <RoadUserTable ones={ones} graph={graph} selection={selection} onRemove={changes.remove}

@@ -17,31 +17,32 @@ export function firstVisit(): boolean {
   }
 }
 
+/** Remembers that the tour was closed. */
+export function tourSeen(): void {
+  try {
+    localStorage.setItem(KEY, "seen");
+  } catch {
+    // It is shown again next time.
+  }
+}
+
 /** Three cards beside the map; the page can be used while they are there. */
 export function Tour({ onClose }: { onClose: () => void }) {
   const [at, setAt] = useState(0);
   const [title, text] = STEPS[at];
   const last = at === STEPS.length - 1;
-  const close = (): void => {
-    try {
-      localStorage.setItem(KEY, "seen");
-    } catch {
-      // It is shown again next time.
-    }
-    onClose();
-  };
   return (
-    <div className="tour" role="dialog" aria-label="Short tour" onKeyDown={(event) => { if (event.key === "Escape") { close(); event.stopPropagation(); } }}>
+    <div className="tour" role="dialog" aria-label="Short tour" onKeyDown={(event) => { if (event.key === "Escape") { onClose(); event.stopPropagation(); } }}>
       <Group justify="space-between" wrap="nowrap">
         <Text fw={700}>{title}</Text>
-        <CloseButton aria-label="Close the tour" onClick={close} />
+        <CloseButton aria-label="Close the tour" onClick={onClose} />
       </Group>
       <Text size="sm" aria-live="polite">{text}</Text>
       <Group justify="space-between" mt="sm">
         <Text size="xs" c="dimmed">{at + 1} of {STEPS.length}</Text>
         <Group gap={6}>
           {at > 0 && <Button size="compact-sm" variant="default" onClick={() => setAt(at - 1)}>Back</Button>}
-          <Button size="compact-sm" onClick={() => (last ? close() : setAt(at + 1))}>{last ? "Done" : "Next"}</Button>
+          <Button size="compact-sm" onClick={() => (last ? onClose() : setAt(at + 1))}>{last ? "Done" : "Next"}</Button>
         </Group>
       </Group>
     </div>
