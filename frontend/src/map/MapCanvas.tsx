@@ -168,6 +168,7 @@ export function MapCanvas({
       ref={host}
       className="map"
       data-aim={aim}
+      data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
       aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
