@@ -183,8 +183,7 @@ def spawn_problems(subject: Subject) -> tuple[Place | None, tuple[Problem, ...]]
 def goal_problems(subject: Subject, spawn: Place) -> Iterator[Problem]:
     """Check the goal of an actor or flow whose spawn is right (R38)."""
     one, region, where = subject.one, subject.region, f"{subject.where}.goal"
-    candidates = region.candidates(spawn)
-    if not len(candidates):
+    if not region.router_of(spawn).has_goals(spawn.node):
         yield error(
             "no_goal",
             f"{subject.where}.spawn",
@@ -210,13 +209,13 @@ def goal_problems(subject: Subject, spawn: Place) -> Iterator[Problem]:
     elif not region.leads(spawn, goal):
         message = (
             f"{subject.name} cannot get from {one.spawn!r} to {one.goal!r} inside the region of "
-            f"interest; pick one of its {len(candidates)} goals"
+            f"interest; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield error("goal_unreachable", where, message, nodes=nodes)
-    elif goal.node not in candidates:
+    elif not region.is_candidate(spawn, goal):
         message = (
             f"{subject.name} goes to {one.goal!r}, which is not where a way through the region "
-            f"ends, and vanishes there; better pick one of its {len(candidates)} goals"
+            f"ends, and vanishes there; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield warning("goal_not_candidate", where, message, nodes=nodes)
 
