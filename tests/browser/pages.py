@@ -6,11 +6,13 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pytest
 from playwright.sync_api import Locator, Page, expect
+
+MOST_TABS = 120
 
 ACTIONS = """
 window.odscenActions = {pointer: 0, key: 0};
@@ -102,6 +104,15 @@ class MapView:
     def click(self, point: tuple[float, float], **options: Any) -> None:
         self.page.mouse.click(*self.at(*point), **options)
 
+    def steer(self, point: tuple[float, float]) -> None:
+        """Bring a place to the middle with the arrow keys; the map has the focus."""
+        for axis, (back, forth) in enumerate((("ArrowLeft", "ArrowRight"), ("ArrowDown", "ArrowUp"))):
+            for modifier, pixels in (("", 60), ("Shift+", 12)):
+                view = self.view()
+                away = (point[axis] - view[axis]) * view[2]
+                for _ in range(round(abs(away) / pixels)):
+                    self.page.keyboard.press(modifier + (forth if away > 0 else back))
+
     def hover(self, point: tuple[float, float]) -> None:
         self.page.mouse.move(*self.at(*point))
 
@@ -139,6 +150,15 @@ class OdscenPage:
         """How often a pointer and a key were pressed since the page was loaded."""
         found: dict[str, int] = self.page.evaluate("window.odscenActions")
         return found
+
+    def tab_to(self, wanted: Locator, *, back: bool = False) -> None:
+        """Press Tab until ``wanted`` has the focus."""
+        expect(wanted).to_be_visible()
+        for _ in range(MOST_TABS):
+            if wanted.evaluate("element => element === document.activeElement"):
+                return
+            self.page.keyboard.press("Shift+Tab" if back else "Tab")
+        pytest.fail(f"{wanted} is not reached with the Tab key")
 
     def close_tour(self) -> None:
         """Closes the tour for first users, if it is there."""
@@ -279,6 +299,9 @@ class OdscenPage:
         return Graph(self.get(f"/maps/{self.document()['map']['name']}/graph"))
 
 
-def rising(values: Iterable[float]) -> bool:
-    """Whether each value is larger than the one before."""
-    return all(a < b for a, b in pairwise(values))
+def settle(page: Page) -> None:
+    """Wait until nothing fades or slides any more; what turns for ever is left alone."""
+    page.wait_for_function(
+        """() => document.getAnimations().every(one =>
+            one.playState !== "running" || one.effect?.getTiming().iterations === Infinity)"""
+    )
