@@ -109,7 +109,8 @@ def open_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Call
 
 def _fault(said: ConsoleMessage) -> list[str]:
     """Errors of the page's own; a refusal by the server is not one, and is shown to the user."""
-    mine = said.type == "error" and not said.text.startswith("Failed to load resource")
+    refused = said.text.startswith(("Failed to load resource", "WebSocket connection to"))
+    mine = said.type == "error" and not refused
     return [said.text] if mine else []
 
 

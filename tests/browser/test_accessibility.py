@@ -31,7 +31,7 @@ class Inspector:
     def __init__(self, user: OdscenPage, scheme: str) -> None:
         self.page: Page = user.page
         self.scheme = scheme
-        self.wrong: list[str] = []
+        self.wrong = Wrongs()
 
     def look(self, view: str) -> None:
         settle(self.page)
@@ -40,12 +40,24 @@ class Inspector:
         self.page.evaluate(AXE.read_text(encoding="utf-8"))
         found: list[dict[str, Any]] = self.page.evaluate("async () => (await axe.run()).violations")
         for rule in found:
-            nodes = "; ".join(
-                f"{node['html'][:160]} ({node['any'][0]['message'][:160] if node['any'] else ''})"
-                for node in rule["nodes"][:4]
-            )
-            self.wrong.append(f"{view}: {rule['id']} ({len(rule['nodes'])}): {nodes}")
-        self.wrong += [f"{view}: no keyboard reaches {e}" for e in self.page.evaluate(UNREACHABLE)]
+            for node in rule["nodes"]:
+                message = node["any"][0]["message"] if node["any"] else rule["help"]
+                self.wrong.append(view, f"{rule['id']}: {node['html'][:120]} {message}")
+        for element in self.page.evaluate(UNREACHABLE):
+            self.wrong.append(view, f"no keyboard reaches {element}")
+
+
+class Wrongs:
+    """What is wrong, and in which views."""
+
+    def __init__(self) -> None:
+        self.views: dict[str, list[str]] = {}
+
+    def append(self, view: str, what: str) -> None:
+        self.views.setdefault(what, []).append(view)
+
+    def __str__(self) -> str:
+        return "".join(f"\n{what}\n    in {', '.join(views)}" for what, views in self.views.items())
 
 
 @pytest.fixture(params=["light", "dark"])
@@ -64,8 +76,7 @@ def visit(scheme: str, open_page: Callable[..., OdscenPage]) -> Iterator[Callabl
         return user, inspectors[-1]
 
     yield opened
-    wrong = [line for one in inspectors for line in one.wrong]
-    assert not wrong, "\n" + "\n".join(wrong)
+    assert not any(one.wrong.views for one in inspectors), "".join(str(one.wrong) for one in inspectors)
 
 
 def test_the_first_screen(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from playwright.sync_api import expect
 
@@ -71,19 +72,14 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     assert region.document()["roi"] == before[:-1]
 
 
-def test_somebody_left_outside_the_region_is_a_problem_that_leads_to_its_place(
-    region: OdscenPage,
-) -> None:
-    arm = region.document()["roi"][-1]
-    region.step("Road users").click()
-    start = region.graph.starts([arm], 1)[0]
-    region.kind("Car").click()
+def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
+    place(region, "Pedestrian", 2)
+    expect(region.problems).to_have_count(0)
+    region.names.first.click()
     with region.changing():
-        region.map.click(start)
-    region.step("Region").click()
-    with region.changing():
-        region.map.click(region.graph.middle(arm))
-    assert arm not in region.document()["roi"]
+        region.page.get_by_label("Crosses the road anywhere").click()
+    expect(region.problems).to_have_count(1)
+    region.page.keyboard.press("Escape")
     region.map.area.press("0")
     whole = region.map.view()
     region.problems.first.click()
@@ -91,7 +87,7 @@ def test_somebody_left_outside_the_region_is_a_problem_that_leads_to_its_place(
     x, y, scale = region.map.view()
     assert scale > whole[2]
     spawn = region.graph.place(region.document()["actors"][0]["spawn"])
-    assert (abs(x - spawn[0]) < 5, abs(y - spawn[1]) < 5) == (True, True)
+    assert np.hypot(x - spawn[0], y - spawn[1]) < 5
 
 
 def test_every_kind_of_road_user_can_be_placed(region: OdscenPage) -> None:
