@@ -32,7 +32,9 @@ def find() -> str | None:
 
 def required() -> bool:
     """Whether its absence is an error: in CI, or if asked for."""
-    return any(os.environ.get(name, "") not in ("", "0") for name in ("CI", "ODSCEN_REQUIRE_BROWSER"))
+    return any(
+        os.environ.get(name, "") not in ("", "0") for name in ("CI", "ODSCEN_REQUIRE_BROWSER")
+    )
 
 
 def _may_install() -> list[str] | None:
@@ -42,7 +44,10 @@ def _may_install() -> list[str] | None:
     if os.geteuid() == 0:
         return []
     sudo = shutil.which("sudo")
-    if sudo and subprocess.run([sudo, "-n", "true"], check=False, capture_output=True).returncode == 0:
+    if (
+        sudo
+        and subprocess.run([sudo, "-n", "true"], check=False, capture_output=True).returncode == 0
+    ):
         return [sudo, "-n"]
     return None
 
@@ -63,7 +68,9 @@ def main() -> int:
     found = find()
     if found:
         return 0
-    print("No Chromium here and none can be installed; name one in ODSCEN_CHROMIUM.", file=sys.stderr)
+    print(
+        "No Chromium here and none can be installed; name one in ODSCEN_CHROMIUM.", file=sys.stderr
+    )
     if required():
         return 1
     print("The tests in a browser will be skipped.", file=sys.stderr)

@@ -54,7 +54,9 @@ def served(workspace: Path) -> Iterator[Served]:
 
 def _address(log: Path, process: subprocess.Popen[str]) -> str:
     """Where the server says that it is; it listens before it says so."""
-    while not (found := re.search(r"odscen is at (http://\S+?)/\s", log.read_text(encoding="utf-8"))):
+    while not (
+        found := re.search(r"odscen is at (http://\S+?)/\s", log.read_text(encoding="utf-8"))
+    ):
         if process.poll() is not None:
             raise RuntimeError(log.read_text(encoding="utf-8"))
     return found[1]

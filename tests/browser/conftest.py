@@ -75,12 +75,16 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 
 @pytest.fixture
-def open_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Callable[..., OdscenPage]]:
+def open_page(
+    browser: Browser, request: pytest.FixtureRequest
+) -> Iterator[Callable[..., OdscenPage]]:
     """Opens a browser of a new user (who has seen the tour unless told otherwise) on a server."""
     contexts: list[BrowserContext] = []
     faults: list[str] = []
 
-    def opened(url: str, *, tour: bool = False, context: BrowserContext | None = None, **options: Any) -> OdscenPage:
+    def opened(
+        url: str, *, tour: bool = False, context: BrowserContext | None = None, **options: Any
+    ) -> OdscenPage:
         if context is None:
             options.setdefault("viewport", {"width": 1360, "height": 850})
             context = browser.new_context(base_url=url, **options)

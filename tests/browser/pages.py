@@ -47,7 +47,9 @@ class Graph:
         rows = np.flatnonzero(np.asarray(self.columns["segment"]) == self._row[segment])
         return self._at(self.columns, int(rows[len(rows) // 2]))
 
-    def starts(self, roi: Iterable[str], number: int, *, walking: bool = False, apart: float = 14.0) -> list[tuple[float, float]]:
+    def starts(
+        self, roi: Iterable[str], number: int, *, walking: bool = False, apart: float = 14.0
+    ) -> list[tuple[float, float]]:
         """Places where somebody may start, each ``apart`` metres from the others, far ends last."""
         columns = self.columns["walks"] if walking else self.columns
         usable = np.asarray(columns["walkable" if walking else "spawnable"]) == 1
@@ -97,7 +99,9 @@ class MapView:
         assert box is not None
         sx = box["x"] + box["width"] / 2 + (x - middle_x) * scale
         sy = box["y"] + box["height"] / 2 - (y - middle_y) * scale
-        inside = box["x"] < sx < box["x"] + box["width"] and box["y"] < sy < box["y"] + box["height"]
+        inside = (
+            box["x"] < sx < box["x"] + box["width"] and box["y"] < sy < box["y"] + box["height"]
+        )
         assert inside, f"({x:.1f}, {y:.1f}) is not in sight"
         return sx, sy
 
@@ -106,7 +110,9 @@ class MapView:
 
     def steer(self, point: tuple[float, float]) -> None:
         """Bring a place to the middle with the arrow keys; the map has the focus."""
-        for axis, (back, forth) in enumerate((("ArrowLeft", "ArrowRight"), ("ArrowDown", "ArrowUp"))):
+        for axis, (back, forth) in enumerate(
+            (("ArrowLeft", "ArrowRight"), ("ArrowDown", "ArrowUp"))
+        ):
             for modifier, pixels in (("", 60), ("Shift+", 12)):
                 view = self.view()
                 away = (point[axis] - view[axis]) * view[2]
@@ -175,7 +181,9 @@ class OdscenPage:
 
     @property
     def add_shipped(self) -> Locator:
-        return self.page.get_by_role("button", name=re.compile("maps that (come|ship)|shipped|example maps", re.I))
+        return self.page.get_by_role(
+            "button", name=re.compile("maps that (come|ship)|shipped|example maps", re.I)
+        )
 
     def new_scenario(self, map_name: str) -> Locator:
         return self.page.get_by_role("button", name=f"New scenario on {map_name}")
@@ -187,7 +195,11 @@ class OdscenPage:
 
     def step(self, title: str) -> Locator:
         """Heading of one of the steps."""
-        return self.page.get_by_role("region", name=title, exact=True).locator("button[aria-expanded]").first
+        return (
+            self.page.get_by_role("region", name=title, exact=True)
+            .locator("button[aria-expanded]")
+            .first
+        )
 
     @property
     def region_note(self) -> Locator:

@@ -76,7 +76,9 @@ def visit(scheme: str, open_page: Callable[..., OdscenPage]) -> Iterator[Callabl
         return user, inspectors[-1]
 
     yield opened
-    assert not any(one.wrong.views for one in inspectors), "".join(str(one.wrong) for one in inspectors)
+    assert not any(one.wrong.views for one in inspectors), "".join(
+        str(one.wrong) for one in inspectors
+    )
 
 
 def test_the_first_screen(

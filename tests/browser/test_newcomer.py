@@ -67,7 +67,11 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
 
     actors = user.document()["actors"]
     assert sorted(actor["category"] for actor in actors) == [
-        "car", "motorcycle", "pedestrian", "truck", "van",
+        "car",
+        "motorcycle",
+        "pedestrian",
+        "truck",
+        "van",
     ]
     assert [actor["category"] for actor in actors if actor["ego"]] == ["car"]
     user.choose_speed("As fast")
