@@ -1,4 +1,4 @@
-"""Builds the wheel as a stranger would, from the committed files and without Node, and looks into it.
+"""Builds the wheel from the committed files and without Node, and looks into it.
 
 ``python -m tools.check_wheel``; the seconds that it prints are with everything that it downloads.
 """
@@ -36,9 +36,7 @@ def main() -> None:
             size = wheel.stat().st_size / 1e6
     if wrong:
         sys.exit("\n".join(wrong))
-    print(
-        f"the wheel ({size:.1f} MB, built in {seconds:.0f} s without Node) has its page and its maps"
-    )
+    print(f"the wheel ({size:.1f} MB, built in {seconds:.0f} s without Node) has its page and maps")
 
 
 def _no_node(folder: Path) -> Path:

@@ -1,7 +1,7 @@
 """Find a Chromium, or install Debian's where that is allowed: ``python tools/chromium.py``.
 
-Needs nothing but Python, for it runs before anything is set up. ``ODSCEN_CHROMIUM`` names a browser of
-one's own; with ``ODSCEN_REQUIRE_BROWSER=1`` or ``CI`` it is an error if there is none.
+Needs nothing but Python, for it runs before anything is set up. ``ODSCEN_CHROMIUM`` names a browser
+of one's own; with ``ODSCEN_REQUIRE_BROWSER=1`` or ``CI`` it is an error if there is none.
 """
 
 from __future__ import annotations

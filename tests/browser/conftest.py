@@ -14,7 +14,8 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page
 from odscen import workflow
 from odscen.catalog.store import Workspace
 from tests.browser.pages import OdscenPage
-from tools import chromium, page as tool
+from tools import chromium
+from tools import page as tool
 
 ARTEFACTS = tool.ROOT / "build/browser"
 SHIPPED = tool.ROOT / "maps"

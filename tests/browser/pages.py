@@ -170,7 +170,7 @@ class OdscenPage:
         """Closes the tour for first users, if it is there."""
         tour = self.page.get_by_role("dialog")
         if tour.count():
-            tour.get_by_role("button", name=re.compile("close|skip", re.I)).first.click()
+            tour.get_by_role("button", name=re.compile("close|skip", re.IGNORECASE)).first.click()
             expect(tour).to_have_count(0)
 
     # Catalogue
@@ -182,7 +182,7 @@ class OdscenPage:
     @property
     def add_shipped(self) -> Locator:
         return self.page.get_by_role(
-            "button", name=re.compile("maps that (come|ship)|shipped|example maps", re.I)
+            "button", name=re.compile("maps that (come|ship)|shipped|example maps", re.IGNORECASE)
         )
 
     def new_scenario(self, map_name: str) -> Locator:

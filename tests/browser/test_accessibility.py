@@ -19,9 +19,10 @@ from tools import page as tool
 AXE = tool.ROOT / "frontend/node_modules/axe-core/axe.min.js"
 
 # Composite widgets have one stop of their own; hidden helpers double what has keys already.
-UNREACHABLE = """() => [...document.querySelectorAll("a[href], button, input, select, textarea, summary")]
+UNREACHABLE = """() => [...document.querySelectorAll("a[href], button, input, select, textarea")]
     .filter(e => e.checkVisibility({visibilityProperty: true}) && !e.disabled && e.tabIndex < 0)
-    .filter(e => !e.closest("[aria-hidden=true], [role=menu], [role=listbox], [role=radiogroup], [role=tablist]"))
+    .filter(e => !e.closest(["menu", "listbox", "radiogroup", "tablist"]
+        .map(role => `[role=${role}]`).join() + ",[aria-hidden=true]"))
     .map(e => e.outerHTML.slice(0, 200))"""
 
 

@@ -61,7 +61,6 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
     user.run.click()
     user.wait_until_moving()
     actions = user.actions()
-    print(f"clicks: {actions['pointer']}")
     assert actions["key"] == 0
     assert actions["pointer"] <= MOST_CLICKS
 
