@@ -4,7 +4,7 @@ import { SHORTCUTS } from "./keys";
 
 export function KeySheet({ open, onClose }: { open: boolean; onClose: () => void }) {
   return (
-    <Modal opened={open} onClose={onClose} title="Keyboard shortcuts" centered size="lg" closeButtonProps={{ "aria-label": "Close" }}>
+    <Modal opened={open} onClose={onClose} title="Keyboard shortcuts" centered size="lg">
       <Table>
         <Table.Tbody>
           {SHORTCUTS.map(([key, what]) => <Table.Tr key={key}><Table.Td><kbd>{key}</kbd></Table.Td><Table.Td>{what}</Table.Td></Table.Tr>)}

@@ -17,7 +17,7 @@ export function Problems({ problems, onShow }: { problems: readonly Problem[]; o
       {sorted.slice(0, SHOWN).map((problem) => (
         <button type="button" className="problem" key={`${problem.where} ${problem.code} ${problem.message}`} onClick={() => onShow(problem)}>
           <span className="problem-sign" data-severity={problem.severity} role="img" aria-label={problem.severity === "error" ? "Must be solved" : "Warning"}><IconWarn /></span>
-          <span>{problem.message}</span>
+          <span className="problem-text">{problem.message}</span>
         </button>
       ))}
       {sorted.length > SHOWN && <Text size="sm" px={8}>and {sorted.length - SHOWN} more</Text>}

@@ -6,8 +6,6 @@ import { go } from "../ui/route";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 
-const CLOSE = { "aria-label": "Close" };
-
 /** Asks for a name; a name that the server refuses can be changed and tried again. */
 export function NameDialog({ title, label, value, action, onName, onClose }: {
   title: string; label: string; value: string; action: string;
@@ -23,7 +21,7 @@ export function NameDialog({ title, label, value, action, onName, onClose }: {
     onName(name.trim()).catch((error: unknown) => setFailure(String((error as Error).message))).finally(() => setBusy(false));
   };
   return (
-    <Modal opened onClose={onClose} title={title} centered closeButtonProps={CLOSE}>
+    <Modal opened onClose={onClose} title={title} centered>
       <form onSubmit={submit}>
         <TextInput data-autofocus label={label} value={name} error={failure} onChange={(event) => setName(event.currentTarget.value)} />
         <Group justify="flex-end" mt="md">
@@ -40,7 +38,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
   const { value, error } = useLoaded(api.scenarios);
   const others = value?.filter((one) => one.name !== current && !one.error);
   return (
-    <Modal opened onClose={onClose} title="Open another scenario" centered closeButtonProps={CLOSE}>
+    <Modal opened onClose={onClose} title="Open another scenario" centered>
       {error && <Alert color="red">{error}</Alert>}
       {!others && !error && <Loader aria-label="Loading the scenarios" />}
       {others?.length === 0 && <Text size="sm">There is no other one yet. “Save as” makes a copy of this one.</Text>}

@@ -16,6 +16,8 @@ const NODES_FROM = 2.6;
 const EDGES_FROM = 7;
 /** From so many on, everybody is a dot while the whole crowd is in sight. */
 const CROWD = 300;
+/** More names than these would lie on top of each other. */
+const FEW = 3;
 /** No body reaches further from its middle, metres. */
 const ROOM = 12;
 const UNUSABLE = "#8b949d";
@@ -65,13 +67,14 @@ export class SceneLayer {
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
     const plain = scene.actors.length > CROWD && view.scale < NODES_FROM;
+    const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
     const seen = visible(view, size);
     for (const actor of scene.actors) {
       const box: Bounds = [actor.x - ROOM, actor.y - ROOM, actor.x + ROOM, actor.y + ROOM];
       if (!overlaps(box, seen)) continue;
       if (plain && !actor.selected && !actor.ego && !actor.problem) {
         spot(context, at(actor.x, actor.y), CATEGORY_COLOR[actor.category]);
-      } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette);
+      } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette, named);
     }
     for (const flow of scene.flows) drawFlow(context, at(flow.x, flow.y), flow, palette);
     if (scene.hover && scene.hoverText) {
@@ -191,7 +194,7 @@ export class SceneLayer {
 
   private drawActor(
     context: CanvasRenderingContext2D, [x, y]: [number, number], view: View, actor: SceneActor,
-    palette: Palette,
+    palette: Palette, named: boolean,
   ): void {
     const color = CATEGORY_COLOR[actor.category];
     const near = actor.length * view.scale > 10;
@@ -207,7 +210,7 @@ export class SceneLayer {
     }
     badge(context, this.glyphs[actor.category], x, y - lift, radius, color, actor.category);
     if (actor.ego) tag(context, "EGO", x, y - lift - radius - 11);
-    else if (actor.selected) tag(context, actor.id, x, y - lift - radius - 11);
+    else if (actor.selected && named) tag(context, actor.id, x, y - lift - radius - 11);
   }
 }
 
