@@ -1,4 +1,4 @@
-import { Alert, Button, Loader, Text } from "@mantine/core";
+import { Alert, Button, Loader, Text, Title } from "@mantine/core";
 import { useEffect, useState } from "react";
 
 import { api } from "../api/client";
@@ -31,7 +31,8 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   if (failure) {
     return (
       <div className="catalogue">
-        <Alert color="red" title={`“${name}” cannot be opened`}>{failure}</Alert>
+        <Title order={1} size="h3" mb="md">“{name}” cannot be opened</Title>
+        <Alert color="red">{failure}</Alert>
         <Button mt="md" onClick={() => go({ view: "catalogue" })}>Back to the maps</Button>
       </div>
     );

@@ -31,11 +31,12 @@ export function StartAndGoal({ one, graph, starts, goals, onStart, onGoal, onSho
       </div>
       {goals?.length === 0 && !one.goal
         ? <Text size="sm" c="red">No goal can be reached from here. Move the start or let the region grow.</Text>
-        : <Group gap={6} align="flex-end" wrap="nowrap">
-          <Select style={{ flex: 1 }} label="Goal" searchable disabled={goals === null} allowDeselect={false} value={one.goal ?? ""}
+        : <Group gap={6} align="flex-end">
+          <Select style={{ flex: "1 1 170px" }} label="Goal" searchable disabled={goals === null} allowDeselect={false} value={one.goal ?? ""}
             data={[{ value: "", label: `By chance${goals ? ` among ${goals.length}` : ""}` }, ...all.map((id) => ({ value: id, label: placeWord(graph, id) }))]}
             nothingFoundMessage="No such place" onChange={(goal) => { if ((goal || null) !== one.goal) onGoal(goal || null); }} />
           <Button variant="default" px="sm" disabled={!goals?.length} onClick={onShowGoals}>Show goals</Button>
+          {one.goal && <Button variant="default" px="sm" onClick={() => onGoal(null)}>By chance</Button>}
         </Group>}
     </>
   );

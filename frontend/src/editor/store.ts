@@ -86,8 +86,8 @@ export function createEditorStore(name: string): EditorStore {
           set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: String((failure as Error).message), again } });
           return;
         }
-        const title = "Changed in another window";
-        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it.", again } });
+        const title = "Changed in another tab";
+        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it; you can make it again on top.", again } });
         return;
       }
       const failed = status <= 0 || status >= 500;

@@ -18,6 +18,8 @@ const EDGES_FROM = 7;
 const CROWD = 300;
 /** More names than these would lie on top of each other. */
 const FEW = 3;
+/** Least length of the arrow at the pointer, pixels. */
+const ARROW = 26;
 /** No body reaches further from its middle, metres. */
 const ROOM = 12;
 const UNUSABLE = "#8b949d";
@@ -79,7 +81,9 @@ export class SceneLayer {
     for (const flow of scene.flows) drawFlow(context, at(flow.x, flow.y), flow, palette);
     if (scene.hover && scene.hoverText) {
       const [x, y] = at(scene.hover.x, scene.hover.y);
-      tag(context, scene.hoverText, x, y + 24);
+      // Below the arrow where it points down.
+      const down = Math.max(0, -Math.sin(scene.hover.hdg)) * Math.max(ARROW, 4 * view.scale);
+      tag(context, scene.hoverText, x, y + 24 + down);
     }
   }
 
@@ -175,7 +179,7 @@ export class SceneLayer {
     context.fill();
     context.stroke();
     if (!place.walk) {
-      const tip = Math.max(26, 4 * view.scale);
+      const tip = Math.max(ARROW, 4 * view.scale);
       context.beginPath();
       context.moveTo(9, 0);
       context.lineTo(tip, 0);
