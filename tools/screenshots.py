@@ -1,7 +1,7 @@
 """Writes docs/images/page-*.png: every view of the page, light and dark.
 
-``python -m tools.screenshots [FOLDER]``. Colours are reduced to a palette, which a page hardly shows
-and which makes the files a third as large.
+``python -m tools.screenshots [FOLDER]``. Colours are reduced to a palette, which hardly shows
+and makes the files a third as large.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ class Camera:
         self.user, self.scheme, self.folder = user, scheme, folder
 
     def take(self, view: str) -> None:
+        """Keep what is seen now, once nothing moves, under the view's name."""
         settle(self.user.page)
         raw = Image.open(io.BytesIO(self.user.page.screenshot())).convert("RGB")
         path = self.folder / f"page-{view}-{self.scheme}.png"
