@@ -21,7 +21,7 @@ from tests.browser.pages import OdscenPage, settle
 from tools import page as tool
 
 IMAGES = tool.ROOT / "docs/images"
-MAP = "signal_crossing"
+MAP = "town_5x5"
 SIZE = {"width": 1280, "height": 800}
 LARGEST = 400_000
 
@@ -51,7 +51,7 @@ def main() -> None:
         workspace = Workspace.open(Path(name))
         for path in shipped_maps():
             workspace.add_map(path)
-        made = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.3)[0]
+        made = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.15, roi_segments=7)[0]
         scenario = made.name.removesuffix(workflow.SUFFIX)
         with tool.served(Path(name)) as server, tool.launched() as browser:
             for scheme in ("light", "dark"):
@@ -65,10 +65,13 @@ def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path)
         camera = Camera(user, scheme, folder)
         user.open_catalogue()
         expect(user.maps).to_have_count(len(shipped_maps()))
+        user.page.wait_for_load_state("networkidle")  # the cards' pictures
         camera.take("catalogue")
         user.open_editor(scenario)
         for step in ("Region", "Weather and time"):
             user.step(step).click()
+            if step == "Region":
+                user.page.get_by_role("button", name="Show the region").click()
             camera.take(step.split(maxsplit=1)[0].lower())
         user.step("Road users").click()
         user.names.first.click()
