@@ -39,7 +39,7 @@ export function HeadTools({ store, onKeys, onTour }: { store: EditorStore; onKey
             onClick={() => void act()}>{icon}</ActionIcon>
         </Tooltip>
       ))}
-      <Menu position="bottom-end">
+      <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
         <Menu.Target><Button variant="default" leftSection={<IconMenu />}>Scenario</Button></Menu.Target>
         <Menu.Dropdown>
           <Menu.Item onClick={() => setDialog("rename")}>Rename …</Menu.Item>
