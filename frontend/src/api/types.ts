@@ -166,14 +166,6 @@ export interface ApiErrorBody {
   problems?: (Problem | string)[];
 }
 
-export interface RunInfo {
-  state: string;
-  speed?: number | null;
-  progress?: { time: number; until: number; running: number; arrived: number; planned: number } | null;
-  summary?: Record<string, unknown> | null;
-  error?: ApiErrorBody | string | null;
-}
-
 /** One change; `kind` is the name of a function of `odscen.scenario.edits`. */
 export interface Edit {
   kind: string;
