@@ -156,6 +156,8 @@ export interface ScenarioEntry {
 export interface Job {
   state: "queued" | "running" | "done" | "failed";
   step?: string | null;
+  /** Name of what was made. */
+  result?: string | null;
   share?: number | null;
   error?: ApiErrorBody | string | null;
 }

@@ -23,8 +23,8 @@ interface Props {
 }
 
 const W = 352;
-const H = 190;
-const BOX = { left: 40, right: W - 10, top: 16, bottom: H - 34 };
+const H = 200;
+const BOX = { left: 40, right: W - 10, top: 28, bottom: H - 34 };
 const ROWS = 24;
 
 /** A small chart with round axes; the same numbers are a table below it. */
@@ -32,7 +32,7 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
   const id = useId();
   const known = [...series.flatMap((one) => one.values), ...(band?.high ?? [])].filter((v) => v !== null);
   const yTicks = ticks(Math.max(0, ...known));
-  const xTicks = ticks(x[x.length - 1] ?? 1, 5).filter((v) => v <= (x[x.length - 1] ?? 1) * 1.001);
+  const xTicks = ticks(x[x.length - 1] ?? 1, 6).filter((v) => v <= (x[x.length - 1] ?? 1) * 1.001);
   const [xMost, yMost] = [x[x.length - 1] || 1, yTicks[yTicks.length - 1]];
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / xMost;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / yMost;
@@ -49,7 +49,7 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
         ))}
         {xTicks.map((v) => <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">{v.toLocaleString("en")}</text>)}
         <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">{xLabel}</text>
-        <text x={2} y={10}>{yLabel}</text>
+        <text x={2} y={12}>{yLabel}</text>
         {band && <path d={area(band.low.map(point), band.high.map(point))} fill={series[0].color} opacity={0.22} />}
         {bars
           ? series[0].values.map((v, k) => v === null || k + 1 >= x.length ? null : (

@@ -1,4 +1,4 @@
-import { Alert, Loader, Table, Text, Title } from "@mantine/core";
+import { Alert, Anchor, Loader, Table, Text, Title, VisuallyHidden } from "@mantine/core";
 import { useCallback } from "react";
 
 import { type RunInfo, runs, type Summary } from "../api/runs";
@@ -27,11 +27,11 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
     <>
       <Title order={3} size="h5">Compared with the last run</Title>
       <Text size="sm" mt={4}>
-        <a href={hashOf({ view: "run", scenario, run: last.info.run })}>{last.info.finished ? when(last.info.finished) : last.info.run}</a>.{" "}
+        <Anchor href={hashOf({ view: "run", scenario, run: last.info.run })}>{last.info.finished ? when(last.info.finished) : last.info.run}</Anchor>.{" "}
         {last.changed ? "The scenario was changed in between." : "The scenario is the same."}
       </Text>
       <Table mt="xs" verticalSpacing={4} fz={13} aria-label="Compared with the last run">
-        <Table.Thead><Table.Tr><Table.Th><span className="mantine-visually-hidden">Figure</span></Table.Th><Table.Th>This run</Table.Th><Table.Th>Last run</Table.Th><Table.Th>Difference</Table.Th></Table.Tr></Table.Thead>
+        <Table.Thead><Table.Tr><Table.Th><VisuallyHidden>Figure</VisuallyHidden></Table.Th><Table.Th>This run</Table.Th><Table.Th>Last run</Table.Th><Table.Th>Difference</Table.Th></Table.Tr></Table.Thead>
         <Table.Tbody>
           {compared(summary, last.summary).map((one) => (
             <Table.Tr key={one.label}>

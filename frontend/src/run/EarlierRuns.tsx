@@ -1,4 +1,4 @@
-import { ActionIcon, Alert, Anchor, Button, Group, Loader, Modal, Table, Text } from "@mantine/core";
+import { ActionIcon, Alert, Anchor, Button, Group, Loader, Modal, Table, Text, VisuallyHidden } from "@mantine/core";
 import { useCallback, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
@@ -24,7 +24,7 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
   return (
     <>
       <Table verticalSpacing={6} fz={14} aria-label="Runs of this scenario">
-        <Table.Thead><Table.Tr><Table.Th>Ended</Table.Th><Table.Th>How</Table.Th><Table.Th><span className="mantine-visually-hidden">Actions</span></Table.Th></Table.Tr></Table.Thead>
+        <Table.Thead><Table.Tr><Table.Th>Ended</Table.Th><Table.Th>How</Table.Th><Table.Th><VisuallyHidden>Actions</VisuallyHidden></Table.Th></Table.Tr></Table.Thead>
         <Table.Tbody>
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>

@@ -12,6 +12,8 @@ export interface Now {
   pace: number;
   running: number;
   arrived: number;
+  /** Whether whoever is followed is on the road. */
+  there: boolean;
 }
 
 /** The newest picture of a run, live or recorded, and who is followed in it. */
@@ -30,7 +32,7 @@ export interface Picture {
 }
 
 export function usePicture(handle: RefObject<MapHandle | null>): Picture {
-  const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0 });
+  const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0, there: false });
   const [followed, setFollowed] = useState<string | null>(null);
   const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
   const watched = useRef<string | null>(null);
@@ -45,8 +47,8 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     pending.current ||= window.setTimeout(() => {
       pending.current = 0;
       if (!last.current) return;
-      const { time, pace, count, arrived } = last.current.frame;
-      setNow({ time, pace, running: count, arrived });
+      const { frame: { time, pace, count, arrived }, moving: { followed: row } } = last.current;
+      setNow({ time, pace, running: count, arrived, there: row >= 0 });
     }, READABLE);
   }, [handle]);
   const redraw = useCallback(() => {
@@ -55,6 +57,7 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
   const clear = useCallback(() => {
     last.current = null;
     handle.current?.setMoving(null);
+    setNow((old) => ({ ...old, running: 0, there: false }));
   }, [handle]);
   const follow = useCallback((id: string | null) => {
     watched.current = id;
