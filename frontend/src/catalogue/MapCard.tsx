@@ -22,8 +22,8 @@ export function MapCard({ map, starting, onStart, onRemove, onReport }: {
         <ul className="card-facts" style={{ flex: 1, alignContent: "flex-start" }}>
           {mapFacts(map.statistics).map((fact) => <li key={fact}>{fact}</li>)}
         </ul>
-        <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>New scenario here</Button>
-        <Button fullWidth mt={6} variant="subtle" size="compact-sm" onClick={onReport} aria-label={`How ${map.name} was taken over`}>How it was taken over</Button>
+        <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>New scenario</Button>
+        <Button fullWidth mt={6} variant="subtle" size="compact-sm" onClick={onReport} aria-label={`How it was taken over: ${map.name}`}>How it was taken over</Button>
       </div>
     </Card>
   );

@@ -11,6 +11,5 @@ export function stepWords(step: string): string {
   const [, name, said] = /^(?:([^:]+): )?(.*)$/.exec(step) ?? [];
   const at = STEPS.findIndex(([key]) => key === said);
   const words = at < 0 ? said.replaceAll("SUMO", "simulation") : `step ${at + 1} of ${STEPS.length}: ${STEPS[at][1]}`;
-  const text = name ? `${name}, ${words}` : words;
-  return text.charAt(0).toUpperCase() + text.slice(1);
+  return name ? `${name}, ${words}` : words.charAt(0).toUpperCase() + words.slice(1);
 }

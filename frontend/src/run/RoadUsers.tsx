@@ -43,10 +43,10 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
         onChange={(event) => setSearch(event.currentTarget.value)} />
       {rows.length === 0 && <Text size="sm" c="dimmed" mt="sm">Nobody is on the road now.</Text>}
       {rows.length > 0 && found.length === 0 && <Text size="sm" mt="sm">Nobody on the road is called “{search}”.</Text>}
-      <ul className="rows" aria-label="Road users">
+      <ul className="rows" aria-label="Follow a road user">
         {found.slice(0, LISTED).map((row) => (
           <li key={row.id}>
-            <button type="button" aria-pressed={row.id === followed} aria-label={`Follow ${row.id}, ${CATEGORY_WORD[row.category]}, ${kmh(row.speed)}`}
+            <button type="button" aria-pressed={row.id === followed}
               onClick={() => follow(row.id === followed ? null : row.id)}>
               <CategoryGlyph category={row.category} size={20} />{row.id}{row.ego && " (yours)"}<span className="far">{kmh(row.speed)}</span>
             </button>
