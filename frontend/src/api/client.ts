@@ -1,5 +1,5 @@
 import type {
-  ApiErrorBody, Assets, Edit, GraphColumns, Job, MapInfo, ScenarioEntry, ScenarioState,
+  ApiErrorBody, Assets, Edit, GraphColumns, Job, MapInfo, Roi, ScenarioEntry, ScenarioState,
 } from "./types";
 import type { PackedDrawing } from "../map/drawing";
 
@@ -65,8 +65,11 @@ export const api = {
   removeScenario: (name: string) => send<undefined>("DELETE", `/scenarios/${enc(name)}`),
   rename: (name: string, to: string) =>
     send<ScenarioState | undefined>("PUT", `/scenarios/${enc(name)}/name`, { name: to }),
-  edit: (name: string, version: number, edit: Edit) =>
-    send<ScenarioState>("POST", `/scenarios/${enc(name)}/edits`, { version, edit }),
+  copyScenario: (name: string, to: string) =>
+    send<ScenarioState>("POST", `/scenarios/${enc(name)}/copy`, { name: to }),
+  /** All of them or none, and one step for undo. */
+  edit: (name: string, version: number, edits: readonly Edit[], label?: string) =>
+    send<ScenarioState>("POST", `/scenarios/${enc(name)}/edits`, label ? { version, edits, label } : { version, edits }),
   undo: (name: string, version: number) =>
     send<ScenarioState>("POST", `/scenarios/${enc(name)}/undo`, { version }),
   redo: (name: string, version: number) =>
@@ -77,7 +80,7 @@ export const api = {
     ask<{ nodes: string[]; points: [number, number][] }>(
       `/scenarios/${enc(name)}/path?spawn=${enc(spawn)}&goal=${enc(goal)}`),
   roi: (name: string) =>
-    ask<{ inside: string[]; candidates: string[] }>(`/scenarios/${enc(name)}/roi`),
+    ask<Roi>(`/scenarios/${enc(name)}/roi`),
   downloadUrl: (name: string, form: "json" | "graphml") =>
     `${BASE}/scenarios/${enc(name)}/download?form=${form}`,
   uploadScenario: (file: File) => upload<ScenarioState>("/scenarios/upload", file),

@@ -110,7 +110,7 @@ export function AddMap({ empty, onAdded, onReport }: {
         )}
       </div>
       {added.map((name) => (
-        <Alert key={name} color="teal" mt="sm" role="status" title={`${name} is ready`}>
+        <Alert key={name} color="blue" mt="sm" role="status" title={`${name} is ready`}>
           <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>How {name} was taken over</Button>
         </Alert>
       ))}

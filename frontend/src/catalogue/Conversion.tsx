@@ -11,7 +11,7 @@ const NAMED = 40;
 /** How a map was taken over, in plain words. */
 export function Conversion({ map, onClose }: { map: string; onClose: () => void }) {
   return (
-    <Modal opened onClose={onClose} size="lg" title={`How ${map} was taken over`} closeButtonProps={{ "aria-label": "Close" }}>
+    <Modal opened onClose={onClose} size="lg" title={`How ${map} was taken over`}>
       <Body map={map} />
     </Modal>
   );

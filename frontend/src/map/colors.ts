@@ -9,6 +9,8 @@ export const ROI_BASE = "#123F8C";
 export const ROI_MEMBER = "#2B62BD";
 export const ELIGIBLE = "#7CC8FF";
 export const GOAL = "#5AC3FF";
+/** Streams of vehicles; those of people have the colour of their places. */
+export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
 
 export interface Palette {
