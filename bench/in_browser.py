@@ -130,7 +130,7 @@ def paced(browser: Browser, url: str, scenario: str) -> None:
     with _user(browser, url) as user:
         run = _start(url, scenario, speed=1)
         user.page.goto(f"/#/run/{scenario}/{run}")
-        user.wait_until_moving()
+        user.page.wait_for_function("odscenProbe.frames.length > 20", timeout=120_000)
         for what, pan in (("still", False), ("panned all the time", True)):
             begun = len(_frames(user.page))
             end = time.monotonic() + 6
@@ -143,7 +143,7 @@ def paced(browser: Browser, url: str, scenario: str) -> None:
             seconds = (seen[-1][0] - seen[0][0]) / 1000
             steps = (seen[-1][1] - seen[0][1]) / seconds
             print(
-                f"{seen[-1][2]:.0f} vehicles at 20 steps a second, map {what}: {steps:.1f} steps and "
+                f"{seen[-1][2]:.0f} vehicles at 20 steps/s, map {what}: {steps:.1f} steps/s and "
                 f"{(len(seen) - 1) / seconds:.1f} drawn frames/s (aim 20)"
             )
         httpx2.post(f"{url}/api/runs/{run}/control", json={"action": "stop"})

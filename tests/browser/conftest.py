@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
 from odscen import workflow
 from odscen.catalog.store import Workspace
@@ -22,6 +22,8 @@ SHIPPED = tool.ROOT / "maps"
 CROSSING = "signal_crossing"
 PATIENCE = 20_000
 """Milliseconds that a state may take to come about on a busy machine."""
+
+expect.set_options(timeout=PATIENCE)
 
 _report = pytest.StashKey[pytest.TestReport]()
 

@@ -166,12 +166,19 @@ class OdscenPage:
             self.page.keyboard.press("Shift+Tab" if back else "Tab")
         pytest.fail(f"{wanted} is not reached with the Tab key")
 
+    @property
+    def tour(self) -> Locator:
+        return self.page.get_by_role("dialog", name="Short tour")
+
     def close_tour(self) -> None:
-        """Closes the tour for first users, if it is there."""
-        tour = self.page.get_by_role("dialog")
-        if tour.count():
-            tour.get_by_role("button", name=re.compile("close|skip", re.IGNORECASE)).first.click()
-            expect(tour).to_have_count(0)
+        """Close the tour that first users see."""
+        self.tour.get_by_role("button", name="Close the tour").click()
+        expect(self.tour).to_have_count(0)
+
+    def choose_in_menu(self, entry: str) -> None:
+        """Choose from the menu of the scenario in the head of the page."""
+        self.page.get_by_role("banner").get_by_role("button", name="Scenario").click()
+        self.page.get_by_role("menuitem", name=re.compile(f"^{entry}")).click()
 
     # Catalogue
 
@@ -211,6 +218,10 @@ class OdscenPage:
 
     def kind(self, word: str) -> Locator:
         palette = self.page.get_by_role("group", name="Kind of road user to place")
+        return palette.get_by_role("button", name=word, exact=True)
+
+    def stream(self, word: str) -> Locator:
+        palette = self.page.get_by_role("group", name="Stream to place")
         return palette.get_by_role("button", name=word, exact=True)
 
     @property

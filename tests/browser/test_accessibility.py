@@ -126,13 +126,26 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
     user.keys.click()
     expect(user.page.get_by_role("dialog")).to_be_visible()
     inspector.look("editor-keys")
+    user.page.keyboard.press("Escape")
+    for entry, view in (("Rename", "rename"), ("Save as", "copy"), ("Open another", "open")):
+        user.choose_in_menu(entry)
+        expect(user.page.get_by_role("dialog")).to_be_visible()
+        inspector.look(f"editor-{view}")
+        user.page.keyboard.press("Escape")
+        expect(user.page.get_by_role("dialog")).to_have_count(0)
 
 
 def test_the_tour(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url, tour=True)
     user.open_editor(sampled)
-    for number in range(1, 1 + user.walk_tour(lambda number: inspector.look(f"tour-{number}"))):
-        assert (ARTEFACTS / f"views/tour-{number}-{inspector.scheme}.png").is_file()
+    for number in (1, 2, 3):
+        expect(user.tour).to_contain_text(f"{number} of 3")
+        inspector.look(f"tour-{number}")
+        user.tour.get_by_role("button", name="Done" if number == 3 else "Next").click()
+    expect(user.tour).to_have_count(0)
+    user.page.reload()
+    user.wait_for_editor()
+    expect(user.tour).to_have_count(0)
 
 
 def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:

@@ -169,3 +169,28 @@ def test_a_scenario_that_is_not_there_is_said_with_a_way_back(user: OdscenPage) 
     expect(user.page.get_by_role("alert")).to_contain_text("nowhere")
     user.page.get_by_role("button", name="Back to the maps").click()
     expect(user.maps).to_have_count(1)
+
+
+def test_a_stream_of_traffic_is_placed_and_undone(region: OdscenPage) -> None:
+    region.step("Road users").click()
+    region.stream("Stream of traffic").click()
+    with region.changing():
+        region.map.click(region.graph.starts(region.document()["roi"], 3)[2])
+    (flow,) = region.document()["flows"]
+    assert flow["per_hour"] > 0
+    expect(region.names).to_have_count(1)
+    with region.changing():
+        region.undo.click()
+    assert region.document()["flows"] == []
+
+
+def test_a_random_crowd_fills_the_region_in_one_step(region: OdscenPage) -> None:
+    region.step("Road users").click()
+    region.page.get_by_role("button", name="Fill the region at random").click()
+    button = region.page.get_by_role("button", name="Fill the region", exact=True)
+    with region.changing():
+        button.click()
+    assert len(region.document()["actors"]) > 5
+    with region.changing():
+        region.undo.click()
+    assert region.document()["actors"] == []

@@ -170,6 +170,8 @@ export interface ScenarioEntry {
 export interface Job {
   state: "queued" | "running" | "done" | "failed";
   step?: string | null;
+  /** Name of what was made. */
+  result?: string | null;
   share?: number | null;
   error?: ApiErrorBody | string | null;
 }
@@ -187,14 +189,6 @@ export interface Roi {
   inside: string[];
   candidates: string[];
   removable: string[];
-}
-
-export interface RunInfo {
-  state: string;
-  speed?: number | null;
-  progress?: { time: number; until: number; running: number; arrived: number; planned: number } | null;
-  summary?: Record<string, unknown> | null;
-  error?: ApiErrorBody | string | null;
 }
 
 /** One change; `kind` is the name of a function of `odscen.scenario.edits`. */

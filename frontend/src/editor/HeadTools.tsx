@@ -46,6 +46,7 @@ export function HeadTools({ store, onKeys, onTour }: { store: EditorStore; onKey
           <Menu.Item onClick={() => setDialog("copy")}>Save as …</Menu.Item>
           <Menu.Item onClick={() => setDialog("open")}>Open another …</Menu.Item>
           <Menu.Item onClick={() => file.current?.click()}>Upload a file …</Menu.Item>
+          <Menu.Item onClick={() => go({ view: "runs", scenario: name })}>Earlier runs</Menu.Item>
           <Menu.Divider />
           <Menu.Item leftSection={<IconDown size={15} />} component="a" href={api.downloadUrl(name, "json")} download>Download as a document (JSON)</Menu.Item>
           <Menu.Item leftSection={<IconDown size={15} />} component="a" href={api.downloadUrl(name, "graphml")} download>Download as a graph (GraphML)</Menu.Item>

@@ -10,7 +10,7 @@ import type { Graph } from "./graph";
 import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
-import type { Moving, Scene } from "./scene";
+import type { Mark, Moving, Scene } from "./scene";
 import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 
@@ -25,6 +25,7 @@ export interface Pointed {
 export interface MapHandle {
   setMoving(moving: Moving | null): void;
   setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  setMarks(marks: readonly Mark[]): void;
   show(bounds: Bounds): void;
   centre(x: number, y: number): void;
   /** Acts on the middle, as Enter does. */
@@ -128,6 +129,7 @@ export function MapCanvas({
   useImperativeHandle(handle, () => ({
     setMoving: (moving) => renderer.current?.setMoving(moving),
     setLamps: (lamps) => renderer.current?.setLamps(lamps),
+    setMarks: (marks) => renderer.current?.setMarks(marks),
     show: (bounds) => apply(fit(bounds, size.current, 0.15)),
     centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
     pickMiddle: () => onPick?.({ x: view.current.x, y: view.current.y, reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale, shift: false }),

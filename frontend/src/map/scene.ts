@@ -72,3 +72,13 @@ export interface Moving {
   ego: number;
   followed: number;
 }
+
+/** A place where something happened; `fresh` just now. */
+export interface Mark {
+  x: number;
+  y: number;
+  kind: MarkKind;
+  fresh: boolean;
+}
+
+export type MarkKind = "collision" | "braking" | "lifted";
