@@ -69,9 +69,12 @@ class Watch:
         self._measure()
         return True
 
-    def show(self, session: Session, recorder: Recorder) -> None:
-        """Send a frame if one is wanted and this step has none yet; and what has changed."""
-        if not self.steering.frame_wanted or self._framed == self._step:
+    def show(self, session: Session, recorder: Recorder, *, last: bool = False) -> None:
+        """Send a frame, and what has changed, unless this step has one already.
+
+        Only if one is wanted; the last one in any case, for who asks for it later.
+        """
+        if self._framed == self._step or not (last or self.steering.frame_wanted):
             return
         self.steering.frame_wanted = False
         self._framed = self._step
