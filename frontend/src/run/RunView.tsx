@@ -127,7 +127,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
         </aside>
       </div>
       {ended && mode !== null
-        ? <ReplayStrip player={player} running={now.running} incidents={incidents} onBack={back} onPlay={() => { setMode("replay"); player.play(); }} />
+        ? <ReplayStrip player={player} recorded={replayable} running={now.running} incidents={incidents} onBack={back} onPlay={() => { setMode("replay"); player.play(); }} />
         : <LiveStrip info={info} now={now} onBack={back} learn={learn} />}
     </div>
   );
