@@ -175,7 +175,8 @@ def hurried(browser: Browser, url: str, scenario: str) -> None:
                 run = _start(url, scenario, speed=None)
                 if kind == "never read":
                     live = f"{url.replace('http', 'ws')}/api/runs/{run}/live"
-                    stack.enter_context(connect(live, max_queue=1, close_timeout=0.1))
+                    never = connect(live, max_queue=1, close_timeout=0.1, ping_interval=None)
+                    stack.enter_context(never)
                 if user:
                     user.page.goto(f"/#/run/{scenario}/{run}")
                 values.append(_duration(url, run))

@@ -1,6 +1,6 @@
 import "./run.css";
 
-import { Alert, Button, Loader, Tabs } from "@mantine/core";
+import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import type { Category } from "../api/types";
@@ -80,7 +80,8 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   if (wrong) {
     return (
       <div className="catalogue">
-        <Alert color="red" title="This run cannot be shown">{wrong}</Alert>
+        <Title order={1} size="h3" mb="sm">This run cannot be shown</Title>
+        <Alert color="red">{wrong}</Alert>
         <Button mt="md" onClick={back}>Back to the editor</Button>
       </div>
     );
