@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def travel_times(folder: Path, *, ignores_red: bool) -> np.ndarray:
         spawn = int(random.integers(len(walks.x)))
         goal = int(random.choice(router.goal_candidates(spawn)))
         path = router.path(spawn, goal).tolist()
-        if not any(frozenset(step) in over for step in zip(path, path[1:], strict=False)):
+        if not any(frozenset(step) in over for step in pairwise(path)):
             continue
         scenario = edits.add_actor(
             scenario,
