@@ -140,7 +140,8 @@ def read_baseline(file: Path) -> Baseline | None:
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {error}", file=str(file)) from error
+        msg = f"cannot be read: {error}"
+        raise InputError(msg, file=str(file)) from error
     with in_file(str(file)):
         try:
             return _from_data(json.loads(text))

@@ -150,9 +150,7 @@ def _found(file: Path, key: str, pattern: str) -> list[Path]:
     return found
 
 
-def _case(
-    document: _Document, entry: _ScenarioEntry, path: Path, folder: Path | None
-) -> Case:
+def _case(document: _Document, entry: _ScenarioEntry, path: Path, folder: Path | None) -> Case:
     name = folder_name(path)
     tolerances = _tolerances(document.tolerance) | _tolerances(entry.tolerance)
     expect = dict.fromkeys((*document.expect, *entry.expect))

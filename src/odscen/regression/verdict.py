@@ -36,20 +36,26 @@ class Change:
     counts: bool
 
     @property
-    def words(self) -> str:
-        """``"mean_delay is 31.20 s, was 24.00 s (+7.20 s, +30.0 %; allowed 2 % or 0.50 s)"``."""
+    def row(self) -> tuple[str, str, str, str, str]:
+        """Figure, baseline, value, difference and what is allowed, for people."""
         figure, found = self.key.figure, self.difference
-        now = "none" if found.b is None else with_unit(found.b, figure)
-        before = "none" if found.a is None else with_unit(found.a, figure)
+        before, now = (
+            "none" if value is None else with_unit(value, figure) for value in (found.a, found.b)
+        )
         how_far = []
         if found.difference is not None:
             sign = "+" if found.difference > 0 else "-"
             how_far.append(f"{sign}{with_unit(abs(found.difference), figure)}")
         if found.relative is not None:
             how_far.append(f"{100 * found.relative:+.1f} %")
-        allowed = f"allowed {self.tolerance.words(figure)}"
-        size = "; ".join([", ".join(how_far), allowed] if how_far else [allowed])
-        return f"{self.key.name} is {now}, was {before} ({size})"
+        return self.key.name, before, now, ", ".join(how_far), self.tolerance.words(figure)
+
+    @property
+    def words(self) -> str:
+        """``"mean_delay is 31.20 s, was 24.00 s (+7.20 s, +30.0 %; allowed 2 % or 0.50 s)"``."""
+        name, before, now, how_far, allowed = self.row
+        size = f"{how_far}; allowed {allowed}" if how_far else f"allowed {allowed}"
+        return f"{name} is {now}, was {before} ({size})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,5 +155,3 @@ def _vehicles(
     new = sum(runs[seed].get(own) or 0.0 for seed in seeds)
     chosen = max(old, new) if key.figure == "vehicles" else min(old, new)
     return chosen / max(1, len(seeds))
-
-
