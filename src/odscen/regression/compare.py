@@ -132,7 +132,8 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     else:
         folders = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
     if not folders:
-        raise InputError(f"no run here: there is no {SUMMARY_FILE}", file=str(folder))
+        msg = f"no run here: there is no {SUMMARY_FILE}"
+        raise InputError(msg, file=str(folder))
     runs: dict[int, Measured] = {}
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
@@ -164,9 +165,11 @@ def _summary(folder: Path) -> dict[str, Any]:
         summary = json.loads(file.read_text(encoding="utf-8"))
         status, seed = summary["status"], summary["seed"]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"not the summary of a run: {error!r}", file=str(file)) from error
+        msg = f"not the summary of a run: {error!r}"
+        raise InputError(msg, file=str(file)) from error
     if status != "completed" or not isinstance(seed, int):
-        raise InputError(f"the run has not completed, it is {status!r}", file=str(file))
+        msg = f"the run has not completed, it is {status!r}"
+        raise InputError(msg, file=str(file))
     return dict(summary)
 
 

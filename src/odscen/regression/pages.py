@@ -36,8 +36,8 @@ def suite_page(result: SuiteResult) -> str:
     rows = [_case_row(case) for case in result.cases]
     heads = ("Scenario", "Map", "Verdict", "Seeds", "Computed in, s")
     explained = (
-        "each scenario is run once per seed, the number that decides all chance. It passes if every "
-        "run meets what is expected of it and the means are within tolerance of the baseline."
+        "each scenario is run once per seed, the number that decides all chance. It passes if "
+        "every run meets what is expected of it and the means are within tolerance of the baseline."
     )
     body = [head, report_section("Scenarios", table(heads, rows), explained=explained, ident="all")]
     body += [_case_section(case) for case in result.cases if lines(case)]
@@ -97,8 +97,9 @@ def comparison_page(result: RunComparison) -> str:
     )
     heads = ("Figure", "Unit", "A", "B", "B - A", "95 % interval", "Verdict")
     explained = (
-        "A and B are means over the runs of each side. If the same comparison were made many times, "
-        "19 of 20 such intervals would hold the true difference; one that leaves out zero is clear."
+        "A and B are means over the runs of each side. If the same comparison were made many "
+        "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
+        "is clear."
     )
     figures = [row for row in result.rows if row.key.kind == "run"]
     body = [head, report_section("Key figures", table(heads, _rows(figures)),

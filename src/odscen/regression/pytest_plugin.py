@@ -61,7 +61,7 @@ class _ScenarioTest(pytest.Item):
         self.seed = seed
 
     def runtest(self) -> None:
-        factory: pytest.TempPathFactory = self.config._tmp_path_factory  # type: ignore[attr-defined]  # noqa: SLF001
+        factory: pytest.TempPathFactory = self.config._tmp_path_factory  # type: ignore[attr-defined]
         try:
             seed = None if self.seed is None else int(self.seed)
         except ValueError:
@@ -94,8 +94,8 @@ def odscen_run(
     """Return a function that runs a scenario and gives its :class:`RunResult`.
 
     ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``; the result has
-    ``status``, ``summary`` (figures, counts) and ``folder`` (trajectories, events). A run that fails
-    or falls short of ``expect`` fails the test.
+    ``status``, ``summary`` (figures, counts) and ``folder`` (trajectories, events). A run that
+    fails or falls short of ``expect`` fails the test.
     """
 
     def run(

@@ -106,7 +106,8 @@ def read_suite(file: Path) -> Suite:
     try:
         data = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"the suite cannot be read: {error}", file=str(file)) from error
+        msg = f"the suite cannot be read: {error}"
+        raise InputError(msg, file=str(file)) from error
     try:
         document = _Document.model_validate(data)
     except ValidationError as error:
@@ -143,7 +144,8 @@ def _found(file: Path, key: str, pattern: str) -> list[Path]:
     try:
         found = sorted(path for path in file.parent.glob(pattern) if path.is_file())
     except (ValueError, NotImplementedError) as error:
-        raise InputError(f"{pattern!r}: {error}", file=str(file), element=key) from error
+        msg = f"{pattern!r}: {error}"
+        raise InputError(msg, file=str(file), element=key) from error
     if not found:
         msg = f"there is no file {pattern!r} in {file.parent}"
         raise InputError(msg, file=str(file), element=key)

@@ -99,10 +99,12 @@ def hold_against(
     changes = []
     for key in keys:
         stored = baseline.figures.get(key)
+        old: dict[int, float | None]
         old = {seed: None if stored is None else stored[position[seed]] for seed in seeds}
         new = {seed: runs[seed].get(key) for seed in seeds}
         if key.place and key.figure == "vehicles":  # a place that nobody passes has no row
-            old, new = ({seed: v or 0.0 for seed, v in row.items()} for row in (old, new))
+            old = {seed: value or 0.0 for seed, value in old.items()}
+            new = {seed: value or 0.0 for seed, value in new.items()}
         weight = _vehicles(key, baseline, runs, seeds, position)
         change = _change(key, compare_figure(old, new), tolerances, weight)
         if change is not None:

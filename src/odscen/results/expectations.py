@@ -1,7 +1,7 @@
 """Expectations of a run, such as ``arrived>=0.95`` or ``mean_delay <= 40 s`` (requirement R58).
 
-``NAME OP NUMBER [UNIT]`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds, the
-counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
+``NAME OP NUMBER [UNIT]`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds,
+the counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
 mean_travel_time, ...). A *count* compared with a number from 0 to 1 that is written with a decimal
 point, or followed by ``%``, is taken as a share of the planned actors: ``arrived>=0.95``,
 ``arrived>=95%`` and ``arrived==1.0`` are shares, ``arrived>=1`` and ``collided==0`` are counts.

@@ -97,7 +97,7 @@ def figures_by_place(
     )
     if rows.is_empty():
         return {}
-    step = rows["timestep_time"].unique().sort().diff().min() or 0.0
+    step = rows.select(pl.col("timestep_time").unique().sort().diff().min()).item() or 0.0
     segment = index.segments_at(
         rows["vehicle_lane"].to_list(), rows.select("vehicle_x", "vehicle_y").to_numpy()
     )
