@@ -114,7 +114,7 @@ def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
 
 def _rows(baseline: Baseline) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = [
-        {"figure": key.figure, "values": list(values)}
+        {"figure": key.figure, "values": _plain(values)}
         for key, values in baseline.figures.items()
         if key.kind == "run"
     ]
@@ -122,9 +122,14 @@ def _rows(baseline: Baseline) -> list[dict[str, Any]]:
         places: dict[str, dict[str, Any]] = {}
         for key, values in baseline.figures.items():
             if key.kind == kind:
-                places.setdefault(key.place, {kind: key.place})[key.figure] = list(values)
+                places.setdefault(key.place, {kind: key.place})[key.figure] = _plain(values)
         rows += [places[name] for name in sorted(places)]
     return rows
+
+
+def _plain(values: Sequence[float | None]) -> list[float | None]:
+    """Whole numbers without a decimal point, as counts are written."""
+    return [int(v) if v is not None and v.is_integer() else v for v in values]
 
 
 def read_baseline(file: Path) -> Baseline | None:

@@ -26,7 +26,9 @@ def junit_xml(result: SuiteResult) -> str:
         "time": f"{seconds:.3f}",
     }
     root = etree.Element("testsuites", counts)
-    suite = etree.SubElement(root, "testsuite", {"name": result.suite.name, "skipped": "0"}, counts)
+    suite = etree.SubElement(
+        root, "testsuite", {"name": result.suite.name, "skipped": "0", **counts}
+    )
     for case in result.cases:
         _test_case(suite, case, result.suite.name)
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8").decode()

@@ -24,11 +24,22 @@ def reason(result: CaseResult) -> str | None:
 
 
 def where(result: CaseResult) -> str | None:
-    """Name the place that has changed most, and the actor, if something fails."""
+    """Name the segments, the junction and the actor that have changed most, if something fails.
+
+    Two segments: where one has changed, the next one often has as well.
+    """
     verdict = result.verdict
     if verdict is None or not verdict.failing:
         return None
-    named = [changes[0].words for changes in (verdict.places, verdict.actors) if changes]
+    changes = (*verdict.places, *verdict.actors)
+    first: dict[str, dict[str, str]] = {}
+    for change in changes:
+        first.setdefault(change.key.kind, {}).setdefault(change.key.place, change.words)
+    named = [
+        words
+        for kind, places in first.items()
+        for words in list(places.values())[: 2 if kind == "segment" else 1]
+    ]
     return f"most changed: {'; '.join(named)}" if named else None
 
 
