@@ -4,15 +4,20 @@ BIN := .venv/bin
 READY := .venv/ready
 QC := build/qc/ready
 
-.PHONY: demo test check format bench golden maps large-town check-maps clean
+.PHONY: demo test regression check format bench golden maps large-town check-maps clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
-# Set-up plus the tests.
+# Set-up plus the tests, the suite of scenarios on the shipped maps among them.
 test: $(READY) $(QC)
 	$(BIN)/python -m pytest
+	$(MAKE) regression
+
+# Scenarios on the shipped maps against their baselines; see docs/regression.md.
+regression: $(READY)
+	$(BIN)/odscen test suites/shipped.toml --jobs 2 --workspace build/regression --junit build/regression/junit.xml --html build/regression/report.html
 
 check: $(READY)
 	$(BIN)/ruff check .

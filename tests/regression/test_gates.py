@@ -10,7 +10,6 @@ from odscen.regression.junit import junit_xml
 from odscen.regression.pages import suite_page
 from odscen.regression.suite import read_suite
 from odscen.regression.words import lines, to_dict
-from tests.regression.conftest import ROOT
 
 
 def run(store, file, **options):
@@ -54,7 +53,7 @@ def test_a_longer_green_fails_naming_figure_junction_size_and_input(store, suite
 def test_a_lower_speed_limit_fails_naming_the_segment(store, suite):
     path = suite.parent / "maps" / "t_junction_signs.xodr"
     text = path.read_text()
-    road = next(road for road in re.findall(r"<road .*?</road>", text, re.S) if 'id="2"' in road)
+    road = re.search(r'<road name="Main Road" id="2".*?</road>', text, re.DOTALL)[0]
     slower = re.sub(r'<speed max="\d+"', '<speed max="20"', road)
     assert slower != road
     path.write_text(text.replace(road, slower))
@@ -178,10 +177,3 @@ def test_a_file_that_is_no_baseline_is_refused_before_anything_runs(store, suite
     path.write_text('{"format": "odscen-baseline", "version": 9}')
     with pytest.raises(InputError, match=r"signal_crossing\.json.*version 9"):
         run(store, suite)
-
-
-def test_the_shipped_suite_passes(store):
-    result = run(store, ROOT / "suites" / "shipped.toml")
-    assert [line for case in result.cases for line in lines(case)] == []
-    assert len(result.cases) == len(list((ROOT / "maps").glob("*.xodr")))
-    assert all(len(case.runs) == 3 for case in result.cases)
