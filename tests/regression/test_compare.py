@@ -75,7 +75,7 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
     assert delay.difference == pytest.approx(np.mean(seconds[3:]) - np.mean(seconds[:3]), abs=1e-3)
     assert any(row.key.place == "j10001" for row in result.places)
     page = comparison_page(result)
-    assert "junction j10001: waiting_time" in page
+    assert "junction j10001: waiting time" in page
     assert "95 % interval" in page
 
 

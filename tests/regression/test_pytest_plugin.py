@@ -53,7 +53,8 @@ def test_scenario_files_are_left_alone_unless_asked_for(project, workspace):
 
 def test_scenario_files_are_collected_with_every_seed(project, workspace):
     (project / "pytest.ini").write_text(
-        "[pytest]\nodscen_collect = true\nodscen_seeds = 1 2\nodscen_expect =\n    arrived >= 97 %\n"
+        "[pytest]\nodscen_collect = true\nodscen_seeds = 1 2\n"
+        "odscen_expect =\n    arrived >= 97 %\n"
     )
     done = run_pytest(project, workspace, "-v")
     assert done.returncode == 0, done.stdout
@@ -71,7 +72,8 @@ def test_a_missed_expectation_fails_the_file_in_plain_words(project, workspace):
 def test_the_fixture_gives_the_run_and_fails_what_falls_short(project, workspace):
     (project / "test_mine.py").write_text(
         "def test_good(odscen_run):\n"
-        "    run = odscen_run('t_junction_signs.scenario.json', seed=3, expect=['arrived >= 97 %'])\n"
+        "    expect = ['arrived >= 97 %']\n"
+        "    run = odscen_run('t_junction_signs.scenario.json', seed=3, expect=expect)\n"
         "    assert run.summary['seed'] == 3\n"
         "    assert (run.folder / 'trajectories.parquet').is_file()\n\n"
         "def test_bad(odscen_run):\n"

@@ -107,8 +107,13 @@ def compare(
     if as_json:
         print_json(result.to_dict())
         return
-    rows = [row.cells for row in result.rows if row.key.kind == "run"]
-    print_table("", ("figure", "unit", "A", "B", "B - A", "95 % interval", ""), rows)
+    rows = []
+    for row in result.rows:
+        if row.key.kind == "run":
+            figure, unit, a, b, difference, interval, says = row.cells
+            name = f"{figure}, {unit}" if unit else figure
+            rows.append((name, a, b, difference.split(" ")[0], interval or "-", says))
+    print_table("", ("figure", "A", "B", "B - A", "95 % interval", ""), rows)
     for row in result.places:
         log(f"changed most: {row.words}")
     for note in result.notes:

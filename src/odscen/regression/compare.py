@@ -54,12 +54,13 @@ class Row:
     def cells(self) -> tuple[str, ...]:
         """Figure, unit, both means, difference, interval, and what it says."""
         found, unit = self.difference, unit_of(self.key.figure)
-        interval = ""
-        if found.low is not None and found.high is not None:
-            interval = f"{found.low:+.2f} to {found.high:+.2f}"
+        interval = difference = ""
+        if found.low is not None and found.high is not None and found.low < found.high:
+            interval = f"{found.low:+,.2f} to {found.high:+,.2f}"
         a, b = (("-" if value is None else f"{value:,.2f}") for value in (found.a, found.b))
-        difference = "" if found.difference is None else f"{found.difference:+,.2f}"
-        if found.relative is not None and found.difference:
+        if found.difference is not None:
+            difference = f"{found.difference:+,.2f}" if found.difference else "0"
+        if found.relative:
             difference += f" ({100 * found.relative:+.1f} %)"
         return self.key.name, unit, a, b, difference, interval, self.says
 
@@ -70,10 +71,10 @@ class Row:
         if found.difference is None:
             return "only on one side" if found.a is not found.b else "not there"
         if found.difference == 0.0:
-            return "the same" if not found.clear and found.low in (None, 0.0) else "no difference"
+            return "the same"
         if found.clear is None:
-            return "one run each: may be chance"
-        return "clear" if found.clear else "may be chance"
+            return "too few runs"
+        return "clear" if found.clear else "unclear"
 
     @property
     def words(self) -> str:

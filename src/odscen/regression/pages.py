@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.catalog.markup import Markup, element, join
-from odscen.regression.words import lines
+from odscen.regression.words import lines, reason, where
 from odscen.results.report import page
 from odscen.results.report_tables import report_section, table
 
@@ -58,21 +58,28 @@ def _case_row(case: CaseResult) -> Markup:
 
 
 def _case_section(case: CaseResult) -> Markup:
-    told = element("ul", *(element("li", line) for line in lines(case)))
     changes = () if case.verdict is None else (*case.verdict.figures, *case.verdict.places)
+    in_table = {change.words for change in changes}
+    besides = [problem for problem in case.problems if problem not in in_table]
+    told = [*besides, *(text for text in (where(case), reason(case)) if text)]
     rows = [_change_row(change) for change in changes]
-    heads = ("Figure", "Baseline", "Now", "Difference", "Allowed", "")
+    heads = ("Figure", "Baseline", "Now", "Difference", "Allowed", "Verdict")
     explained = (
         "means over all seeds. Segments and junctions are named as on the map of the editor; those "
         "with the largest changes for the number of vehicles that passed stand first."
     )
     return report_section(
         case.case.name,
-        told,
-        table(heads, rows) if rows else None,
+        element("ul", *(element("li", line) for line in told)),
+        table(heads, rows, label=f"Figures of {case.case.name}") if rows else None,
         explained=explained,
         ident=f"case-{case.case.name}",
     )
+
+
+def _readable(name: str) -> str:
+    """``mean_delay`` as ``mean delay``."""
+    return name.replace("_", " ")
 
 
 def _change_row(change: Change) -> Markup:
@@ -80,7 +87,7 @@ def _change_row(change: Change) -> Markup:
     cells = [element("td", text, class_="n") for text in row[1:]]
     fails = element("td", "fails" if change.counts else "too few vehicles to fail",
                     class_="bad" if change.counts else "fair")  # fmt: skip
-    return element("tr", element("th", row[0], scope="row"), *cells, fails)
+    return element("tr", element("th", _readable(row[0]), scope="row"), *cells, fails)
 
 
 def comparison_page(result: RunComparison) -> str:
@@ -99,7 +106,7 @@ def comparison_page(result: RunComparison) -> str:
     explained = (
         "A and B are means over the runs of each side. If the same comparison were made many "
         "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
-        "is clear."
+        "is clear, one that holds zero may be chance."
     )
     figures = [row for row in result.rows if row.key.kind == "run"]
     body = [head, report_section("Key figures", table(heads, _rows(figures)),
@@ -109,7 +116,8 @@ def comparison_page(result: RunComparison) -> str:
             "segments by mean speed and junctions by the time that a vehicle stands before them; "
             "large changes where many vehicles pass come first."
         )
-        body.append(report_section("Where it changed most", table(heads, _rows(result.places)),
+        body.append(report_section("Where it changed most",
+                                   table(heads, _rows(result.places), label="Places"),
                                    explained=explained, ident="places"))  # fmt: skip
     return page(f"{title} - comparison", join(body))
 
@@ -123,7 +131,7 @@ def _rows(rows: Sequence[Row]) -> list[Markup]:
     return [
         element(
             "tr",
-            element("th", cells[0], scope="row"),
+            element("th", _readable(cells[0]), scope="row"),
             element("td", cells[1]),
             *(element("td", text, class_="n") for text in cells[2:6]),
             element("td", cells[6], class_="fair" if cells[6] == "clear" else None),

@@ -50,12 +50,14 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
     return element("section", element("h2", heading), *children, note, id=ident)
 
 
-def table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
-    """Table that scrolls inside its place; ``rows`` are ``tr`` elements."""
+def table(
+    heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
+) -> Markup:
+    """Table that scrolls inside its place; ``rows`` are ``tr`` elements, ``label`` names it."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
     content = element("table", head, element("tbody", *rows), **attributes)
     return element(
-        "div", content, class_="scroll", tabindex="0", role="region", aria_label=heads[0]
+        "div", content, class_="scroll", tabindex="0", role="region", aria_label=label or heads[0]
     )
 
 
