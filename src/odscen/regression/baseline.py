@@ -56,18 +56,15 @@ def fingerprint(
     The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
     left out, as the suite names the seeds, and so are name and description.
     """
-    document = scenario.model_dump(mode="json")
-    if until is not None:
-        document["simulation"]["duration"] = until
-    if step_length is not None:
-        document["simulation"]["step_length"] = step_length
-    parts = ("roi", "environment", "actors", "flows", "signals", "simulation")
-    known = {"format", "version", "name", "description", "map", "seed", *parts}
+    # What has its default value is left out: a field that a later version adds changes nothing.
+    document = scenario.model_dump(mode="json", exclude_defaults=True)
+    settings = {"duration": until, "step_length": step_length}
+    given = {name: value for name, value in settings.items() if value is not None}
+    document["simulation"] = document.get("simulation", {}) | given
+    for other in ("format", "version", "name", "description", "map", "seed"):
+        document.pop(other, None)
     found = {"map": map_sha256[:_SHORT]}
-    found |= {f"scenario.{part}": _digest(document[part]) for part in parts}
-    found |= {
-        f"scenario.{part}": _digest(value) for part, value in document.items() if part not in known
-    }
+    found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
     return found | {"odscen": __version__, "sumo": version("libsumo")}
 
 
