@@ -10,15 +10,20 @@ PAGE_SOURCES := $(shell find frontend/src frontend/public -type f) \
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test test-page chromium page check format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test regression test-page chromium page check format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
-# Set-up plus the tests.
+# Set-up plus the tests, the suite of scenarios on the shipped maps among them.
 test: test-page $(READY) $(QC) $(PAGE) chromium
 	$(BIN)/python -m pytest
+	$(MAKE) regression
+
+# Scenarios on the shipped maps against their baselines; see docs/regression.md.
+regression: $(READY)
+	$(BIN)/odscen test suites/shipped.toml --jobs 2 --workspace build/regression --junit build/regression/junit.xml --html build/regression/report.html
 
 # The parts of the page that need no browser.
 test-page: $(MODULES)

@@ -59,6 +59,8 @@ def test_shares_of_nobody_are_not_met() -> None:
         ("arived>=0.95", "did you mean arrived"),
         ("zzz>=1", "known are sim_seconds"),
         ("mean_travel_time<50%", "no percentage"),
+        ("mean_travel_time<50 m", "written in s, min, h, not in 'm'"),
+        ("arrived>=5 s", "written in no unit"),
     ],
 )
 def test_a_bad_expectation_says_what_is_wrong(text: str, reason: str) -> None:
@@ -82,3 +84,16 @@ def test_every_name_operator_and_number_is_read(name: str, op: str, bound: float
 def test_any_text_is_read_or_refused(text: str) -> None:
     with suppress(InputError):
         parse_expectation(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [
+        ("mean_delay <= 40 s", 40.0),
+        ("mean_delay <= 2 min", 120.0),
+        ("mean_speed >= 36 km/h", 10.0),
+        ("insertion_error_max < 25cm", 0.25),
+    ],
+)
+def test_a_bound_may_have_a_unit(text: str, bound: float) -> None:
+    assert parse_expectation(text).bound == pytest.approx(bound)

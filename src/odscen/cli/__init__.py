@@ -16,6 +16,7 @@ from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
+from odscen.cli.regression import compare, gate
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
 from odscen.cli.serve import serve
@@ -34,6 +35,8 @@ app.command()(generate)
 app.command()(check)
 app.command()(export)
 app.command()(run)
+app.command("test")(gate)
+app.command()(compare)
 app.command()(serve)
 app.command()(doctor)
 app.command()(demo)

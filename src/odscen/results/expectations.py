@@ -1,10 +1,11 @@
-"""Expectations of a run, such as ``arrived>=0.95`` (requirement R58, simplest form).
+"""Expectations of a run, such as ``arrived>=0.95`` or ``mean_delay <= 40 s`` (requirement R58).
 
-``NAME OP NUMBER`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds, the
-counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
+``NAME OP NUMBER [UNIT]`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds,
+the counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
 mean_travel_time, ...). A *count* compared with a number from 0 to 1 that is written with a decimal
 point, or followed by ``%``, is taken as a share of the planned actors: ``arrived>=0.95``,
 ``arrived>=95%`` and ``arrived==1.0`` are shares, ``arrived>=1`` and ``collided==0`` are counts.
+A unit may be another one of the same kind: ``mean_speed >= 30 km/h``; without one it is SI.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
+from odscen.results.units import in_unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -56,7 +58,7 @@ _OPERATORS: dict[str, Callable[[float, float], bool]] = {
 }
 _PATTERN = re.compile(
     r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<op>>=|<=|==|>|<)\s*"
-    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<percent>%?)\s*"
+    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>%|[A-Za-z][A-Za-z/]*)?\s*"
 )
 
 
@@ -86,7 +88,7 @@ def parse_expectation(text: str) -> Expectation:
     Raises
     ------
     InputError
-        If it is not ``NAME OP NUMBER``, or the name is not known.
+        If it is not ``NAME OP NUMBER [UNIT]``, or the name is not known, or the unit does not fit.
     """
     match = _PATTERN.fullmatch(text)
     if match is None:
@@ -95,7 +97,8 @@ def parse_expectation(text: str) -> Expectation:
             "for example arrived>=0.95 (OP is one of >= <= > < ==)"
         )
         raise InputError(msg)
-    name, number, percent = match["name"], match["number"], bool(match["percent"])
+    name, number, unit = match["name"], match["number"], match["unit"] or ""
+    percent = unit == "%"
     if name not in NAMES:
         close = difflib.get_close_matches(name, NAMES, n=3, cutoff=0.5)
         hint = f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(NAMES)}"
@@ -104,7 +107,14 @@ def parse_expectation(text: str) -> Expectation:
     if percent and name not in COUNTS:
         msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
         raise InputError(msg)
-    bound = float(number) / 100.0 if percent else float(number)
+    if percent:
+        bound = float(number) / 100.0
+    else:
+        try:
+            bound = in_unit_of(name, float(number), unit)
+        except InputError as error:
+            msg = f"expectation {text!r}: {error.problem}"
+            raise InputError(msg) from error
     written_as_share = ("." in number or "e" in number.lower()) and 0.0 <= bound <= 1.0
     return Expectation(
         text=text.strip(),

@@ -86,10 +86,11 @@ def render_report(
         actor_table(actors, travel(traces)),
         _foot(summary),
     ]
-    return _page(title, join([part for part in body if part]))
+    return page(f"{title} - run report", join([part for part in body if part]))
 
 
-def _page(title: str, body: Markup) -> str:
+def page(title: str, body: Markup) -> str:
+    """Page with the report's style and script around ``body``, which needs nothing else."""
     style, script = _asset("report.css"), _asset("report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
@@ -98,7 +99,7 @@ def _page(title: str, body: Markup) -> str:
         Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", name="color-scheme", content="light dark"),
-        element("title", f"{title} - run report"),
+        element("title", title),
         element("style", Markup(style)),
     ]
     script_element = element("script", Markup(script))

@@ -50,10 +50,15 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
     return element("section", element("h2", heading), *children, note, id=ident)
 
 
-def _table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
+def table(
+    heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
+) -> Markup:
+    """Table that scrolls inside its place; ``rows`` are ``tr`` elements, ``label`` names it."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
-    table = element("table", head, element("tbody", *rows), **attributes)
-    return element("div", table, class_="scroll", tabindex="0", role="region", aria_label=heads[0])
+    content = element("table", head, element("tbody", *rows), **attributes)
+    return element(
+        "div", content, class_="scroll", tabindex="0", role="region", aria_label=label or heads[0]
+    )
 
 
 def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | None:
@@ -74,8 +79,8 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
         "each line was asked for when the run was started; the value is what the run gave. Names "
         "like arrived compare the share of all planned actors."
     )
-    table = _table(("Expectation", "Value", "Verdict"), rows)
-    return report_section("Expectations", table, explained=explained, ident="expectations")
+    shown = table(("Expectation", "Value", "Verdict"), rows)
+    return report_section("Expectations", shown, explained=explained, ident="expectations")
 
 
 def event_list(
@@ -157,8 +162,8 @@ def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
         "press a heading to sort by it, once more to turn the order round. Times count from the "
         "start of the simulation; an empty field means that it never came to that."
     )
-    table = _table(_COLUMNS, rows, id="actors-table")
-    return report_section("Actors", control, more, table, explained=explained, ident="actors")
+    shown = table(_COLUMNS, rows, id="actors-table")
+    return report_section("Actors", control, more, shown, explained=explained, ident="actors")
 
 
 def _actor_row(actor: ActorOutcome, travel: ActorTravel) -> Markup:

@@ -83,10 +83,6 @@ class Subject:
         return repr(self.one.id)
 
 
-NOT_ACTED_ON = ("crosses_anywhere", "ignores_red")
-"""Settings of the document that no run acts on so far (requirement R45)."""
-
-
 def actor_problems(
     scenario: Scenario, region: Region, index: int, assets: Assets | None = None
 ) -> Iterator[Problem]:
@@ -108,13 +104,12 @@ def actor_problems(
             f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
             f"{scenario.simulation.duration:g} s; depart earlier or run longer",
         )
-    for setting in NOT_ACTED_ON:
-        if getattr(actor, setting):
-            yield warning(
-                "not_acted_on",
-                f"{subject.where}.{setting}",
-                f"{setting} has no effect yet: {subject.name} keeps to crossings and lights",
-            )
+    if actor.crosses_anywhere:  # R45; no run acts on it so far
+        yield warning(
+            "not_acted_on",
+            f"{subject.where}.crosses_anywhere",
+            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks",
+        )
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:

@@ -1,0 +1,1 @@
+"""Regression gates: suites of scenarios, held against expectations and baselines (R58)."""

@@ -1,0 +1,176 @@
+"""Baselines: the figures of a scenario that a change is held against, and what they came from.
+
+One JSON file per scenario, one figure or place per line and one value per seed, so that a diff
+shows what has changed. The fingerprint tells a changed input from a changed behaviour.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from odscen import __version__
+from odscen.errors import InputError, in_file
+from odscen.regression.measure import Key
+from odscen.results.records import json_with_rows
+from odscen.workflow import write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from odscen.regression.measure import Kind, Measured
+    from odscen.scenario.document import Scenario
+
+FORMAT = "odscen-baseline"
+VERSION = 1
+
+_SHORT = 16
+"""Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
+
+_KINDS: tuple[Kind, ...] = ("segment", "junction", "actor")
+
+Fingerprint = dict[str, str]
+"""What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""
+
+_VERSIONS = ("odscen", "sumo")
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """Figures per seed; every tuple is in the order of ``seeds``."""
+
+    seeds: tuple[int, ...]
+    fingerprint: Fingerprint
+    figures: dict[Key, tuple[float | None, ...]]
+
+
+def fingerprint(
+    scenario: Scenario, map_sha256: str, *, until: float | None, step_length: float | None
+) -> Fingerprint:
+    """Fingerprint of what a scenario is run from.
+
+    The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
+    left out, as the suite names the seeds, and so are name and description.
+    """
+    # What has its default value is left out: a field that a later version adds changes nothing.
+    document = scenario.model_dump(mode="json", exclude_defaults=True)
+    settings = {"duration": until, "step_length": step_length}
+    given = {name: value for name, value in settings.items() if value is not None}
+    document["simulation"] = document.get("simulation", {}) | given
+    for other in ("format", "version", "name", "description", "map", "seed"):
+        document.pop(other, None)
+    found = {"map": map_sha256[:_SHORT]}
+    found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
+    return found | {"odscen": __version__, "sumo": version("libsumo")}
+
+
+def _digest(value: object) -> str:
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
+
+
+def changed_inputs(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
+    """Say what is different in what two runs were made of, in words; nothing if nothing is."""
+    told = []
+    for name in sorted(old.keys() | new.keys()):
+        before, now = old.get(name, "none"), new.get(name, "none")
+        if before == now:
+            continue
+        if name in _VERSIONS:
+            told.append(f"{name} {before} -> {now}")
+        else:
+            part = name.removeprefix("scenario.")
+            told.append("the map" if name == "map" else f"the scenario's {part}")
+    return tuple(told)
+
+
+def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
+    """Make the baseline of the runs of a scenario, given by seed."""
+    seeds = tuple(sorted(runs))
+    keys = dict.fromkeys(key for seed in seeds for key in runs[seed])
+    return Baseline(
+        seeds, made_of, {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys}
+    )
+
+
+def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
+    """Write a baseline; the same figures give the same text."""
+    head = {
+        "format": FORMAT,
+        "version": VERSION,
+        "scenario": scenario,
+        "fingerprint": baseline.fingerprint,
+        "seeds": list(baseline.seeds),
+    }
+    write_text(file, json_with_rows(head, "rows", _rows(baseline)))
+
+
+def _rows(baseline: Baseline) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = [
+        {"figure": key.figure, "values": _plain(values)}
+        for key, values in baseline.figures.items()
+        if key.kind == "run"
+    ]
+    for kind in _KINDS:
+        places: dict[str, dict[str, Any]] = {}
+        for key, values in baseline.figures.items():
+            if key.kind == kind:
+                places.setdefault(key.place, {kind: key.place})[key.figure] = _plain(values)
+        rows += [places[name] for name in sorted(places)]
+    return rows
+
+
+def _plain(values: Sequence[float | None]) -> list[float | None]:
+    """Whole numbers without a decimal point, as counts are written."""
+    return [int(v) if v is not None and v.is_integer() else v for v in values]
+
+
+def read_baseline(file: Path) -> Baseline | None:
+    """Read a baseline; ``None`` if there is no such file.
+
+    Raises
+    ------
+    InputError
+        If it is not a baseline of this version.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"cannot be read: {error}"
+        raise InputError(msg, file=str(file)) from error
+    with in_file(str(file)):
+        try:
+            return _from_data(json.loads(text))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            msg = f"not a baseline, write it again with --update-baseline: {error!r}"
+            raise InputError(msg) from error
+
+
+def _from_data(data: Mapping[str, Any]) -> Baseline:
+    if (data["format"], data["version"]) != (FORMAT, VERSION):
+        msg = f"format {data['format']!r} version {data['version']!r} is not a baseline"
+        raise InputError(msg)
+    seeds = tuple(int(seed) for seed in data["seeds"])
+    figures: dict[Key, tuple[float | None, ...]] = {}
+    for row in data["rows"]:
+        if "figure" in row:
+            figures[Key("run", "", row["figure"])] = _values(row["values"], seeds)
+            continue
+        kind = next(kind for kind in _KINDS if kind in row)
+        for name, values in row.items():
+            if name != kind:
+                figures[Key(kind, row[kind], name)] = _values(values, seeds)
+    return Baseline(seeds, dict(data["fingerprint"]), figures)
+
+
+def _values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:
+    if len(values) != len(seeds):
+        msg = f"{len(values)} values for {len(seeds)} seeds"
+        raise ValueError(msg)
+    return tuple(None if value is None else float(value) for value in values)

@@ -1,0 +1,233 @@
+"""Two runs, or several seeds of two, side by side."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.errors import InputError
+from odscen.regression.measure import measure, place_index
+from odscen.results.comparison import CONFIDENCE, compare_figure
+from odscen.results.units import unit_of, with_unit
+from odscen.sumo.layout import SUMMARY_FILE
+from odscen.workflow import load_map
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from odscen.catalog.store import Workspace
+    from odscen.regression.measure import Key, Measured
+    from odscen.results.comparison import Difference
+    from odscen.results.places import PlaceIndex
+
+FORMAT = "odscen-comparison"
+VERSION = 1
+
+MOST = 8
+"""Places that are named, at most."""
+
+_PLACE_FIGURES = {"segment": "mean_speed", "junction": "waiting_time"}
+
+
+@dataclass(frozen=True, slots=True)
+class RunSet:
+    """Runs of one side by seed; ``versions`` and ``scenario`` as in their summaries."""
+
+    name: str
+    scenario: str
+    versions: tuple[str, ...]
+    runs: Mapping[int, Measured]
+    places: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One figure on both sides."""
+
+    key: Key
+    difference: Difference
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Figure, unit, both means, difference, interval, and what it says."""
+        found, unit = self.difference, unit_of(self.key.figure)
+        interval = difference = ""
+        if found.low is not None and found.high is not None and found.low < found.high:
+            interval = f"{found.low:+,.2f} to {found.high:+,.2f}"
+        a, b = (("-" if value is None else f"{value:,.2f}") for value in (found.a, found.b))
+        if found.difference is not None:
+            difference = f"{found.difference:+,.2f}" if found.difference else "0"
+        if found.relative:
+            difference += f" ({100 * found.relative:+.1f} %)"
+        return self.key.name, unit, a, b, difference, interval, self.says
+
+    @property
+    def says(self) -> str:
+        """What the difference amounts to."""
+        found = self.difference
+        if found.difference is None:
+            return "only on one side" if found.a is not found.b else "not there"
+        if found.difference == 0.0:
+            return "the same"
+        if found.clear is None:
+            return "too few runs"
+        return "clear" if found.clear else "unclear"
+
+    @property
+    def words(self) -> str:
+        """One line for people."""
+        found, figure = self.difference, self.key.figure
+        a, b = ("none" if v is None else with_unit(v, figure) for v in (found.a, found.b))
+        return f"{self.key.name}: {a} in A, {b} in B ({self.says})"
+
+
+@dataclass(frozen=True, slots=True)
+class RunComparison:
+    """The comparison: figures of the run, then the places that differ most."""
+
+    a: RunSet
+    b: RunSet
+    rows: tuple[Row, ...]
+    places: tuple[Row, ...]
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as data; figures in SI units, named beside each."""
+
+        def side(runs: RunSet) -> dict[str, Any]:
+            return {"runs": runs.name, "scenario": runs.scenario, "seeds": sorted(runs.runs)}
+
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "confidence": CONFIDENCE,
+            "a": side(self.a),
+            "b": side(self.b),
+            "figures": [_row(row) for row in self.rows],
+            "notes": list(self.notes),
+        }
+
+
+def _row(row: Row) -> dict[str, Any]:
+    key = {"kind": row.key.kind, "place": row.key.place or None, "figure": row.key.figure}
+    found = asdict(row.difference)
+    found |= {"relative": row.difference.relative, "clear": row.difference.clear}
+    return {**key, "unit": unit_of(row.key.figure), **found}
+
+
+def read_runs(folder: Path, workspace: Workspace) -> RunSet:
+    """Read a run, or all runs in a folder, of one scenario with different seeds.
+
+    Figures of segments and junctions are there only where the workspace has the map.
+
+    Raises
+    ------
+    InputError
+        If there is no run, one has failed, or two have the same seed.
+    """
+    if (folder / SUMMARY_FILE).is_file():
+        folders = [folder]
+    else:
+        folders = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
+    if not folders:
+        msg = f"no run here: there is no {SUMMARY_FILE}"
+        raise InputError(msg, file=str(folder))
+    runs: dict[int, Measured] = {}
+    scenarios: dict[str, None] = {}
+    versions: dict[str, None] = {}
+    indexes: dict[str, PlaceIndex | None] = {}
+    for path in folders:
+        summary = _summary(path)
+        sha256 = summary.get("map_sha256", "")
+        if sha256 not in indexes:
+            indexes[sha256] = _index(workspace, summary)
+        if summary["seed"] in runs:
+            msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
+            raise InputError(msg, file=str(path))
+        runs[summary["seed"]] = measure(path, summary, indexes[sha256])
+        scenarios[str(summary.get("scenario"))] = None
+        told = summary.get("versions") or {}
+        versions[", ".join(f"{key} {told[key]}" for key in ("odscen", "sumo") if key in told)] = (
+            None
+        )
+    if len(scenarios) > 1:
+        msg = f"runs of different scenarios: {', '.join(scenarios)}; name a folder with one"
+        raise InputError(msg, file=str(folder))
+    places = all(index is not None for index in indexes.values())
+    return RunSet(str(folder), next(iter(scenarios)), tuple(versions), runs, places)
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    file = folder / SUMMARY_FILE
+    try:
+        summary = json.loads(file.read_text(encoding="utf-8"))
+        status, seed = summary["status"], summary["seed"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"not the summary of a run: {error!r}"
+        raise InputError(msg, file=str(file)) from error
+    if status != "completed" or not isinstance(seed, int):
+        msg = f"the run has not completed, it is {status!r}"
+        raise InputError(msg, file=str(file))
+    return dict(summary)
+
+
+def _index(workspace: Workspace, summary: Mapping[str, Any]) -> PlaceIndex | None:
+    try:
+        entry = workspace.map_for(str(summary.get("map")), str(summary.get("map_sha256")))
+    except InputError:
+        return None
+    return place_index(load_map(entry).sumo)
+
+
+def compare_runs(a: RunSet, b: RunSet) -> RunComparison:
+    """Compare every figure that one of the two sides has."""
+    keys = dict.fromkeys(
+        key for side in (a, b) for figures in side.runs.values() for key in figures
+    )
+    rows = []
+    for key in keys:
+        one, other = (
+            {seed: figures.get(key) for seed, figures in side.runs.items()} for side in (a, b)
+        )
+        difference = compare_figure(one, other)
+        if difference.a is not None or difference.b is not None:
+            rows.append(Row(key, difference))
+    return RunComparison(a, b, tuple(rows), _most_changed(rows, a, b), _notes(a, b))
+
+
+def _most_changed(rows: list[Row], a: RunSet, b: RunSet) -> tuple[Row, ...]:
+    """Segments by speed and junctions by waiting, weighted by how many vehicles passed."""
+    if not (a.places and b.places):
+        return ()
+    passed = {
+        (row.key.kind, row.key.place): min(row.difference.a or 0.0, row.difference.b or 0.0)
+        for row in rows
+        if row.key.figure == "vehicles"
+    }
+    scored = []
+    for row in rows:
+        if _PLACE_FIGURES.get(row.key.kind) != row.key.figure or not row.difference.difference:
+            continue
+        size = abs(row.difference.difference) / max(abs(row.difference.a or 0.0), 1.0)
+        weight = math.sqrt(passed.get((row.key.kind, row.key.place), 0.0))
+        scored.append((-size * weight, row.key, row))
+    return tuple(row for _, _, row in sorted(scored, key=lambda item: item[:2])[:MOST])
+
+
+def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
+    notes = []
+    if a.scenario != b.scenario:
+        notes.append(f"the scenarios have different names: {a.scenario} and {b.scenario}")
+    if a.versions != b.versions:
+        notes.append(f"made with different versions: {'; '.join(a.versions)} and "
+                     f"{'; '.join(b.versions)}")  # fmt: skip
+    if a.runs.keys() != b.runs.keys():
+        notes.append("the seeds differ, so runs are not paired; pairs show smaller differences")
+    elif len(a.runs) == 1:
+        notes.append("one run each: intervals need at least two seeds a side")
+    if not (a.places and b.places):
+        notes.append("the workspace does not have the map, so places are left out")
+    return tuple(notes)

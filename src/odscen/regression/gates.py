@@ -1,0 +1,300 @@
+"""Run a suite: scenarios times seeds, each judged by its expectations and its baseline."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+import threading
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from odscen.catalog.assets import shipped_assets
+from odscen.catalog.store import name_from_file
+from odscen.errors import InputError, in_file
+from odscen.regression.baseline import (
+    baseline_of,
+    changed_inputs,
+    fingerprint,
+    read_baseline,
+    write_baseline,
+)
+from odscen.regression.measure import measure, place_index
+from odscen.regression.verdict import hold_against
+from odscen.results.expectations import evaluate
+from odscen.scenario.problems import refuse_errors
+from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.runner import RunJob, run_many
+from odscen.workflow import check_scenario, load_map, read_scenario
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from odscen.catalog.store import MapEntry, Workspace
+    from odscen.regression.baseline import Baseline, Fingerprint
+    from odscen.regression.measure import Measured
+    from odscen.regression.suite import Case, Suite
+    from odscen.regression.verdict import Verdict
+    from odscen.results.places import PlaceIndex
+    from odscen.scenario.document import Scenario
+    from odscen.sumo.progress import Progress
+    from odscen.sumo.runner import RunResult
+
+Status = Literal["passed", "failed", "error"]
+
+
+@dataclass(frozen=True, slots=True)
+class SeedResult:
+    """One run of a case; ``error`` in SUMO's words if it failed, ``missed`` in ours."""
+
+    seed: int
+    wall_seconds: float
+    error: str | None
+    missed: tuple[str, ...]
+    figures: Measured
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """What became of one scenario of a suite.
+
+    Attributes
+    ----------
+    changed_inputs
+        What the runs are made of that the baseline was not made of; empty without a baseline.
+    verdict
+        Against the baseline; ``None`` without one.
+    problems
+        Every reason to fail, in words.
+    updated
+        Whether the baseline was written anew.
+    """
+
+    case: Case
+    map_name: str
+    runs: tuple[SeedResult, ...]
+    changed_inputs: tuple[str, ...] = ()
+    verdict: Verdict | None = None
+    problems: tuple[str, ...] = ()
+    updated: bool = False
+
+    @property
+    def status(self) -> Status:
+        """``error`` if a run failed, ``failed`` if one fell short, else ``passed``."""
+        if any(run.error for run in self.runs):
+            return "error"
+        return "failed" if self.problems else "passed"
+
+    @property
+    def wall_seconds(self) -> float:
+        """Of all runs, one after the other."""
+        return sum(run.wall_seconds for run in self.runs)
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteResult:
+    """A suite that has been run."""
+
+    suite: Suite
+    cases: tuple[CaseResult, ...]
+
+    @property
+    def exit_code(self) -> int:
+        """0 all passed; 1 something differs or falls short; 3 a run failed."""
+        found = {case.status for case in self.cases}
+        return 3 if "error" in found else 1 if "failed" in found else 0
+
+
+@dataclass(slots=True)
+class _Loaded:
+    """A case with its scenario on the map that it will run on."""
+
+    case: Case
+    scenario: Scenario
+    entry: MapEntry
+    made_of: Fingerprint
+    baseline: Baseline | None
+    runs: dict[int, SeedResult] = field(default_factory=dict)
+
+
+@lru_cache(maxsize=4)
+def _index(entry: MapEntry) -> PlaceIndex:
+    return place_index(load_map(entry).sumo)
+
+
+def run_suite(
+    workspace: Workspace,
+    suite: Suite,
+    *,
+    processes: int = 1,
+    update_baseline: bool = False,
+    out: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> SuiteResult:
+    """Run every scenario of a suite with every seed, and judge what comes out.
+
+    Parameters
+    ----------
+    processes
+        How many run at a time.
+    update_baseline
+        Write baselines anew of what comes out, instead of holding it against them.
+    out
+        Keeps the runs there, one folder per scenario and seed, with reports; else they are deleted.
+
+    Raises
+    ------
+    InputError
+        If a map, a scenario or a baseline cannot be used; nothing is run then.
+    """
+    loaded = _load(workspace, suite, with_baseline=not update_baseline)
+    jobs: dict[str, tuple[_Loaded, int]] = {}
+    with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
+        root = out or Path(temporary)
+        run_jobs = []
+        for case in loaded:
+            for seed in case.case.seeds:
+                name = f"{case.case.name}/seed-{seed}"
+                jobs[name] = case, seed
+                run_jobs.append(RunJob(name, _preparer(case, seed), root / name))
+        follow = _Follow(len(run_jobs), progress)
+
+        def done(job: RunJob, result: RunResult) -> None:
+            case, seed = jobs[job.name]
+            case.runs[seed] = _seed_result(case, seed, result)
+            if out is None:
+                shutil.rmtree(result.folder)
+            follow.done(job)
+
+        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+            if out is not None:
+                drawing = load_map(workspace.map_for(summary["map"], summary["map_sha256"])).drawing
+                write_report(folder, summary, drawing=drawing)
+
+        run_many(
+            run_jobs,
+            processes=processes,
+            progress=follow.step,
+            done=done,
+            time_limit=suite.time_limit,
+            finish=finish,
+        )
+    return SuiteResult(suite, tuple(_judge(case, update=update_baseline) for case in loaded))
+
+
+class _Follow:
+    """Adds up the progress of runs that go on at the same time."""
+
+    def __init__(self, total: int, tell: Callable[[str, float], None] | None) -> None:
+        self._shares: dict[str, float] = {}
+        self._total = total
+        self._tell = tell
+        self._lock = threading.Lock()
+
+    def step(self, job: RunJob, message: Progress) -> None:
+        share = message.time / message.until if message.until else 0.0
+        self._set(job.name, min(share, 1.0))
+
+    def done(self, job: RunJob) -> None:
+        self._set(job.name, 1.0)
+
+    def _set(self, name: str, share: float) -> None:
+        with self._lock:
+            self._shares[name] = share
+            total = sum(self._shares.values()) / self._total
+        if self._tell is not None:
+            self._tell(name, total)
+
+
+def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_Loaded]:
+    maps = {name_from_file(path): path for path in suite.maps}
+    loaded = []
+    for case in suite.cases:
+        scenario = read_scenario(case.file)
+        with in_file(str(case.file)):
+            entry = _map_of(workspace, scenario, maps)
+            # The suite names the map to test on; a baseline knows if it is not the one of before.
+            reference = scenario.map.model_copy(update={"sha256": entry.sha256})
+            scenario = scenario.model_copy(update={"map": reference})
+            refuse_errors(check_scenario(workspace, scenario))
+        made_of = fingerprint(
+            scenario, entry.sha256, until=case.until, step_length=case.step_length
+        )
+        baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
+        loaded.append(_Loaded(case, scenario, entry, made_of, baseline))
+    return loaded
+
+
+def _map_of(workspace: Workspace, scenario: Scenario, maps: Mapping[str, Path]) -> MapEntry:
+    """Find the map of the suite, built in the workspace if need be; else the workspace's own.
+
+    A map of that name and another content in the workspace is left alone.
+    """
+    name = scenario.map.name
+    if name not in maps:
+        return workspace.map_for(name, scenario.map.sha256)
+    try:
+        content = maps[name].read_bytes()
+    except OSError as error:
+        raise InputError(error.strerror or str(error), file=str(maps[name])) from error
+    sha256 = hashlib.sha256(content).hexdigest()
+    for entry in workspace.maps():
+        if entry.sha256 == sha256 and entry.info["spacing"] == scenario.map.spacing:
+            return entry
+    free = name not in workspace.map_names()
+    own = name if free else f"{name[:50]}-{sha256[:8]}"
+    return workspace.add_map(maps[name], name=own, spacing=scenario.map.spacing)
+
+
+def _preparer(loaded: _Loaded, seed: int) -> Callable[[], Any]:
+    return lambda: prepare(
+        loaded.scenario,
+        load_map(loaded.entry).sumo,
+        loaded.entry.path("net"),
+        shipped_assets(),
+        seed=seed,
+        until=loaded.case.until,
+        step_length=loaded.case.step_length,
+    )
+
+
+def _seed_result(loaded: _Loaded, seed: int, result: RunResult) -> SeedResult:
+    summary = result.summary
+    missed = [
+        f"seed {seed}: expected {verdict.expectation}, but it is "
+        f"{'nothing' if verdict.value is None else f'{verdict.value:g}'}"
+        for verdict in evaluate(loaded.case.expectations, summary)
+        if not verdict.passed
+    ]
+    error = None
+    if result.status == "failed":
+        error = f"seed {seed}: the run failed: {summary['error']}"
+        missed = []
+    figures = measure(result.folder, summary, _index(loaded.entry))
+    return SeedResult(seed, summary["wall_seconds"], error, tuple(missed), figures)
+
+
+def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
+    case = loaded.case
+    runs = tuple(loaded.runs[seed] for seed in case.seeds)
+    problems = [run.error for run in runs if run.error]
+    problems += [missed for run in runs for missed in run.missed]
+    figures = {run.seed: run.figures for run in runs if not run.error}
+    if case.baseline is None or (update and len(figures) < len(runs)):
+        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+    if update:
+        write_baseline(baseline_of(figures, loaded.made_of), case.baseline, scenario=case.name)
+        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems), updated=True)
+    if loaded.baseline is None:
+        problems.append(f"there is no baseline {case.baseline}; write it with --update-baseline")
+        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+    unknown = sorted(figures.keys() - set(loaded.baseline.seeds))
+    if unknown:
+        listed = ", ".join(map(str, unknown))
+        problems.append(f"the baseline has no seed {listed}; write it with --update-baseline")
+    verdict = hold_against(loaded.baseline, figures, case.tolerances)
+    inputs = changed_inputs(loaded.baseline.fingerprint, loaded.made_of)
+    problems += [change.words for change in verdict.failing]
+    return CaseResult(case, loaded.entry.name, runs, inputs, verdict, tuple(problems))

@@ -1,0 +1,161 @@
+"""pytest plugin: the fixture ``odscen_run``, and scenario files as tests.
+
+Loaded by every pytest that finds odscen installed, so it imports nothing at the top but pytest and
+collects scenario files only where it is told to: named on the command line, or with
+``odscen_collect = true`` in the configuration.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from odscen.sumo.runner import RunResult
+
+_SUFFIX = ".scenario.json"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Declare the options of the plugin."""
+    group = parser.getgroup("odscen", "traffic scenarios")
+    group.addoption(
+        "--odscen-workspace",
+        metavar="DIR",
+        help="workspace with the maps of the scenarios [default: as for the odscen command]",
+    )
+    parser.addini("odscen_collect", "collect *.scenario.json files as tests", type="bool")
+    parser.addini("odscen_expect", "expectations of every collected scenario", type="linelist")
+    parser.addini("odscen_seeds", "seeds of every collected scenario", type="args")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Collect a scenario file, if that is wanted."""
+    if not file_path.name.endswith(_SUFFIX):
+        return None
+    if parent.config.getini("odscen_collect") or parent.session.isinitpath(file_path):
+        file: pytest.Collector = _ScenarioFile.from_parent(parent, path=file_path)
+        return file
+    return None
+
+
+class _ScenarioFile(pytest.File):
+    """A scenario: one test per seed."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        seeds = self.config.getini("odscen_seeds")
+        for seed in seeds or [None]:
+            name = "run" if seed is None else f"seed-{seed}"
+            yield _ScenarioTest.from_parent(self, name=name, seed=seed)
+
+
+class _ScenarioTest(pytest.Item):
+    """A run of the scenario: passes if it completes and meets the expectations."""
+
+    def __init__(self, *, seed: str | None, **arguments: object) -> None:
+        super().__init__(**arguments)  # type: ignore[arg-type]  # pytest's own
+        self.seed = seed
+
+    def runtest(self) -> None:
+        factory: pytest.TempPathFactory = self.config._tmp_path_factory  # type: ignore[attr-defined]
+        try:
+            seed = None if self.seed is None else int(self.seed)
+        except ValueError:
+            msg = f"odscen_seeds: {self.seed!r} is not a whole number"
+            raise pytest.UsageError(msg) from None
+        expect = self.config.getini("odscen_expect")
+        result = _run(self.config, factory.mktemp("odscen"), self.path, seed=seed, expect=expect)
+        told = _shortcomings(result)
+        if told:
+            pytest.fail("\n".join(told), pytrace=False)
+
+    def repr_failure(
+        self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None
+    ) -> str:
+        """Errors of odscen in their own words, without Python's traceback."""
+        from odscen.errors import OdscenError
+
+        if isinstance(excinfo.value, OdscenError):
+            return str(excinfo.value)
+        return str(super().repr_failure(excinfo, style))  # type: ignore[arg-type]
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.path, None, f"{self.path.name}: {self.name}"
+
+
+@pytest.fixture
+def odscen_run(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., RunResult]:
+    """Return a function that runs a scenario and gives its :class:`RunResult`.
+
+    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``; the result has
+    ``status``, ``summary`` (figures, counts) and ``folder`` (trajectories, events). A run that
+    fails or falls short of ``expect`` fails the test.
+    """
+
+    def run(
+        scenario: Path,
+        *,
+        seed: int | None = None,
+        until: float | None = None,
+        expect: Sequence[str] = (),
+        workspace: Path | None = None,
+    ) -> RunResult:
+        result = _run(
+            request.config,
+            tmp_path_factory.mktemp("odscen"),
+            scenario,
+            seed=seed,
+            until=until,
+            expect=expect,
+            workspace=workspace,
+        )
+        told = _shortcomings(result)
+        if told:
+            pytest.fail("\n".join(told))
+        return result
+
+    return run
+
+
+def _run(
+    config: pytest.Config,
+    out: Path,
+    scenario: Path,
+    *,
+    seed: int | None = None,
+    until: float | None = None,
+    expect: Sequence[str] = (),
+    workspace: Path | None = None,
+) -> RunResult:
+    from pathlib import Path
+
+    from odscen import workflow
+    from odscen.catalog.store import Workspace
+    from odscen.results.expectations import parse_expectation
+
+    named = workspace or config.getoption("--odscen-workspace")
+    (result,) = workflow.run(
+        Workspace.open(Path(named) if named else None),
+        [Path(scenario)],
+        out=out,
+        seed=seed,
+        until=until,
+        expectations=[parse_expectation(text) for text in expect],
+    )
+    return result
+
+
+def _shortcomings(result: RunResult) -> list[str]:
+    if result.status == "failed":
+        return [f"the run failed: {result.summary['error']}"]
+    return [
+        f"expected {verdict['expectation']}, but it is {verdict['value']}"
+        for verdict in result.summary["expectations"]
+        if not verdict["passed"]
+    ]

@@ -1,0 +1,103 @@
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from odscen import workflow
+from odscen.catalog.store import Workspace
+from odscen.errors import InputError
+from odscen.regression.compare import compare_runs, read_runs
+from odscen.regression.measure import Key
+from odscen.regression.pages import comparison_page
+from odscen.results.comparison import compare_figure
+from tests.cli.conftest import odscen
+from tests.regression.conftest import ROOT
+
+SCENARIO = ROOT / "suites" / "scenarios" / "signal_crossing.scenario.json"
+
+
+def test_runs_of_the_same_seeds_are_paired_as_scipy_does():
+    a, b = {1: 10.0, 2: 14.0, 3: 9.0}, {1: 11.0, 2: 16.5, 3: 10.0}
+    found = compare_figure(a, b)
+    peer = stats.ttest_rel(list(b.values()), list(a.values())).confidence_interval(0.95)
+    assert found.paired
+    assert found.difference == pytest.approx(1.5)
+    assert (found.low, found.high) == pytest.approx((peer.low, peer.high))
+
+
+def test_runs_of_other_seeds_are_compared_by_welch_as_scipy_does():
+    a, b = {1: 10.0, 2: 14.0, 3: 9.0}, {5: 21.0, 6: 16.5, 7: 20.0, 8: 30.0}
+    found = compare_figure(a, b)
+    one, other = (np.array(list(side.values())) for side in (b, a))
+    peer = stats.ttest_ind(one, other, equal_var=False).confidence_interval(0.95)
+    assert not found.paired
+    assert (found.low, found.high) == pytest.approx((peer.low, peer.high))
+    assert found.clear
+
+
+def test_what_is_missing_on_one_side_is_no_difference_of_zero():
+    found = compare_figure({1: None}, {1: 3.0})
+    assert (found.a, found.b, found.difference, found.low) == (None, 3.0, None, None)
+
+
+@pytest.fixture(scope="module")
+def sides(tmp_path_factory):
+    """Three seeds of a crossing, and the same with a much longer first green."""
+    root = tmp_path_factory.mktemp("sides")
+    store = Workspace.open(root / "workspace")
+    store.add_map(ROOT / "maps" / "signal_crossing.xodr")
+    changed = json.loads(SCENARIO.read_text())
+    changed["signals"] = {"junctions": [{"junction": "10001", "green": [60, 8, 8, 8, 8, 8, 7]}]}
+    other = root / "signal_crossing.scenario.json"
+    other.write_text(json.dumps(changed))
+    for side, path in (("a", SCENARIO), ("b", other)):
+        for seed in (1, 2, 3):
+            workflow.run(store, [path], out=root / side / str(seed), seed=seed)
+            (root / side / str(seed) / "signal_crossing").rename(root / side / f"seed-{seed}")
+    return store, root / "a", root / "b"
+
+
+def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
+    store, a, b = sides
+    result = compare_runs(read_runs(a, store), read_runs(b, store))
+    rows = {row.key: row.difference for row in result.rows}
+    delay = rows[Key("run", "", "mean_delay")]
+    assert delay.paired
+    assert delay.runs == 3
+    assert delay.low < delay.difference < delay.high
+    seconds = [
+        json.loads((side / f"seed-{seed}" / "summary.json").read_text())["figures"]["mean_delay"]
+        for side in (a, b)
+        for seed in (1, 2, 3)
+    ]
+    assert delay.a == pytest.approx(np.mean(seconds[:3]), abs=1e-3)
+    assert delay.difference == pytest.approx(np.mean(seconds[3:]) - np.mean(seconds[:3]), abs=1e-3)
+    assert any(row.key.place == "j10001" for row in result.places)
+    page = comparison_page(result)
+    assert "junction j10001: waiting time" in page
+    assert "95 % interval" in page
+
+
+def test_a_run_compared_with_itself_is_the_same(sides):
+    store, a, _ = sides
+    result = compare_runs(read_runs(a, store), read_runs(a, store))
+    assert {row.says for row in result.rows} == {"the same"}
+
+
+def test_the_command_prints_json_and_writes_a_page(sides, tmp_path):
+    store, a, b = sides
+    out = ("--json", "--html", tmp_path / "c.html", "--workspace", store.root)
+    done = odscen("compare", a / "seed-1", b / "seed-2", *out)
+    assert done.code == 0, done.err
+    delay = next(row for row in done.json["figures"] if row["figure"] == "mean_delay")
+    assert delay["unit"] == "s"
+    assert delay["low"] is None
+    assert any("not paired" in note for note in done.json["notes"])
+    assert (tmp_path / "c.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_a_folder_without_runs_is_refused_by_name(sides, tmp_path):
+    store, *_ = sides
+    with pytest.raises(InputError, match=r"no run here: there is no summary\.json"):
+        read_runs(tmp_path, store)
