@@ -202,3 +202,43 @@ def test_boxes_may_lie_before_the_origin_of_their_vehicles() -> None:
         blueprint = world.get_blueprint_library().find(CAR)
         car = world.spawn_actor(blueprint, transform(0.0, 0.0))
         assert car.bounding_box.location.x == 0.25
+
+
+def test_every_command_of_the_client_is_understood(connected: Connected) -> None:
+    car = connected.spawn(CAR, transform(0.0, 0.0))
+    walker = connected.spawn(WALKER, transform(0.0, 20.0, 1.0))
+    connected.world.tick()
+    command, vector = carla.command, carla.Vector3D(1.0, 0.0, 0.0)
+    commands = [
+        command.ApplyVehicleControl(car.id, carla.VehicleControl()),
+        command.ApplyVehicleAckermannControl(car.id, carla.VehicleAckermannControl()),
+        command.ApplyWalkerControl(walker.id, carla.WalkerControl()),
+        command.ApplyVehiclePhysicsControl(car.id, car.get_physics_control()),
+        command.ApplyTransform(car.id, transform(1.0, 1.0)),
+        command.ApplyWalkerState(walker.id, transform(1.0, 20.0, 1.0), 1.0),
+        command.ApplyTargetVelocity(car.id, vector),
+        command.ApplyTargetAngularVelocity(car.id, vector),
+        command.ApplyImpulse(car.id, vector),
+        command.ApplyForce(car.id, vector),
+        command.ApplyAngularImpulse(car.id, vector),
+        command.ApplyTorque(car.id, vector),
+        command.SetSimulatePhysics(car.id, False),
+        command.SetEnableGravity(car.id, False),
+        command.SetVehicleLightState(car.id, carla.VehicleLightState.Fog),
+        command.DestroyActor(car.id),
+    ]
+    answers = connected.client.apply_batch_sync(commands, True)
+    assert [answer.error for answer in answers] == [""] * len(commands)
+    assert not connected.world.get_snapshot().has_actor(car.id)
+
+
+def test_a_push_and_a_pull_change_the_velocity(connected: Connected) -> None:
+    car = connected.spawn(CAR, transform(0.0, 0.0))
+    mass = car.get_physics_control().mass
+    car.add_impulse(carla.Vector3D(2.0 * mass, 0.0, 0.0))
+    car.add_force(carla.Vector3D(0.0, mass, 0.0))
+    connected.world.tick()
+    velocity = car.get_velocity()
+    assert (velocity.x, velocity.y) == pytest.approx((2.0, DELTA))
+    connected.world.tick()
+    assert car.get_velocity().y == pytest.approx(DELTA)
