@@ -19,18 +19,26 @@ def test_the_server_says_the_version_of_the_client(server: StandIn) -> None:
     assert client.get_server_version() == client.get_client_version() == "0.9.16"
 
 
-def test_the_map_has_its_name_text_and_spawn_points_on_lanes(server: StandIn) -> None:
+def test_the_map_has_its_name_and_text(server: StandIn) -> None:
     road_map = connect(server).get_world().get_map()
     assert road_map.name == "Carla/Maps/Crossing"
     assert road_map.to_opendrive() == (MAPS / "signal_crossing.xodr").read_text(encoding="utf-8")
-    spawn_points = road_map.get_spawn_points()
+
+
+@pytest.mark.parametrize("name", ["signal_crossing", "rural_hills", "left_hand_crossing"])
+def test_spawn_points_float_above_lanes_and_look_along_them(name: str) -> None:
+    with StandIn(MAPS / f"{name}.xodr") as server:
+        road_map = connect(server).get_world().get_map()
+        spawn_points = road_map.get_spawn_points()
     assert len(spawn_points) > 10
     for point in spawn_points:
-        lane = road_map.get_waypoint(point.location, project_to_road=False)
-        assert lane is not None
-        assert point.location.distance(lane.transform.location) < 0.6
-        turn = np.radians(point.rotation.yaw - lane.transform.rotation.yaw)
-        assert np.cos(turn) > 0.999
+        lane = road_map.get_waypoint(point.location).transform
+        assert point.location.distance(lane.location) < 0.8
+        for turn in (
+            point.rotation.yaw - lane.rotation.yaw,
+            point.rotation.pitch - lane.rotation.pitch,
+        ):
+            assert (turn + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.3)
 
 
 def test_waypoints_of_the_client_lie_on_the_lane_graph(server: StandIn) -> None:
