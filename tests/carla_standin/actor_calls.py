@@ -99,9 +99,9 @@ class ActorCalls:
     @rpc("add_actor_torque", Returns.VOID)
     @rpc("set_actor_enable_gravity", Returns.VOID)
     @rpc("set_actor_collisions", Returns.VOID)
-    def take_note(self, actor: int, *_: Any) -> None:
+    def take_note(self, actor: int, *_what: Any) -> None:
         """Accept what has no effect here: actors have no inertia, weight or collisions."""
-        _ = self._world[actor]
+        _ = self._world[actor]  # refuses an unknown one
 
     @rpc("set_actor_simulate_physics", Returns.VOID)
     def simulate_physics(self, actor: int, on: bool) -> None:

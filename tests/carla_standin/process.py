@@ -126,7 +126,7 @@ class StandIn:
             return False
         return True
 
-    def _ask(self, name: str, **arguments: Any) -> Any:
+    def _ask(self, name: str, /, **arguments: Any) -> Any:
         self._write([name, arguments])
         answer = self._read()
         if "error" in answer:

@@ -112,9 +112,8 @@ def _spawn_points(odr: OpenDrive, table: RoadTable) -> list[Pose]:
 
 
 def _pose(at: CarlaPose) -> Pose:
-    return (
-        float(at.x), float(at.y), float(at.z), float(at.pitch_deg), float(at.yaw_deg), 0.0
-    )  # fmt: skip
+    yaw = (float(at.yaw_deg) + 180.0) % 360.0 - 180.0
+    return (float(at.x), float(at.y), float(at.z), float(at.pitch_deg), yaw, 0.0)
 
 
 def _groups(odr: OpenDrive, lights: set[str]) -> tuple[tuple[frozenset[str], ...], ...]:

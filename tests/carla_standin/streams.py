@@ -78,7 +78,8 @@ class StreamServer:
             if self.refusing:
                 return
             self._writers.setdefault(stream, set()).add(writer)
-            self._expected[stream] -= 1
+            # One who comes back by itself asks for no token again, and is not expected.
+            self._expected[stream] = max(self._expected[stream] - 1, 0)
             self._arrival.set()
             # Nothing more is ever written by the client: this ends when it unsubscribes.
             await reader.read()

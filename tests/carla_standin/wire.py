@@ -99,14 +99,17 @@ def state_message(
     delta: float,
     episode: int,
     platform_time: float,
-    map_changed: bool,
     records: Iterable[bytes],
 ) -> bytes:
-    """State of the world in one frame, for the world observer's stream."""
+    """State of the world in one frame, for the world observer's stream.
+
+    ``platform_time`` is the server's own clock. A new number of the episode is all that clients
+    need to notice another map.
+    """
     return b"".join(
         (
             _HEADER.pack(_SENSOR_WORLD_OBSERVER, frame, elapsed, *ZERO, *ZERO),
-            _EPISODE.pack(episode, platform_time, delta, 0, 0, 0, int(map_changed)),
+            _EPISODE.pack(episode, platform_time, delta, 0, 0, 0, 0),
             *records,
         )
     )

@@ -57,7 +57,6 @@ class World:
         self.map = road_map
         self.episode += 1
         self.elapsed = 0.0
-        self.map_changed = True
         self.actors: dict[int, Actor] = {}
         self.lights = TrafficLights()
         self.traffic_managers.clear()
@@ -197,11 +196,9 @@ class World:
             delta=self.delta,
             episode=self.episode,
             platform_time=time.monotonic(),
-            map_changed=self.map_changed,
             records=[actor.record() for actor in self.actors.values()],
         )
         self._streams.send(wire.WORLD_OBSERVER, message)
-        self.map_changed = False
 
     def _take_pictures(self) -> None:
         cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]
