@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+from odscen.catalog.assets import shipped_assets
 from odscen.scenario.bodies import overlap
 from tests.carla_standin import camera, wire
 from tests.carla_standin.actors import Actor, Kind, attached
@@ -27,7 +28,6 @@ ASYNC_DELTA = 0.05
 
 _SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
 _SYNCHRONOUS, _FIXED_DELTA = 0, 2
-_CLEAR_NOON = [5.0, 0.0, 0.0, 10.0, -1.0, 45.0, 2.0, 0.75, 0.1, 0.0, 1.0, 0.03, 0.0331, 0.0]
 _TRIGGER = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]]
 _POINT = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
@@ -38,7 +38,7 @@ class World:
     def __init__(self, road_map: RoadMap, streams: StreamServer, switches: Switches) -> None:
         self.definitions = definitions()
         self.settings: list[Any] = list(_SETTINGS)
-        self.weather: list[float] = list(_CLEAR_NOON)
+        self.weather = list(shipped_assets().preset("ClearNoon").parameters.values())
         self.traffic_managers: dict[int, str] = {}
         self.frame = 0
         self.episode = 0
