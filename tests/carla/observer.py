@@ -107,8 +107,7 @@ def main() -> None:
                 "users": {
                     names[number].removeprefix(ROLE): values
                     for number, values in users.items()
-                    if names.get(number, "").startswith(ROLE)
-                    and names[number] != ROLE + "measure"
+                    if names.get(number, "").startswith(ROLE) and names[number] != ROLE + "measure"
                 },
                 "lights": {},
             }

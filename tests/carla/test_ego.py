@@ -34,6 +34,7 @@ def scenario_of(workspace: Workspace, xodr: Path, actors: list[dict[str, Any]], 
         version=1,
         name="ego",
         map=MapReference(name=entry.name, sha256=entry.sha256),
+        roi=tuple(entry.graph().segments.ids),
         actors=tuple(Actor(**actor) for actor in actors),
     )
     path = out / "ego.scenario.json"
@@ -96,7 +97,8 @@ def test_a_follower_brakes_behind_an_ego_that_brakes_in_carla(
     # 20 m/s, and after 4 s down to a stand at 8 m/s^2.
     braking = [(4.0 + 0.1 * k, max(0.0, 20.0 - 0.8 * k)) for k in range(26)]
     result, report, rows, events = drive(
-        workspace, MAPS / "motorway_weave.xodr", actors, [(0.0, 20.0), *braking], tmp_path, until=15.0
+        workspace, MAPS / "motorway_weave.xodr", actors, [(0.0, 20.0), *braking], tmp_path,
+        until=20.0,
     )  # fmt: skip
     assert (result.status, report.error) == ("completed", None)
     ego, behind = rows.filter(pl.col("id") == "ego"), rows.filter(pl.col("id") == "behind")
@@ -135,21 +137,23 @@ def test_who_has_right_of_way_brakes_for_an_ego_that_ignores_it_or_the_crash_is_
     actors = [
         {
             "id": "ego", "category": "car", "model": "vehicle.tesla.model3", "ego": True,
-            "spawn": "5.0.1.20", "goal": "2.0.1.40",
+            "spawn": "5.0.-1.20",
         },
         {
-            "id": "major", "category": "car", "spawn": "2.0.-1.20", "goal": "4.0.1.40",
+            "id": "major", "category": "car", "spawn": "4.0.-1.34", "goal": "2.0.1.30",
             "speed": 13.0,
         },
     ]  # fmt: skip
     result, report, rows, events = drive(
-        workspace, MAPS / "t_junction_signs.xodr", actors, [(0.0, 11.0)], tmp_path, until=12.0
-    )
+        workspace, MAPS / "t_junction_signs.xodr", actors, [(0.0, 11.0), (6.25, 0.0)], tmp_path,
+        until=14.0,
+    )  # fmt: skip
     assert (result.status, report.error) == ("completed", None)
     major = rows.filter(pl.col("id") == "major")
-    braked = major.filter(pl.col("time") > 2.0)["speed"].min() < 9.0
+    assert major["speed"].max() > 8.0, "it was under way"
+    stopped = major["speed"].tail(1).item() < 0.5
     crashed = any(event["kind"] == "collision" for event in events)
-    assert braked or crashed
+    assert stopped or crashed
 
 
 def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
@@ -161,9 +165,7 @@ def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
     with StandIn(xodr, map_name=xodr.stem) as server:
         before = server.actors()
         options = CosimOptions(Address(server.host, server.port), tick=STEP, external_ego=True)
-        result, report = cosim(
-            workspace, path, options, out=tmp_path, until=2.0, step_length=STEP
-        )
+        result, report = cosim(workspace, path, options, out=tmp_path, until=2.0, step_length=STEP)
         assert (result.status, report.error, report.spawned) == ("completed", None, 0)
         assert [a["id"] for a in server.actors()] == [a["id"] for a in before]
     rows = pl.read_parquet(result.folder / "trajectories.parquet")

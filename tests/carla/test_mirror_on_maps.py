@@ -50,7 +50,9 @@ class Oracle:
             roads.setdefault(table.lane_list[piece.sumo].id, set()).add(key)
         self.own = {lane: np.isin(road, sorted(names)) for lane, names in roads.items()}
 
-    def ground(self, lane: str, x: float, y: float, yaw: float) -> tuple[float, float, float] | None:
+    def ground(
+        self, lane: str, x: float, y: float, yaw: float
+    ) -> tuple[float, float, float] | None:
         """Height, slope and direction (degrees) of the road, if it is known."""
         near = np.array(self.tree.query_ball_point((x, y), 12.0), dtype=int)
         own = near[self.own[lane][near]] if lane in self.own else near[:0]
