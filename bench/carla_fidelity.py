@@ -47,7 +47,9 @@ def main() -> None:
             for name, values in found.items():
                 off[name] += values
             worst = ", ".join(f"{name} {max(values):.4f}" for name, values in found.items())
-            print(f"{number + 1:3d} {path.name}: {len(actors)} road users; worst {worst}", flush=True)
+            print(
+                f"{number + 1:3d} {path.name}: {len(actors)} road users; worst {worst}", flush=True
+            )
     print(f"{int(count)} scenarios of {seconds:g} s; {dict(categories)}")
     for name, values in off.items():
         median, high = np.percentile(values, [50, 99])

@@ -58,13 +58,12 @@ class Oracle:
         own = near[self.own[lane][near]] if lane in self.own else near[:0]
         if not len(own):
             return None
-        far = np.hypot(*(self.xyz[:, :2] - (x, y)).T)
-        deck = self.xyz[own[np.argmin(far[own])], 2]
+        deck = self.xyz[self.nearest(own, x, y), 2]
         along = np.abs(np.sin(np.radians(self.turn[near, 1] - yaw))) < 0.4
         near = near[along & (np.abs(self.xyz[near, 2] - deck) < 2.0)]
         if not len(near):
             return None
-        best = near[np.argmin(far[near])]
+        best = self.nearest(near, x, y)
         return self.xyz[best, 2], *self.turn[best]
 
 
