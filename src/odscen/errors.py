@@ -12,7 +12,8 @@
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
     `-- ToolError (3)               a program or library that we call failed, in its own words
-        `-- SimulationError         SUMO: refused to start, died, or stopped early
+        |-- SimulationError         SUMO: refused to start, died, or stopped early
+        `-- CarlaError              a CARLA server that is not there, does not fit, or went away
 
 Messages read ``place: what is wrong``; a place is a file, then the path of the element in it.
 """
@@ -145,6 +146,10 @@ class ToolError(OdscenError):
 
 class SimulationError(ToolError):
     """SUMO refused to start, died, or stopped early."""
+
+
+class CarlaError(ToolError):
+    """A CARLA server is not there, does not fit, or went away; the message says what to do."""
 
 
 @contextmanager

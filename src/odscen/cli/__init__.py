@@ -12,10 +12,12 @@ import typer
 
 from odscen import __version__
 from odscen.cli.assets import app as assets
+from odscen.cli.cosim import cosim
 from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
+from odscen.cli.pull import pull
 from odscen.cli.regression import compare, gate
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
@@ -29,6 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+maps.command()(pull)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.command()(generate)
@@ -37,6 +40,7 @@ app.command()(export)
 app.command()(run)
 app.command("test")(gate)
 app.command()(compare)
+app.command()(cosim)
 app.command()(serve)
 app.command()(doctor)
 app.command()(demo)

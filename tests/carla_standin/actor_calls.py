@@ -1,0 +1,164 @@
+"""RPCs about single actors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.carla_standin import wire
+from tests.carla_standin.actors import MASS, Actor, Kind, turned
+from tests.carla_standin.rpc import Returns, rpc
+from tests.carla_standin.world import World
+
+_NOTHING = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0]
+_WHEEL = [3.5, 0.25, 70.0, 35.0, 1500.0, 3000.0, 2.0, 17.0, 1000.0, [0.0, 0.0, 0.0]]
+_PHYSICS = [
+    [[0.0, 400.0], [5000.0, 400.0]], 5000.0, 1.0, 0.15, 2.0, 0.35, True, 0.0, 10.0, 4.0,
+    [[4.0, 0.5, 0.65]], MASS, 0.3, [0.0, 0.0, 0.0], [[0.0, 1.0], [100.0, 0.5]],
+    [_WHEEL] * 4, False,
+]  # fmt: skip
+
+
+class ActorCalls:
+    """Spawning, moving, steering. Methods take what is on the wire, without the metadata."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._physics_controls: dict[int, list[Any]] = {}
+
+    # ------------------------------------------------------------------------------- life
+    @rpc("spawn_actor")
+    def spawn(self, description: list[Any], at: list[Any]) -> list[Any]:
+        return self._described(self._world.spawn(description, wire.pose(at)))
+
+    @rpc("spawn_actor_with_parent")
+    def spawn_with_parent(
+        self, description: list[Any], at: list[Any], parent: int, *_attachment: Any
+    ) -> list[Any]:
+        return self._described(self._world.spawn(description, wire.pose(at), parent))
+
+    @rpc("destroy_actor")
+    def destroy(self, actor: int) -> bool:
+        return self._world.destroy(actor)
+
+    @rpc("get_actors_by_id")
+    def described(self, ids: list[int]) -> list[Any]:
+        actors = self._world.actors
+        return [self._described(actors[number]) for number in ids if number in actors]
+
+    @rpc("get_spectator")
+    def spectator(self) -> list[Any]:
+        return self._described(self._world.spectator)
+
+    @rpc("get_actor_bounding_box")
+    def bounding_box(self, actor: int) -> list[Any]:
+        # The Traffic Manager asks for vehicles that are gone, and an error would kill the client.
+        known = self._world.actors.get(actor)
+        return known.box if known else _NOTHING
+
+    # ------------------------------------------------------------------------------- motion
+    @rpc("set_actor_transform", Returns.VOID)
+    def set_transform(self, actor: int, at: list[Any]) -> None:
+        self._world[actor].put(wire.pose(at))
+
+    @rpc("set_actor_location", Returns.VOID)
+    def set_location(self, actor: int, location: list[float]) -> None:
+        found = self._world[actor]
+        old = found.relative or found.at
+        found.put((*wire.vector(location), *wire.vector(old[3:])))
+
+    @rpc("set_actor_target_velocity", Returns.VOID)
+    def set_velocity(self, actor: int, velocity: list[float]) -> None:
+        self._world[actor].velocity = wire.vector(velocity)
+
+    @rpc("set_actor_target_angular_velocity", Returns.VOID)
+    def set_angular_velocity(self, actor: int, velocity: list[float]) -> None:
+        self._world[actor].angular = wire.vector(velocity)
+
+    @rpc("enable_actor_constant_velocity", Returns.VOID)
+    def keep_velocity(self, actor: int, velocity: list[float]) -> None:
+        """Keep a velocity of the actor's own frame."""
+        found = self._world[actor]
+        found.constant_velocity = wire.vector(velocity)
+        found.velocity = turned(found.at, found.constant_velocity)
+
+    @rpc("disable_actor_constant_velocity", Returns.VOID)
+    def release_velocity(self, actor: int) -> None:
+        self._world[actor].constant_velocity = None
+
+    @rpc("add_actor_impulse", Returns.VOID)
+    @rpc("add_actor_impulse_at_location", Returns.VOID)
+    def push(self, actor: int, impulse: list[float], *_where: Any) -> None:
+        self._world[actor].push(wire.vector(impulse))
+
+    @rpc("add_actor_force", Returns.VOID)
+    @rpc("add_actor_force_at_location", Returns.VOID)
+    def pull(self, actor: int, force: list[float], *_where: Any) -> None:
+        self._world[actor].force = wire.vector(force)
+
+    @rpc("add_actor_angular_impulse", Returns.VOID)
+    @rpc("add_actor_torque", Returns.VOID)
+    @rpc("set_actor_enable_gravity", Returns.VOID)
+    @rpc("set_actor_collisions", Returns.VOID)
+    def take_note(self, actor: int, *_what: Any) -> None:
+        """Accept what has no effect here: actors have no inertia, weight or collisions."""
+        _ = self._world[actor]  # refuses an unknown one
+
+    @rpc("set_actor_simulate_physics", Returns.VOID)
+    def simulate_physics(self, actor: int, on: bool) -> None:
+        self._world[actor].physics = on
+
+    # ------------------------------------------------------------------------------- vehicles
+    @rpc("apply_control_to_vehicle", Returns.VOID)
+    def drive(self, actor: int, control: list[Any]) -> None:
+        self._world.of_kind(actor, Kind.VEHICLE).drive(control)
+
+    @rpc("apply_ackermann_control_to_vehicle", Returns.VOID)
+    @rpc("show_vehicle_debug_telemetry", Returns.VOID)
+    def note_vehicle(self, actor: int, *_: Any) -> None:
+        """Accept what has no effect here."""
+        self._world.of_kind(actor, Kind.VEHICLE)
+
+    @rpc("set_actor_autopilot", Returns.VOID)
+    def autopilot(self, actor: int, on: bool) -> None:
+        """Remember it; nothing drives but a Traffic Manager in the client."""
+        self._world.of_kind(actor, Kind.VEHICLE).autopilot = on
+
+    @rpc("set_vehicle_light_state", Returns.VOID)
+    def set_lights(self, actor: int, state: list[int]) -> None:
+        self.set_light_flags(actor, state[0])
+
+    def set_light_flags(self, actor: int, flags: int) -> None:
+        self._world.of_kind(actor, Kind.VEHICLE).lights = flags
+
+    @rpc("get_vehicle_light_state")
+    def lights(self, actor: int) -> list[int]:
+        return [self._world.of_kind(actor, Kind.VEHICLE).lights]
+
+    @rpc("get_vehicle_light_states")
+    def all_lights(self) -> list[list[int]]:
+        vehicles = self._world.actors.values()
+        return [[actor.id, actor.lights] for actor in vehicles if actor.kind is Kind.VEHICLE]
+
+    @rpc("get_physics_control")
+    def physics_control(self, actor: int) -> list[Any]:
+        self._world.of_kind(actor, Kind.VEHICLE)
+        return self._physics_controls.get(actor, _PHYSICS)
+
+    @rpc("apply_physics_control", Returns.VOID)
+    def set_physics_control(self, actor: int, control: list[Any]) -> None:
+        self._world.of_kind(actor, Kind.VEHICLE)
+        self._physics_controls[actor] = control
+
+    # ------------------------------------------------------------------------------- walkers
+    @rpc("apply_control_to_walker", Returns.VOID)
+    def walk(self, actor: int, control: list[Any]) -> None:
+        self._world.of_kind(actor, Kind.WALKER).walk_on(control)
+
+    def set_walker_state(self, actor: int, at: list[Any], speed: float) -> None:
+        """Put a walker somewhere, walking ahead with a speed; only exists as a command."""
+        walker = self._world.of_kind(actor, Kind.WALKER)
+        walker.put(wire.pose(at))
+        walker.walk_on([list(turned(walker.at, (1.0, 0.0, 0.0))), speed, False])
+
+    def _described(self, actor: Actor) -> list[Any]:
+        return actor.wire(self._world.token(actor))

@@ -1,0 +1,183 @@
+"""Actors: what each is, where it is, how it moves, and its record in the state message."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from math import cos, hypot, radians, sin
+from typing import Any
+
+from odscen.scenario.bodies import Box
+from tests.carla_standin import wire
+from tests.carla_standin.blueprints import CAMERA
+from tests.carla_standin.wire import ZERO, Pose, Vector
+
+_NO_CONTROL = [0.0, 0.0, 0.0, False, False, False, 0]
+_NO_WALK = [[1.0, 0.0, 0.0], 0.0, False]
+_SPEED_LIMIT = 30.0
+_GREEN = 2
+MASS = 1500.0
+"""Of every actor, kg: impulses and forces act, but not true to the model."""
+
+
+class Kind(Enum):
+    """What the union at the end of an actor's record holds."""
+
+    VEHICLE = "vehicle."
+    WALKER = "walker."
+    LIGHT = "traffic.traffic_light"
+    SIGN = "traffic."
+    OTHER = ""
+
+    @classmethod
+    def of(cls, type_id: str) -> Kind:
+        """Kind of a blueprint, by the beginning of its id."""
+        return next(kind for kind in cls if type_id.startswith(kind.value))
+
+
+@dataclass(slots=True, eq=False)
+class Actor:
+    """One actor. Angular velocities are deg/s; ``box`` is local, as a BoundingBox on the wire.
+
+    With ``physics`` an actor moves by its velocity from tick to tick; without, it stays where it
+    was put, and still reports the velocity it was given. There is no gravity and no collision.
+    """
+
+    id: int
+    description: list[Any]
+    at: Pose
+    box: list[Any]
+    tag: int = 0
+    sign_id: str = ""
+    stream: int | None = None
+    parent: Actor | None = None
+    relative: Pose | None = None
+    velocity: Vector = ZERO
+    angular: Vector = ZERO
+    acceleration: Vector = ZERO
+    previous_velocity: Vector = ZERO
+    constant_velocity: Vector | None = None
+    force: Vector = ZERO
+    physics: bool = True
+    autopilot: bool = False
+    lights: int = 0
+    control: list[Any] = field(default_factory=lambda: list(_NO_CONTROL))
+    walk: list[Any] = field(default_factory=lambda: list(_NO_WALK))
+    kind: Kind = field(init=False)
+    tail: bytes = field(init=False, default=b"")
+
+    def __post_init__(self) -> None:
+        self.kind = Kind.of(self.type_id)
+        if self.kind is Kind.VEHICLE:
+            self.drive(self.control)
+        elif self.kind is Kind.WALKER:
+            self.walk_on(self.walk)
+        elif self.kind is Kind.SIGN:
+            self.tail = wire.SIGN_TAIL.pack(self.sign_id.encode())
+
+    @property
+    def type_id(self) -> str:
+        """Id of the blueprint."""
+        return str(self.description[1])
+
+    @property
+    def is_camera(self) -> bool:
+        """Whether it takes pictures."""
+        return self.type_id == CAMERA
+
+    def attribute(self, name: str) -> str:
+        """Value of an attribute that was given at spawning."""
+        return next(str(value) for key, _, value in self.description[2] if key == name)
+
+    def wire(self, token: bytes) -> list[Any]:
+        """Actor, with the token of its stream."""
+        parent = self.parent.id if self.parent else 0
+        return [self.id, parent, self.description, self.box, bytes([self.tag]), token]
+
+    def record(self) -> bytes:
+        """Its part of the state message."""
+        return wire.actor_record(
+            self.id, self.at, self.velocity, self.angular, self.acceleration, self.tail
+        )
+
+    def footprint(self) -> Box:
+        """Rectangle on the ground, in CARLA's frame."""
+        (offset, _, _), (length, width, _) = self.box[:2]
+        x, y, z, _, yaw, _ = self.at
+        ux, uy = cos(radians(yaw)), sin(radians(yaw))
+        return Box(x + offset * ux, y + offset * uy, z, ux, uy, length, width)
+
+    def drive(self, control: list[Any]) -> None:
+        """Take a VehicleControl; it is shown to clients and does not move the vehicle."""
+        self.control = control
+        # No traffic light ever acts on a vehicle here: the client sees green.
+        self.tail = wire.VEHICLE_TAIL.pack(*control, _SPEED_LIMIT, _GREEN, False, 0, 0)
+
+    def walk_on(self, walk: list[Any]) -> None:
+        """Take a WalkerControl: walk straight on in its direction, and look there."""
+        self.walk = walk
+        (x, y, z), speed, jump = walk
+        self.tail = wire.WALKER_TAIL.pack(x, y, z, speed, jump)
+        norm = hypot(x, y, z)
+        self.velocity = (x / norm * speed, y / norm * speed, z / norm * speed) if norm else ZERO
+
+    def put(self, at: Pose) -> None:
+        """Teleport; the pose of an attached actor is relative to its parent, as in CARLA."""
+        if self.parent is None:
+            self.at = at
+        else:
+            self.relative = at
+            self.at = attached(self.parent.at, at)
+
+    def push(self, impulse: Vector) -> None:
+        """Change the velocity by an impulse, N s."""
+        x, y, z = self.velocity
+        self.velocity = (x + impulse[0] / MASS, y + impulse[1] / MASS, z + impulse[2] / MASS)
+
+    def advance(self, dt: float) -> None:
+        """Move by one tick of ``dt`` seconds."""
+        if self.parent is not None and self.relative is not None:
+            self.at = attached(self.parent.at, self.relative)
+            self.velocity = self.parent.velocity
+            return
+        if self.constant_velocity is not None:
+            self.velocity = turned(self.at, self.constant_velocity)
+        if self.force != ZERO:
+            fx, fy, fz = self.force
+            self.push((fx * dt, fy * dt, fz * dt))
+            self.force = ZERO
+        velocity = self.velocity
+        if self.physics and (velocity != ZERO or self.angular != ZERO):
+            self._move(dt)
+        if velocity != self.previous_velocity or self.acceleration != ZERO:
+            (a, b, c), (d, e, f) = velocity, self.previous_velocity
+            self.acceleration = ((a - d) / dt, (b - e) / dt, (c - f) / dt)
+            self.previous_velocity = velocity
+
+    def _move(self, dt: float) -> None:
+        x, y, z, pitch, yaw, roll = self.at
+        vx, vy, vz = self.velocity
+        self.at = (x + vx * dt, y + vy * dt, z + vz * dt, pitch, yaw + self.angular[2] * dt, roll)
+
+
+def turned(frame: Pose, local: Vector) -> Vector:
+    """Vector of a pose's frame in the world; Unreal's order of rotations, left-handed."""
+    _, _, _, pitch, yaw, roll = frame
+    sp, cp = sin(radians(pitch)), cos(radians(pitch))
+    sy, cy = sin(radians(yaw)), cos(radians(yaw))
+    sr, cr = sin(radians(roll)), cos(radians(roll))
+    x, y, z = local
+    return (
+        cp * cy * x + (cy * sp * sr - sy * cr) * y - (cy * sp * cr + sy * sr) * z,
+        cp * sy * x + (sy * sp * sr + cy * cr) * y - (sy * sp * cr - cy * sr) * z,
+        sp * x - cp * sr * y + cp * cr * z,
+    )
+
+
+def attached(parent: Pose, relative: Pose) -> Pose:
+    """Pose of something attached; rotations are added, which is exact for a level parent."""
+    dx, dy, dz = turned(parent, wire.vector(relative[:3]))
+    x, y, z, pitch, yaw, roll = parent
+    return (
+        x + dx, y + dy, z + dz, pitch + relative[3], yaw + relative[4], roll + relative[5]
+    )  # fmt: skip

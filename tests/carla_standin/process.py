@@ -1,0 +1,147 @@
+"""A stand-in for a CARLA 0.9.16 server, in a process of its own, for tests."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+_ROOT = Path(__file__).parents[2]
+_END_SECONDS = 10.0
+
+
+class StandIn:
+    """Server process; a context manager that leaves no process behind.
+
+    The process has to be another one: the client keeps Python's lock while it waits.
+
+    Parameters
+    ----------
+    xodr
+        Map to begin with; ``map_name`` is what the server calls it.
+    other_maps
+        More maps that can be loaded, by name.
+    box_offset
+        Metres by which the boxes of vehicles lie before their origin; some models have that.
+    switches
+        Of :class:`tests.carla_standin.switches.Switches`.
+    """
+
+    host = "127.0.0.1"
+
+    def __init__(
+        self,
+        xodr: Path,
+        *,
+        map_name: str | None = None,
+        other_maps: dict[str, Path] | None = None,
+        box_offset: float = 0.0,
+        **switches: Any,
+    ) -> None:
+        maps = {map_name or xodr.stem: xodr, **(other_maps or {})}
+        self._options = {
+            "maps": {name: str(file.resolve()) for name, file in maps.items()},
+            "box_offset": box_offset,
+            "switches": switches,
+        }
+        self.port = 0
+
+    def __enter__(self) -> Self:
+        path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.carla_standin"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=_ROOT,
+            env={**os.environ, "PYTHONPATH": path},
+            text=True,
+        )
+        try:
+            self._write(self._options)
+            self.port = self._read()["port"]
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the process: it ends by itself with its standard input, or else is killed."""
+        try:
+            self._process.communicate(timeout=_END_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+
+    # ------------------------------------------------------------------------------- side door
+    def calls(self) -> Counter[str]:
+        """How often each RPC was called since the start or :meth:`reset_calls`."""
+        return Counter(self._ask("calls"))
+
+    def reset_calls(self) -> None:
+        """Count RPCs anew."""
+        self._ask("reset_calls")
+
+    def actors(self) -> list[dict[str, Any]]:
+        """All actors as the server has them, in the order of their ids."""
+        return list(self._ask("actors"))
+
+    def set(self, **switches: Any) -> None:
+        """Change switches of :class:`tests.carla_standin.switches.Switches`."""
+        self._ask("set", **switches)
+
+    def load(self, name: str) -> None:
+        """Load another map, as another client might."""
+        self._ask("load", name=name)
+
+    # ------------------------------------------------------------------------------- violence
+    def kill(self) -> None:
+        """Kill the server at once."""
+        self._process.kill()
+        self._process.wait()
+
+    def pause(self) -> None:
+        """Freeze the whole process."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let a frozen process go on."""
+        self._process.send_signal(signal.SIGCONT)
+
+    def has_died(self, seconds: float = _END_SECONDS) -> bool:
+        """Whether the process ends within some seconds."""
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def _ask(self, name: str, /, **arguments: Any) -> Any:
+        self._write([name, arguments])
+        answer = self._read()
+        if "error" in answer:
+            raise RuntimeError(answer["error"])
+        return answer["result"]
+
+    def _write(self, message: Any) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(message) + "\n")
+        self._process.stdin.flush()
+
+    def _read(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            msg = f"the stand-in ended with {self._process.wait()}"
+            raise RuntimeError(msg)
+        return dict(json.loads(line))

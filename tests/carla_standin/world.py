@@ -1,0 +1,220 @@
+"""The world: actors, settings, weather, maps; what a tick does and what clients see of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from odscen.catalog.assets import shipped_assets
+from odscen.scenario.bodies import overlap
+from tests.carla_standin import camera, wire
+from tests.carla_standin.actors import Actor, Kind, attached
+from tests.carla_standin.blueprints import (
+    SIGN_TAG,
+    TRAFFIC_LIGHT_TAG,
+    WALKER_CONTROLLER,
+    Definition,
+    definitions,
+)
+from tests.carla_standin.road_map import RoadMap, RoadSign
+from tests.carla_standin.streams import StreamServer
+from tests.carla_standin.switches import Switches
+from tests.carla_standin.traffic_lights import TrafficLights
+from tests.carla_standin.wire import Pose
+
+ASYNC_DELTA = 0.05
+"""Seconds between ticks, on the clock, while no client ticks."""
+
+_SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
+_SYNCHRONOUS, _FIXED_DELTA = 0, 2
+_TRIGGER = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]]
+_POINT = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+
+
+class World:
+    """Everything a client can see; ids of actors, episodes and streams are never used again."""
+
+    def __init__(self, road_map: RoadMap, streams: StreamServer, switches: Switches) -> None:
+        self.definitions = definitions()
+        self.settings: list[Any] = list(_SETTINGS)
+        self.weather = list(shipped_assets().preset("ClearNoon").parameters.values())
+        self.traffic_managers: dict[int, str] = {}
+        self.frame = 0
+        self.episode = 0
+        self.box_offset = 0.0
+        self.spectator: Actor
+        self._streams = streams
+        self._switches = switches
+        self._next_id = 1
+        self._next_stream = wire.WORLD_OBSERVER + 1
+        self._captured: dict[int, float] = {}
+        self.open(road_map)
+
+    # ------------------------------------------------------------------------------- episodes
+    def open(self, road_map: RoadMap) -> None:
+        """Begin an episode on a map: nothing is left but its traffic lights and signs."""
+        self.map = road_map
+        self.episode += 1
+        self.elapsed = 0.0
+        self.actors: dict[int, Actor] = {}
+        self.lights = TrafficLights()
+        self.traffic_managers.clear()
+        self._captured.clear()
+        nowhere = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self.spectator = self._enter(
+            Actor(self._next_id, [0, "spectator", []], nowhere, [*_POINT, self._next_id])
+        )
+        placed = {sign.id: self._add_sign(sign) for sign in road_map.signs}
+        for group in road_map.groups:
+            self.lights.add_group([[placed[sign] for sign in sorted(turn)] for turn in group])
+
+    def reset_settings(self) -> None:
+        """Back to what a server starts with."""
+        self.settings = list(_SETTINGS)
+
+    @property
+    def synchronous(self) -> bool:
+        """Whether the world waits for clients to tick."""
+        return bool(self.settings[_SYNCHRONOUS])
+
+    @property
+    def delta(self) -> float:
+        """Simulated seconds of a tick."""
+        fixed = self.settings[_FIXED_DELTA]
+        return float(fixed[1]) if fixed[0] else ASYNC_DELTA
+
+    # ------------------------------------------------------------------------------- actors
+    def __getitem__(self, actor: int) -> Actor:
+        """Actor by id; refuses an unknown one."""
+        if actor not in self.actors:
+            message = f"Actor could not be found in the registry.  Actor Id: {actor}"
+            raise wire.RefusedError(message)
+        return self.actors[actor]
+
+    def of_kind(self, actor: int, kind: Kind) -> Actor:
+        """Actor by id; refuses one of another kind."""
+        found = self[actor]
+        if found.kind is not kind:
+            msg = f"Actor is not a {kind.name.title()}. Actor Id: {actor}"
+            raise wire.RefusedError(msg)
+        return found
+
+    def spawn(self, description: list[Any], at: Pose, parent: int | None = None) -> Actor:
+        """Spawn an actor; with a parent, ``at`` is relative to it."""
+        refusal = self._switches.refuse_spawn()
+        if refusal is not None:
+            raise wire.RefusedError(refusal)
+        definition = self.definitions.get(description[1])
+        if definition is None:
+            raise wire.RefusedError("Spawn failed because of invalid actor description")
+        if parent is not None and parent not in self.actors:
+            raise wire.RefusedError("unable to attach actor: parent actor not found")
+        actor = self._make(definition, description, at, parent)
+        if definition.has_body and self._is_taken(actor):
+            raise wire.RefusedError("Spawn failed because of a collision at spawn position")
+        if actor.is_camera:
+            actor.stream = self._next_stream
+            self._next_stream += 1
+        return self._enter(actor)
+
+    def destroy(self, actor: int) -> bool:
+        """Destroy an actor; what is attached to it stays where it is."""
+        if actor not in self.actors:
+            raise wire.RefusedError("unable to destroy actor: not found")
+        gone = self.actors.pop(actor)
+        for other in self.actors.values():
+            if other.parent is gone:
+                other.parent = other.relative = None
+        return True
+
+    def token(self, actor: Actor) -> bytes:
+        """Token of an actor's stream, empty for what is no sensor."""
+        return b"" if actor.stream is None else self._streams.token(actor.stream)
+
+    def _make(
+        self, definition: Definition, description: list[Any], at: Pose, parent: int | None
+    ) -> Actor:
+        owner = self.actors[parent] if parent is not None else None
+        offset = self.box_offset if Kind.of(definition.id) is Kind.VEHICLE else 0.0
+        box = [[offset, 0.0, definition.box_height], list(definition.half_size), [0.0, 0.0, 0.0]]
+        return Actor(
+            self._next_id,
+            description,
+            attached(owner.at, at) if owner else at,
+            [*box, self._next_id],
+            tag=definition.semantic_tag,
+            parent=owner,
+            relative=at if owner else None,
+            physics=definition.id != WALKER_CONTROLLER,
+        )
+
+    def _enter(self, actor: Actor) -> Actor:
+        self.actors[actor.id] = actor
+        self._next_id += 1
+        return actor
+
+    def _add_sign(self, sign: RoadSign) -> Actor:
+        return self._enter(
+            Actor(
+                self._next_id,
+                [0, sign.type_id, []],
+                sign.at,
+                [*_TRIGGER, self._next_id],
+                tag=TRAFFIC_LIGHT_TAG if sign.type_id == Kind.LIGHT.value else SIGN_TAG,
+                sign_id=sign.id,
+            )
+        )
+
+    def _is_taken(self, actor: Actor) -> bool:
+        ground = actor.footprint()
+        return any(
+            overlap(ground, other.footprint())
+            for other in self.actors.values()
+            if other.kind in (Kind.VEHICLE, Kind.WALKER)
+        )
+
+    # ------------------------------------------------------------------------------- ticks
+    def tick(self) -> int:
+        """Let one tick pass and show it; the number of the new frame."""
+        dt = self.delta
+        self.frame += 1
+        self.elapsed += dt
+        # A parent is older than what is attached to it, and a dictionary keeps its order.
+        for actor in self.actors.values():
+            actor.advance(dt)
+        self.lights.advance(dt)
+        self.show()
+        self._take_pictures()
+        return self.frame
+
+    def show(self) -> None:
+        """Send the state of the present frame to all who watch."""
+        message = wire.state_message(
+            frame=self.frame,
+            elapsed=self.elapsed,
+            delta=self.delta,
+            episode=self.episode,
+            platform_time=time.monotonic(),
+            records=[actor.record() for actor in self.actors.values()],
+        )
+        self._streams.send(wire.WORLD_OBSERVER, message)
+
+    def _take_pictures(self) -> None:
+        cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]
+        bodies = self._bodies() if cameras else ()
+        for actor in cameras:
+            self._captured[actor.id] = self.elapsed
+            picture = camera.take(actor, bodies, frame=self.frame, elapsed=self.elapsed)
+            self._streams.send(actor.stream or 0, picture)
+
+    def _is_due(self, actor: Actor) -> bool:
+        if actor.stream is None or not self._streams.is_watched(actor.stream):
+            return False
+        last = self._captured.get(actor.id)
+        pause = float(actor.attribute("sensor_tick"))
+        # Times are sums of steps: a hair less than the pause is the pause.
+        return last is None or self.elapsed - last >= pause - 1e-6
+
+    def _bodies(self) -> Sequence[Actor]:
+        return [a for a in self.actors.values() if a.kind in (Kind.VEHICLE, Kind.WALKER)]
