@@ -89,6 +89,10 @@ class LockstepWatch:
                 self.stopped = True
                 return False
 
+    def show_last(self, session: Session, recorder: Recorder) -> None:
+        """Tell of the last step."""
+        self.show(session, recorder)
+
     def show(self, session: Session, recorder: Recorder) -> None:
         """Tell of the step just made; there is nothing to tell before the first."""
         if not self._steps:

@@ -74,13 +74,17 @@ class Watch:
         self._measure()
         return True
 
-    def show(self, session: Session, recorder: Recorder, *, last: bool = False) -> None:
-        """Send a frame, and what has changed, unless this step has one already.
+    def show(self, session: Session, recorder: Recorder) -> None:
+        """Send a frame if one is wanted and this step has none yet; and what has changed."""
+        if self.steering.frame_wanted and self._framed != self._step:
+            self._show(session, recorder)
 
-        Only if one is wanted; the last one in any case, for who asks for it later.
-        """
-        if self._framed == self._step or not (last or self.steering.frame_wanted):
-            return
+    def show_last(self, session: Session, recorder: Recorder) -> None:
+        """Send the last frame, wanted or not: somebody may ask for it later."""
+        if self._framed != self._step:
+            self._show(session, recorder)
+
+    def _show(self, session: Session, recorder: Recorder) -> None:
         self.steering.frame_wanted = False
         self._framed = self._step
         start = time.monotonic()

@@ -138,7 +138,7 @@ def _steps(
                     Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned)
                 )
         if watch is not None:  # whoever watches sees how it ends
-            watch.show(session, recorder, last=True)
+            watch.show_last(session, recorder)
             running = session.running()
             send(Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned))
         return now, steps
