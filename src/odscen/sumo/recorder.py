@@ -7,13 +7,13 @@ with the number of vehicles running. Trajectories are SUMO's own business (FCD o
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.frames import SumoPose, sumo_to_xodr
 from odscen.results.records import Event, EventKind, Plan
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.sumo.session import Collision, Front, Session
 
@@ -24,13 +24,16 @@ class Recorder:
     Attributes
     ----------
     events
-        All events so far, in order of time.
+        Events since the last :meth:`drain`, in order of time.
+    drained
+        How many events were drained before.
     departed, arrived
         How many vehicles and persons so far.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.events: list[Event] = []
+        self.drained = 0
         self.departed = 0
         self.arrived = 0
         self._planned = {actor.id: actor for actor in plan.actors}
@@ -39,6 +42,45 @@ class Recorder:
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
         self._stopping: set[str] = set()
+
+    def since(self, number: int) -> list[Event]:
+        """Events but the first ``number`` ones, as far as they have not been drained."""
+        return self.events[max(0, number - self.drained) :]
+
+    @property
+    def count(self) -> int:
+        """How many events there have been."""
+        return self.drained + len(self.events)
+
+    def drain(self) -> list[Event]:
+        """Hand out the events and forget them: a long run keeps them on disk."""
+        events, self.events = self.events, []
+        self.drained += len(events)
+        return events
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        return {
+            "drained": self.drained,
+            "departed": self.departed,
+            "arrived": self.arrived,
+            "departures": self._departures,
+            "touching": sorted(self._touching),
+            "stopping": sorted(self._stopping),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self.events = []
+        self.drained = state["drained"]
+        self.departed, self.arrived = state["departed"], state["arrived"]
+        self._departures = dict(state["departures"])
+        self._touching = {(one, other) for one, other in state["touching"]}
+        self._stopping = set(state["stopping"])
+
+    def lose(self, time: float, names: Iterable[str]) -> None:
+        """Say that SUMO did not bring these back with a saved state."""
+        self.events += [Event(time, EventKind.LOST, name) for name in sorted(names)]
 
     def record(self, session: Session, time: float) -> None:
         """Record the step that began at ``time`` and has just been made."""
@@ -75,7 +117,7 @@ class Recorder:
 
     def _arrive(self, time: float, name: str) -> None:
         self.arrived += 1
-        departed = self._departures.get(name)
+        departed = self._departures.pop(name, None)
         spent = None if departed is None else time - departed
         self.events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
 

@@ -99,8 +99,8 @@ class Watch:
             self._send(self._pace, b"")
 
     def _tell_incidents(self, recorder: Recorder) -> None:
-        new = recorder.events[self._told :]
-        self._told = len(recorder.events)
+        new = recorder.since(self._told)
+        self._told = recorder.count
         rows = [event_row(event) for event in new if event.kind not in _PLAIN]
         if rows:
             self._send(Incidents(rows), b"")
