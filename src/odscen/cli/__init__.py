@@ -16,7 +16,7 @@ from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
-from odscen.cli.runs import run
+from odscen.cli.runs import resume, run
 from odscen.cli.scenarios import check, export, generate
 from odscen.cli.serve import serve
 from odscen.errors import OdscenError
@@ -34,6 +34,7 @@ app.command()(generate)
 app.command()(check)
 app.command()(export)
 app.command()(run)
+app.command()(resume)
 app.command()(serve)
 app.command()(doctor)
 app.command()(demo)

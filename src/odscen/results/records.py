@@ -151,7 +151,7 @@ class Plan:
 class EventKind(StrEnum):
     """What can happen to an actor.
 
-    A jam is told of whoever is first in it. ``lost``: SUMO did not bring it back with a saved state.
+    A jam is told of whoever is first in it. ``lost``: it did not come back with a saved state.
     """
 
     DEPARTED = "departed"

@@ -46,6 +46,7 @@ def render_report(
     trajectories: pl.DataFrame,
     *,
     drawing: MapDrawing | None = None,
+    every: int = 1,
 ) -> str:
     """Write the report of one run.
 
@@ -64,6 +65,8 @@ def render_report(
         As read from ``trajectories.parquet``, in SUMO's frame.
     drawing
         Of the map, if it is to be shown below the ways.
+    every
+        Of so many records the trajectories have one only; the page says so.
 
     Returns
     -------

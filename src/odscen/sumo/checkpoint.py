@@ -54,8 +54,8 @@ class Checkpoint:
         How many vehicles and persons were on the road.
     present
         Ids of all vehicles and persons that the state holds, as far as SUMO tells.
-    recorder, jams
-        What these remember, see :meth:`odscen.sumo.recorder.Recorder.state`.
+    recorder
+        What it remembers, see :meth:`odscen.sumo.recorder.Recorder.state`.
     files
         Size and CRC-32 by name.
     """
@@ -71,7 +71,6 @@ class Checkpoint:
     running: int
     present: list[str]
     recorder: dict[str, Any]
-    jams: dict[str, Any]
     files: dict[str, list[int]]
 
 

@@ -5,7 +5,7 @@ Paths are relative to the file. What each setting is for is said in ``docs/runs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
 from odscen.sumo.layout import (
@@ -54,7 +54,7 @@ class RunSettings:
     time_to_teleport: float = 300.0
     elevation: bool = False
     signals: bool = False
-    recording: Recording = Recording()
+    recording: Recording = field(default_factory=Recording)
     meso: bool = False
 
 

@@ -1,7 +1,8 @@
 """What happened to whom, collected while the simulation steps.
 
 Only id lists are read per step, and poses of those who have just departed: the cost does not grow
-with the number of vehicles running. Trajectories are SUMO's own business (FCD output).
+with the number of vehicles running. Twice a minute all are looked at for jams. Trajectories are
+SUMO's own business (FCD output).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.frames import SumoPose, sumo_to_xodr
 from odscen.results.records import Event, EventKind, Plan
+from odscen.sumo.jams import JamWatch
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -42,6 +44,7 @@ class Recorder:
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
         self._stopping: set[str] = set()
+        self._jams = JamWatch(plan.net_offset)
 
     def since(self, number: int) -> list[Event]:
         """Events but the first ``number`` ones, as far as they have not been drained."""
@@ -67,6 +70,7 @@ class Recorder:
             "departures": self._departures,
             "touching": sorted(self._touching),
             "stopping": sorted(self._stopping),
+            "jams": self._jams.state(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -77,6 +81,7 @@ class Recorder:
         self._departures = dict(state["departures"])
         self._touching = {(one, other) for one, other in state["touching"]}
         self._stopping = set(state["stopping"])
+        self._jams.restore(state["jams"])
 
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
@@ -90,12 +95,13 @@ class Recorder:
         for person in lists.departed_persons:
             self._depart(time, person, session.person_front(person))
         for vehicle in lists.teleports_started:
-            self._place(time, EventKind.TELEPORT_START, vehicle, None)
+            self._teleport(time, vehicle)
         for vehicle in lists.teleports_ended:
             front = session.vehicle_front(vehicle)
             self._place(time, EventKind.TELEPORT_END, vehicle, front)
         self._stops(time, lists.emergency_stops, session)
         self._collisions(time, session.collisions())
+        self.events += self._jams.look(session, time)
         # The end of the step is when they left the road.
         for name in (*lists.arrived, *lists.arrived_persons):
             self._arrive(session.time, name)
@@ -120,6 +126,25 @@ class Recorder:
         departed = self._departures.pop(name, None)
         spent = None if departed is None else time - departed
         self.events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
+
+    def _teleport(self, time: float, vehicle: str) -> None:
+        """Tell where and why it stood until now, as it has no place any more."""
+        stuck = self._jams.stuck(vehicle)
+        if stuck is None:
+            self.events.append(Event(time, EventKind.TELEPORT_START, vehicle))
+            return
+        self.events.append(
+            Event(
+                time,
+                EventKind.TELEPORT_START,
+                vehicle,
+                x=stuck.x,
+                y=stuck.y,
+                lane=stuck.lane,
+                detail=stuck.reason,
+                waited=time - stuck.since,
+            )
+        )
 
     def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
         if front is None:

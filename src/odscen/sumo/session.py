@@ -72,6 +72,39 @@ class StepLists(NamedTuple):
     emergency_stops: Sequence[str]
 
 
+class Standing(NamedTuple):
+    """A vehicle that stands: where its front is, metres along ``lane``, and for how long, s."""
+
+    vehicle: str
+    lane: str
+    pos: float
+    waited: float
+
+
+class Ahead(NamedTuple):
+    """What a vehicle has before it.
+
+    Attributes
+    ----------
+    onwards
+        Whether its lane leads on along its way.
+    light
+        Letter of the next link: ``r`` red, ``y`` yellow, ``G``, ``g`` green; others without light.
+    open
+        Whether right of way and light let it pass.
+    leader
+        Vehicle close ahead, if there is one.
+    people
+        Whether somebody is on a crossing that its next link runs over.
+    """
+
+    onwards: bool
+    light: str
+    open: bool
+    leader: str | None
+    people: bool
+
+
 class Session:
     """A running simulation. Made by :func:`open_session` only."""
 
@@ -155,6 +188,62 @@ class Session:
         """State of each traffic light, a letter per link."""
         state = self._sumo.trafficlight.getRedYellowGreenState
         return {name: state(name) for name in self._sumo.trafficlight.getIDList()}
+
+    def present(self) -> set[str]:
+        """Ids of all vehicles and persons on the road, and of vehicles that wait for room."""
+        waiting = self._simulation.getPendingVehicles()
+        return {*self._sumo.vehicle.getIDList(), *self._sumo.person.getIDList(), *waiting}
+
+    def save(self, path: Path) -> None:
+        """Write the state to ``path``, which ends in ``.xml.gz``.
+
+        Raises
+        ------
+        SimulationError
+            If SUMO cannot.
+        """
+        try:
+            self._simulation.saveState(str(path))
+        except self._errors as error:
+            msg = f"SUMO could not save its state at {self.time:g} s: {error}"
+            raise SimulationError(msg) from error
+
+    def standing(self, seconds: float) -> list[Standing]:
+        """Vehicles on the road that have stood for so long; a microsecond for each on the road."""
+        vehicle = self._sumo.vehicle
+        found = []
+        for name in vehicle.getIDList():
+            waited = vehicle.getWaitingTime(name)
+            if waited >= seconds and (lane := vehicle.getLaneID(name)):
+                found.append(Standing(name, lane, vehicle.getLanePosition(name), waited))
+        return found
+
+    def ahead(self, name: str, *, within: float) -> Ahead | None:
+        """What a vehicle has before it, ``within`` metres; ``None`` if it is not on the road."""
+        vehicle = self._sumo.vehicle
+        try:
+            links = vehicle.getNextLinks(name)
+            leader = vehicle.getLeader(name, within)
+            at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
+        except self._errors:
+            return None
+        close = leader[0] if leader and leader[0] and leader[1] <= within else None
+        if not links:
+            return Ahead(at_end, "", at_end, close, people=False)
+        link = links[0]
+        # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
+        people = bool(link[3]) and self._people_cross(link[4])
+        return Ahead(True, str(link[5]), bool(link[2]), close, people)
+
+    def _people_cross(self, internal: str) -> bool:
+        if not internal:
+            return False
+        lane, edge = self._sumo.lane, self._sumo.edge
+        return any(
+            lane.getAllowed(foe) == ("pedestrian",)
+            and edge.getLastStepPersonIDs(lane.getEdgeID(foe))
+            for foe in lane.getInternalFoes(internal)
+        )
 
     def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
         ids = domain.getIDList()

@@ -15,10 +15,14 @@ from odscen.errors import InputError, NotFoundError
 from odscen.results.records import Plan
 from odscen.results.replay import replay_columns
 from odscen.sumo import layout
+from odscen.sumo.recorded import read_trajectories
 from odscen.web.live import LiveView
 from odscen.web.messages import Control, NewRun, RunInfo, RunStarted
 from odscen.web.packed import answer, pack
 from odscen.web.services import Shared
+
+REPLAY_ROWS = 4_000_000
+"""Rows that a page gets at most; of a longer run it gets every second, third, ... record."""
 
 router = APIRouter(prefix="/api/runs")
 
@@ -84,15 +88,13 @@ def trajectories(
     every: Annotated[int, Query(ge=1, le=10_000)] = 1,
 ) -> Any:
     """Where everybody was, as columns; see ``docs/server.md``."""
-    import polars as pl
-
     folder = shared.runs.folder(run)
-    file = folder / layout.TRAJECTORIES_FILE
-    if not file.is_file():
+    recorded = read_trajectories(folder, most=REPLAY_ROWS)
+    if recorded is None:
         what = "trajectories of run"
         raise NotFoundError(what, run, [])
     plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
-    columns = replay_columns(pl.read_parquet(file), plan, every=every)
+    columns = replay_columns(recorded.rows, plan, every=max(1, every // recorded.every))
     columns["actors"] = [
         {"id": a.id, "category": a.category, "length": a.length, "width": a.width, "ego": a.ego}
         for a in plan.actors
