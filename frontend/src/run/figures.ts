@@ -30,12 +30,12 @@ export function keyFigures(summary: Record<string, unknown>): Figure[] {
   return found;
 }
 
-const ENDED = ["completed", "stopped", "failed"];
+const ENDED = ["completed", "stopped", "failed", "interrupted"];
 export const hasEnded = (state: string): boolean => ENDED.includes(state);
 
 export const STATE_WORD: Record<string, string> = {
   preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
-  completed: "Finished", stopped: "Stopped", failed: "Failed",
+  completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
 };
 
 /** Speeds to choose from; null is as fast as the machine can. */

@@ -32,6 +32,10 @@ EVENT_WORDS = {
         "stopped harder than its brakes can",
         "Usually the way ahead was closed to it at short notice.",
     ),
+    EventKind.LOST: (
+        "did not come back when the simulation was reloaded",
+        "A limit of the simulator; its trip is not counted as finished.",
+    ),
 }
 """What happened and why that may be, for the events worth telling."""
 
@@ -50,7 +54,8 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
     return element("section", element("h2", heading), *children, note, id=ident)
 
 
-def _table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
+def data_table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
+    """Build a table that scrolls by itself where it is too wide for the page."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
     table = element("table", head, element("tbody", *rows), **attributes)
     return element("div", table, class_="scroll", tabindex="0", role="region", aria_label=heads[0])
@@ -74,7 +79,7 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
         "each line was asked for when the run was started; the value is what the run gave. Names "
         "like arrived compare the share of all planned actors."
     )
-    table = _table(("Expectation", "Value", "Verdict"), rows)
+    table = data_table(("Expectation", "Value", "Verdict"), rows)
     return report_section("Expectations", table, explained=explained, ident="expectations")
 
 
@@ -157,7 +162,7 @@ def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
         "press a heading to sort by it, once more to turn the order round. Times count from the "
         "start of the simulation; an empty field means that it never came to that."
     )
-    table = _table(_COLUMNS, rows, id="actors-table")
+    table = data_table(_COLUMNS, rows, id="actors-table")
     return report_section("Actors", control, more, table, explained=explained, ident="actors")
 
 

@@ -134,6 +134,15 @@ def interrupted(runs: Path) -> list[str]:
     return sorted(path.name for path in runs.iterdir() if read_status(path) is not None)
 
 
+def about(folder: Path) -> dict[str, Any]:
+    """What a run that has not ended will say of itself, for example its map; empty if unknown."""
+    try:
+        settings = json.loads((folder / layout.SETTINGS_FILE).read_text(encoding="utf-8"))
+        return dict(settings["about"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
 def _go_on(
     prepared: PreparedRun,
     folder: Path,

@@ -28,7 +28,7 @@ LEAST_PAUSE = 1 / 30
 """Wall seconds between two frames of a run in a hurry."""
 _WINDOW = 0.5
 """Wall seconds that the real-time factor is measured over."""
-_PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED)
+_PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED, EventKind.JAM_END)
 
 
 class Watch:

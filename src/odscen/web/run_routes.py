@@ -76,6 +76,9 @@ def report(run: str, shared: Shared) -> Response:
 def summary(run: str, shared: Shared) -> dict[str, Any]:
     """Key figures of a finished run: its ``summary.json``."""
     path = shared.runs.folder(run) / layout.SUMMARY_FILE
+    if not path.is_file():
+        what = "summary of run"
+        raise NotFoundError(what, run, [])
     found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
