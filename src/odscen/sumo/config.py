@@ -94,7 +94,11 @@ def sumo_config(settings: RunSettings) -> str:
         },
     }
     if settings.meso:
-        sections["mesoscopic"] = {"mesosim": "true", "meso-junction-control": "true"}
+        sections["mesoscopic"] = {
+            "mesosim": "true",
+            "meso-junction-control": "true",
+            "meso-interpolate-pos": "true",
+        }
         # The striping model needs lanes with places on them, which meso does not keep.
         sections["processing"]["pedestrian.model"] = "nonInteracting"
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]

@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 
 SLICE = 3600.0
 """Seconds of a slice, unless somebody wishes otherwise."""
+MESO_NOTE = (
+    "meso: queues on sections of road instead of vehicles that follow each other. No lanes, lane "
+    "changes, places across the lane, exact starts, collisions or hard braking; people on foot "
+    "meet neither each other nor vehicles; places are interpolated"
+)
 REPORT_ROWS = 2_000_000
 """Rows of trajectories that a report is made from at most; a day of a town has far more."""
 
@@ -85,8 +90,8 @@ def prepare(
         net=net,
         scenario_json=dumps(scenario),
         problems=realization.problems,
-        notes=realization.notes,
-        about={"map": scenario.map.name, "map_sha256": scenario.map.sha256},
+        notes=((MESO_NOTE,) if meso else ()) + realization.notes,
+        about={"map": scenario.map.name, "map_sha256": scenario.map.sha256, "meso": meso},
         expected=forecast(
             plan, realization.files, every=None if recording is None else recording.every
         ),
