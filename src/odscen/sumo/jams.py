@@ -2,7 +2,8 @@
 
 A lane is jammed while somebody on it has stood for :data:`STUCK` seconds, which is longer than a
 red light. Who is first in it is asked what it has ahead; if that is another standing vehicle, that
-one is asked, and so on to the head of the queue, whose reason is everybody's.
+one is asked, and so on to the head of the queue, whose reason is everybody's. Asking begins
+earlier, at :data:`WATCHED` seconds: whoever cannot go on at green will be looked at at red, too.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ if TYPE_CHECKING:
 
     from odscen.sumo.session import Ahead, Session, Standing
 
-PERIOD = 30.0
+PERIOD = 15.0
 """Simulated seconds between two looks."""
+WATCHED = 45.0
+"""Seconds of standing from which the reason is looked for."""
 STUCK = 180.0
 """Seconds of standing that make a jam."""
 
-_NEAR = 15.0
-"""Metres ahead that a standing vehicle may be and be the reason."""
 _HOPS = 200
 """Vehicles that a reason is followed through."""
 
@@ -74,16 +75,19 @@ class JamWatch:
             return []
         self._next = time + PERIOD
         queues: dict[str, list[Standing]] = {}
-        for one in session.standing(STUCK):
+        for one in session.standing(WATCHED):
             queues.setdefault(one.lane, []).append(one)
-        events = [self._end(time, lane) for lane in sorted(self._since.keys() - queues.keys())]
-        self._stuck = {}
+        jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= STUCK}
+        events = [self._end(time, lane) for lane in sorted(self._since.keys() - jammed)]
+        before, self._stuck = self._stuck, {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
             reason, head = explain(session, first.vehicle)
+            if reason in (RED, UNKNOWN) and first.vehicle in before:
+                reason = before[first.vehicle].reason
             for one in queue:
                 self._stuck[one.vehicle] = self._place(session, one, time, reason)
-            if lane not in self._since:
+            if lane in jammed and lane not in self._since:
                 self._since[lane] = time - first.waited
                 events.append(self._begin(time, first, len(queue), head))
         return events
@@ -118,12 +122,12 @@ class JamWatch:
 def explain(session: Session, vehicle: str) -> tuple[str, str]:
     """Why a vehicle stands, and the vehicle at the head of the queue that it stands in."""
     seen = [vehicle]
-    ahead = session.ahead(vehicle, within=_NEAR)
+    ahead = session.ahead(vehicle)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
         if ahead.leader in seen or len(seen) >= _HOPS:
             return CIRCLE if ahead.leader in seen else NO_ROOM, seen[-1]
         seen.append(ahead.leader)
-        ahead = session.ahead(ahead.leader, within=_NEAR)
+        ahead = session.ahead(ahead.leader)
     if ahead is None:
         return UNKNOWN, seen[-1]
     return _own_reason(ahead) or UNKNOWN, seen[-1]

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+_CLOSE = 5.0
+"""Metres that a standing vehicle ahead may be away and be the reason for standing."""
+_STANDS = 0.1
+"""Speed, m/s, below which SUMO counts a vehicle as waiting."""
+
+
 class Front(NamedTuple):
     """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
 
@@ -93,7 +99,8 @@ class Ahead(NamedTuple):
     open
         Whether right of way and light let it pass.
     leader
-        Vehicle close ahead, if there is one.
+        Vehicle that stands so close ahead that there is no room to go on: right in front, or just
+        behind the junction, which must be kept clear.
     people
         Whether somebody is on a crossing that its next link runs over.
     """
@@ -218,22 +225,33 @@ class Session:
                 found.append(Standing(name, lane, vehicle.getLanePosition(name), waited))
         return found
 
-    def ahead(self, name: str, *, within: float) -> Ahead | None:
-        """What a vehicle has before it, ``within`` metres; ``None`` if it is not on the road."""
+    def ahead(self, name: str) -> Ahead | None:
+        """What a vehicle has before it; ``None`` if it is not on the road."""
         vehicle = self._sumo.vehicle
         try:
             links = vehicle.getNextLinks(name)
-            leader = vehicle.getLeader(name, within)
+            leader = self._standing_leader(name, float(links[0][7]) if links else 0.0)
             at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
         except self._errors:
             return None
-        close = leader[0] if leader and leader[0] and leader[1] <= within else None
         if not links:
-            return Ahead(at_end, "", at_end, close, people=False)
+            return Ahead(at_end, "", at_end, leader, people=False)
         link = links[0]
         # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
         people = bool(link[3]) and self._people_cross(link[4])
-        return Ahead(True, str(link[5]), bool(link[2]), close, people)
+        return Ahead(True, str(link[5]), bool(link[2]), leader, people)
+
+    def _standing_leader(self, name: str, junction: float) -> str | None:
+        """Return who leaves no room for the vehicle behind ``junction`` metres of junction."""
+        vehicle = self._sumo.vehicle
+        lane = vehicle.getLaneID(name)
+        rest = self._sumo.lane.getLength(lane) - vehicle.getLanePosition(name) if lane else 0.0
+        gap = vehicle.getMinGap(name)
+        needed = max(_CLOSE, rest + junction + vehicle.getLength(name) + 2.0 * gap)
+        leader = vehicle.getLeader(name, needed)
+        if not leader or not leader[0] or leader[1] > needed:
+            return None
+        return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STANDS else None
 
     def _people_cross(self, internal: str) -> bool:
         if not internal:
