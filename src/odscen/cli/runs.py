@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,10 +13,24 @@ from odscen.durations import clock, parse_duration
 from odscen.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunJob, RunResult
+
+
+@contextmanager
+def _hint(folder: Path) -> Iterator[None]:
+    """Tell whoever interrupts long runs how to go on with them."""
+    from odscen.sumo.long_runs import interrupted
+
+    before = set(interrupted(folder))
+    try:
+        yield
+    except KeyboardInterrupt:
+        for name in sorted(set(interrupted(folder)) - before):
+            log(f"{name} is interrupted; to go on with it: odscen resume {folder / name}")
+        raise
 
 
 def _duration(text: str) -> float:
@@ -96,9 +111,10 @@ def run(
     slice_length = None if slice_ == "none" else parse_duration(slice_)
     expectations = [parse_expectation(text) for text in expect or ()]
     paths = workflow.scenario_files(scenarios)
-    with progress("running") as step:
+    store = Workspace.open(workspace)
+    with _hint(out or store.runs), progress("running") as step:
         results = workflow.run(
-            Workspace.open(workspace),
+            store,
             paths,
             out=out,
             seed=seed,

@@ -122,7 +122,7 @@ def refuse_interrupted(out: Path) -> None:
     if status is not None:
         msg = (
             f"run {out.name!r} has not ended (it is at {status.get('time', 0):g} s); "
-            f"odscen resume {out.name} goes on with it, and without its folder {out} it begins anew"
+            f"odscen resume {out} goes on with it; delete the folder to begin anew"
         )
         raise ConflictError(msg)
 
@@ -160,7 +160,7 @@ def _go_on(
         kept = summary["slices"]["time"]
         summary["error"] = (
             f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
-            f"to go on from there: odscen resume {folder.name}"
+            f"to go on from there: odscen resume {folder}"
         )
     elif finish is not None:
         finish(folder, summary)
