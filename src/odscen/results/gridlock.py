@@ -101,7 +101,8 @@ def _on_the_road(events: Iterable[Event]) -> list[Trouble]:
         elif event.kind is EventKind.JAM_END:
             begin = open_jams.pop(str(event.lane), None)
             if begin is not None:
-                found.append(_jam(begin, event.time))
+                since = begin.time - (begin.waited or 0.0)
+                found.append(_jam(begin, since + (event.waited or 0.0)))
         elif event.kind is EventKind.TELEPORT_START:
             found.append(_moved_on(event))
     return [*found, *(_jam(begin, None) for begin in open_jams.values())]

@@ -27,6 +27,9 @@ STUCK = 180.0
 _HOPS = 200
 """Vehicles that a reason is followed through."""
 
+RELEASE = 60.0
+"""Seconds without anybody watched after which a jam is over: moving up a little does not end it."""
+
 CIRCLE = "vehicles wait for each other in a circle"
 NO_WAY_ON = "its lane does not lead on along its way"
 RED = "a red light"
@@ -53,16 +56,18 @@ class JamWatch:
         self._offset = net_offset
         self._next = 0.0
         self._since: dict[str, float] = {}
+        self._seen: dict[str, float] = {}
         self._stuck: dict[str, Stuck] = {}
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
-        return {"next": self._next, "since": self._since, "stuck": self._stuck}
+        return {"next": self._next, "since": self._since, "seen": self._seen, "stuck": self._stuck}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._next = state["next"]
         self._since = dict(state["since"])
+        self._seen = dict(state["seen"])
         self._stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
 
     def stuck(self, vehicle: str) -> Stuck | None:
@@ -78,7 +83,9 @@ class JamWatch:
         for one in session.standing(WATCHED):
             queues.setdefault(one.lane, []).append(one)
         jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= STUCK}
-        events = [self._end(time, lane) for lane in sorted(self._since.keys() - jammed)]
+        self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
+        over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
+        events = [self._end(time, lane) for lane in sorted(over)]
         before, self._stuck = self._stuck, {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
@@ -89,8 +96,13 @@ class JamWatch:
                 self._stuck[one.vehicle] = self._place(session, one, time, reason)
             if lane in jammed and lane not in self._since:
                 self._since[lane] = time - first.waited
+                self._seen[lane] = time
                 events.append(self._begin(time, first, len(queue), head))
         return events
+
+    def nobody_left(self, time: float) -> list[Event]:
+        """Jams that are over because the road is empty."""
+        return [self._end(time, lane) for lane in sorted(self._since)]
 
     def _place(self, session: Session, one: Standing, time: float, reason: str) -> Stuck:
         front = session.vehicle_front(one.vehicle)
@@ -115,7 +127,7 @@ class JamWatch:
         )
 
     def _end(self, time: float, lane: str) -> Event:
-        lasted = time - self._since.pop(lane)
+        lasted = self._seen.pop(lane) - self._since.pop(lane)
         return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
 
 

@@ -83,6 +83,10 @@ class Recorder:
         self._stopping = set(state["stopping"])
         self._jams.restore(state["jams"])
 
+    def nobody_left(self, time: float) -> None:
+        """Say that the run ends because the road is empty: every jam is over."""
+        self.events += self._jams.nobody_left(time)
+
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
         self.events += [Event(time, EventKind.LOST, name) for name in sorted(names)]

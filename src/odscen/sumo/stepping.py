@@ -80,6 +80,8 @@ class Stepper:
             if end - self._sent >= MESSAGE_PAUSE:
                 self._sent = end
                 self._tell(session, now)
+        if not more and session.expected() == 0:
+            self.recorder.nobody_left(now)
         if self._watch is not None:  # whoever watches sees how it ends
             self._watch.show(session, self.recorder)
             self._tell(session, now)
