@@ -41,7 +41,10 @@ def main() -> None:
         binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
         bare = [str(binary), "-c", str(config), "--end", f"{until:g}"]
         ours = [sys.executable, "-m", "odscen.sumo.worker", str(run / layout.PLAN_FILE)]
-        silent = [*bare, "--fcd-output", ""]
+        lines = config.read_text(encoding="utf-8").splitlines(keepends=True)
+        quiet = config.with_name("quiet.sumocfg")
+        quiet.write_text("".join(line for line in lines if "fcd" not in line), encoding="utf-8")
+        silent = [str(binary), "-c", str(quiet), "--end", f"{until:g}"]
         seconds = {"sumo": cpu(bare), "odscen": cpu(ours)}
         shown = json.loads((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))["actors"]
         seconds["silent"] = cpu(silent)

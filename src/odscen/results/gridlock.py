@@ -68,7 +68,10 @@ class Trouble:
 def find_trouble(
     plan: Plan, outcomes: Sequence[ActorOutcome], events: Iterable[Event], *, end: float
 ) -> tuple[Trouble, ...]:
-    """Every place where traffic got stuck, those that did not dissolve first, then by time.
+    """Every place where traffic got stuck.
+
+    Jams that did not dissolve come first, then other jams by how long they lasted, then places
+    where vehicles were kept out by their number, then vehicles moved on.
 
     Parameters
     ----------
@@ -76,7 +79,13 @@ def find_trouble(
         When the run ended, seconds; who was to depart later has not been kept out.
     """
     found = [*_on_the_road(events), *_kept_out(plan, outcomes, end)]
-    return tuple(sorted(found, key=lambda one: (one.until is not None, -one.count, one.time)))
+    return tuple(sorted(found, key=_order))
+
+
+def _order(one: Trouble) -> tuple[int, float, float]:
+    if one.kind == "jam":
+        return (0, one.time, 0.0) if one.until is None else (1, one.time - one.until, one.time)
+    return (2, -one.count, one.time) if one.kind == "kept_out" else (3, one.time, 0.0)
 
 
 def trouble_summary(found: Sequence[Trouble]) -> dict[str, Any]:

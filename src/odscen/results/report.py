@@ -270,7 +270,10 @@ def _map_section(
         "where traffic was slow: red places stood, blue places flowed."
     )
     if trouble:
-        explained += " Numbered rings are places where traffic got stuck; the table below has them."
+        explained += (
+            " Numbered rings are places where traffic got stuck; the table below has them. Where "
+            "rings crowd, one has its number; point at the others for theirs."
+        )
     if every > 1:
         explained += (
             f" The run is long: this page is made from one in {every} records of where everybody "

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from odscen.results.gridlock import Trouble
 
-SHOWN = 40
-"""Rows and rings at most, the worst first."""
+SHOWN = 15
+"""Rows and rings of each kind at most, the worst first."""
 
 _WHAT = {
     "jam": "Stood for minutes",
@@ -27,14 +27,15 @@ def trouble_section(found: Sequence[Trouble]) -> Markup | None:
     if not found:
         return None
     heads = ("No.", "What", "How many", "Since, s", "Until, s", "Where", "Why")
-    rows = [_row(index, one) for index, one in enumerate(found[:SHOWN], start=1)]
+    shown = _shown(found)
+    rows = [_row(index, one) for index, one in enumerate(shown, start=1)]
     more = None
-    if len(found) > SHOWN:
-        more = element("p", f"{len(found) - SHOWN:,} more, smaller ones are in summary.json.")
+    if len(found) > len(shown):
+        more = element("p", f"{len(found) - len(shown):,} smaller ones are not listed here.")
     explained = (
-        "each line is a place where traffic did not go on; its number is on the map above. First "
-        "come those that did not dissolve. The reason is what the first vehicle of the queue had "
-        "ahead of it. A red light that holds people for minutes asks for another signal plan, a "
+        "each line is a place where traffic did not go on; its number is on the map above. Jams "
+        "come first, and first of all those that did not dissolve. The reason is what the "
+        "first vehicle of the queue had ahead of it. A red light that holds people for minutes asks for another signal plan, a "
         "lane that does not lead on for a look at the map, a full start for less traffic there."
     )
     table = data_table(heads, rows)
@@ -47,17 +48,32 @@ def trouble_rings(found: Sequence[Trouble], dot: float) -> Markup | None:
     """Rings with the numbers of the table, in the map's centimetres."""
     radius = round(dot * 220)
     parts = []
-    for index, one in enumerate(found[:SHOWN], start=1):
+    labelled: list[tuple[int, int]] = []
+    for index, one in enumerate(_shown(found), start=1):
         if one.x is None or one.y is None:
             continue
         x, y = round(one.x * 100), round(-one.y * 100)
         title = element("title", f"{index}: {_WHAT[one.kind]}, {one.reason}")
         ring = element("circle", cx=x, cy=y, r=radius, stroke_width=round(dot * 45))
-        label = element(
-            "text", str(index), x=x + round(radius * 1.2), y=y, font_size=round(dot * 420)
-        )
+        label = None
+        if all(max(abs(x - a) / 3, abs(y - b)) > 2 * radius for a, b in labelled):
+            labelled.append((x, y))
+            label = element(
+                "text", str(index), x=x + round(radius * 1.2), y=y, font_size=round(dot * 420)
+            )
         parts.append(element("g", title, ring, label))
     return element("g", *parts, class_="stuck") if parts else None
+
+
+def _shown(found: Sequence[Trouble]) -> list[Trouble]:
+    """Return the worst of each kind, in the order given."""
+    left = dict.fromkeys(_WHAT, SHOWN)
+    shown = []
+    for one in found:
+        left[one.kind] -= 1
+        if left[one.kind] >= 0:
+            shown.append(one)
+    return shown
 
 
 def _row(index: int, one: Trouble) -> Markup:
