@@ -17,7 +17,7 @@ SHOWN = 15
 
 _WHAT = {
     "jam": "Stood for minutes",
-    "moved_on": "Stuck, moved on by the simulator",
+    "moved_on": "Moved on by the simulator",
     "kept_out": "Could not enter the road",
 }
 
@@ -26,7 +26,7 @@ def trouble_section(found: Sequence[Trouble]) -> Markup | None:
     """Table of the places where traffic got stuck; ``None`` if it did not."""
     if not found:
         return None
-    heads = ("No.", "What", "How many", "Since, s", "Until, s", "Where", "Why")
+    heads = ("No.", "What", "Why", "How many", "Since, s", "Until, s", "Where")
     shown = _shown(found)
     rows = [_row(index, one) for index, one in enumerate(shown, start=1)]
     more = None
@@ -34,9 +34,10 @@ def trouble_section(found: Sequence[Trouble]) -> Markup | None:
         more = element("p", f"{len(found) - len(shown):,} smaller ones are not listed here.")
     explained = (
         "each line is a place where traffic did not go on; its number is on the map above. Jams "
-        "come first, and first of all those that did not dissolve. The reason is what the "
-        "first vehicle of the queue had ahead of it. A red light that holds people for minutes asks for another signal plan, a "
-        "lane that does not lead on for a look at the map, a full start for less traffic there."
+        "come first, and first of all those that did not dissolve. The reason is what the first "
+        "vehicle of the queue had ahead of it. A red light that holds people for minutes asks for "
+        "another signal plan, a lane that does not lead on for a look at the map, a full start "
+        "for less traffic there."
     )
     table = data_table(heads, rows)
     return report_section(
@@ -86,10 +87,10 @@ def _row(index: int, one: Trouble) -> Markup:
     cells = (
         element("th", str(index), scope="row"),
         element("td", _WHAT[one.kind]),
+        element("td", one.reason, class_="wrap"),
         element("td", number(one.count, 0), class_="n"),
         element("td", number(one.time, 0), class_="n"),
         element("td", until, class_="n"),
         element("td", where),
-        element("td", one.reason),
     )
     return element("tr", join(list(cells)))
