@@ -28,6 +28,7 @@ FORMAT = "odscen-slice"
 VERSION = 1
 
 _BLOCK = 1 << 20
+_PART = ".part-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +82,16 @@ def slice_folder(run: Path, number: int) -> Path:
 
 def part_folder(run: Path, number: int) -> Path:
     """Folder that a slice is written in; empty, whatever an earlier process left there."""
-    folder = run / SLICES_FOLDER / f".part-{number:04d}"
+    folder = run / SLICES_FOLDER / f"{_PART}{number:04d}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     return folder
+
+
+def clear_parts(run: Path) -> None:
+    """Remove what is left of slices that were not completed."""
+    for folder in (run / SLICES_FOLDER).glob(f"{_PART}*"):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def trajectories_part(run: Path, number: int) -> Path:

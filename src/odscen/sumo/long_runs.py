@@ -18,7 +18,7 @@ from odscen.results.expectations import parse_expectation
 from odscen.results.records import Plan
 from odscen.results.summary import summary_to_json
 from odscen.sumo import layout
-from odscen.sumo.checkpoint import last_number, read_checkpoint, survey, write_whole
+from odscen.sumo.checkpoint import clear_parts, last_number, read_checkpoint, survey, write_whole
 from odscen.sumo.process import run_worker
 from odscen.sumo.run_folder import (
     PreparedRun,
@@ -154,6 +154,7 @@ def _go_on(
     live: Live | None,
 ) -> RunResult:
     ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live, keep=(lock,))
+    clear_parts(folder)  # a torn one takes room that what follows may need
     summary = make_summary(prepared, folder, ended, expectations)
     summary["slices"] = _slices(folder)
     if ended.done is None:
