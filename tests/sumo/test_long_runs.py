@@ -11,7 +11,7 @@ import pytest
 
 from odscen.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
 from odscen.results.expectations import parse_expectation
-from odscen.results.records import Plan, PlannedActor
+from odscen.results.records import EventKind, Plan, PlannedActor, events_from_json
 from odscen.results.summary import actors_from_json
 from odscen.sumo import checkpoint, forecast, process, status
 from odscen.sumo.config import RunSettings, sumo_config
@@ -278,3 +278,42 @@ def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
     table = pl.read_parquet(trajectory_files(tmp_path / "run"))
     assert table["timestep_time"].max() == end - 0.5
     assert status.going(tmp_path / "run") is None
+
+
+def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    """The number of vehicles in the queue is more than can start before the boundary."""
+    cars = "".join(
+        f'<vehicle id="queue{i}" type="car" depart="55" departLane="1">'
+        '<route edges="A0B0 B0C0"/></vehicle>\n'
+        for i in range(20)
+    )
+    plan = replace(
+        long.plan, actors=tuple(replace(long.plan.actors[0], id=f"queue{i}") for i in range(20))
+    )
+    files = {**long.sumo_files, "routes.rou.xml": f"<routes>\n{TYPES}\n{cars}</routes>\n"}
+    result = run_prepared(replace(long, plan=plan, sumo_files=files), tmp_path / "run")
+    assert result.summary["actors"]["inserted"] == 20
+    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    late = [event for event in events if event.kind is EventKind.DEPARTED and event.time >= SLICE]
+    assert late
+    assert not [event for event in events if event.kind is EventKind.LOST]
+
+
+def test_whoever_does_not_come_back_with_a_saved_state_is_told(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SUMO is made to forget a car; the run is resumed in a worker that is told so."""
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=13)
+    assert checkpoint.last_number(run) == 1
+    on_road = checkpoint.read_checkpoint(run, 1).present
+    car = next(name for name in on_road if name.startswith("car"))
+    config = run / "sumo" / "scenario.sumocfg"
+    forget = f'<processing>\n<load-state.remove-vehicles value="{car}"/>'
+    config.write_text(config.read_text().replace("<processing>", forget))
+    resume(run)
+    events = events_from_json((run / "events.json").read_text())
+    lost = [event for event in events if event.kind is EventKind.LOST]
+    assert [(event.actor, event.time) for event in lost] == [(car, SLICE)]

@@ -201,6 +201,18 @@ class Session:
         waiting = self._simulation.getPendingVehicles()
         return {*self._sumo.vehicle.getIDList(), *self._sumo.person.getIDList(), *waiting}
 
+    def knows(self, name: str) -> bool:
+        """Whether there is such a vehicle or person, on the road or still to come.
+
+        :meth:`present` does not tell right after a state is loaded: SUMO lists vehicles that wait
+        for room only after its first step.
+        """
+        for domain in (self._sumo.vehicle, self._sumo.person):
+            with suppress(*self._errors):
+                domain.getTypeID(name)
+                return True
+        return False
+
     def save(self, path: Path) -> None:
         """Write the state to ``path``, which ends in ``.xml.gz``.
 

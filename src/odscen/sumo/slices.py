@@ -154,7 +154,7 @@ class _Slice:
         if abs(session.time - self._before.time) > 1e-6:
             msg = f"SUMO goes on at {session.time:g} s instead of {self._before.time:g} s"
             raise SimulationError(msg)
-        missing = set(self._before.present) - session.present()
+        missing = [name for name in self._before.present if not session.knows(name)]
         stepper.recorder.lose(session.time, missing)
 
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
