@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -23,8 +24,9 @@ from odscen.scenario.files import dumps, read_any
 from odscen.scenario.graphform import to_graphml
 from odscen.scenario.problems import refuse_errors
 from odscen.scenario.sampling import choose_map, sample_scenario
+from odscen.sumo import long_runs
 from odscen.sumo.layout import NET_FILE
-from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.prepare import SLICE, prepare, write_report
 from odscen.sumo.runner import RunJob, run_many, write_sumo_files
 from odscen.sumo.signals import scenario_lights
 from odscen.sumo.sumo_map import SumoMap
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from odscen.scenario.signals import Light
     from odscen.scenario.supply import Usable
     from odscen.sumo.progress import Progress
+    from odscen.sumo.recording import Recording
     from odscen.sumo.runner import RunResult
 
 SUFFIX = ".scenario.json"
@@ -181,6 +184,10 @@ def run(
     time_limit: float | None = None,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, RunResult], None] | None = None,
+    recording: Recording | None = None,
+    meso: bool = False,
+    slice_length: float | None = SLICE,
+    tell: Callable[[str], None] | None = None,
 ) -> tuple[RunResult, ...]:
     """Check scenarios, run them in SUMO, and write their reports.
 
@@ -194,6 +201,10 @@ def run(
         Instead of the scenarios' own.
     processes
         How many run at a time.
+    recording, meso, slice_length
+        See :func:`odscen.sumo.prepare.prepare`.
+    tell
+        Called with what the user should know before a long run.
 
     Raises
     ------
@@ -222,6 +233,9 @@ def run(
                 until=until,
                 step_length=step_length,
                 weather=weather,
+                recording=recording,
+                meso=meso,
+                slice_length=slice_length,
             ),
             (out or workspace.runs) / name,
         )
@@ -240,6 +254,45 @@ def run(
         done=done,
         time_limit=time_limit,
         finish=finish,
+        tell=tell,
+    )
+
+
+def resume(
+    workspace: Workspace,
+    run: Path,
+    *,
+    time_limit: float | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> RunResult:
+    """Go on with an interrupted run and write its report.
+
+    Parameters
+    ----------
+    run
+        Its folder, or its name in the workspace.
+    tell
+        Called with where it goes on, and what is damaged.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    ConflictError
+        If it has ended, or is going on.
+    """
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        drawing = None
+        with suppress(InputError):  # the map has been removed meanwhile
+            entry = workspace.map_for(summary["map"], summary["map_sha256"])
+            drawing = load_map(entry).drawing
+        write_report(folder, summary, drawing=drawing)
+
+    folder = run if run.is_dir() else workspace.runs / run
+    return long_runs.resume(
+        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish
     )
 
 

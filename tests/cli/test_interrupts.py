@@ -58,3 +58,38 @@ def test_an_interrupted_run_leaves_nothing(workspace, tmp_path):
     assert out == ""
     assert "Traceback" not in err
     assert list(runs.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="sends SIGINT as a POSIX terminal does")
+def test_a_long_run_that_is_interrupted_says_how_to_go_on_and_does(workspace, tmp_path):
+    w = ("--workspace", workspace)
+    odscen("generate", "--map", "signal_crossing", "--fill", "0.3", "--out", tmp_path / "s", *w)
+    (scenario,) = (tmp_path / "s").iterdir()
+    folder = tmp_path / "r" / scenario.name.removesuffix(".scenario.json")
+    command = ["run", scenario, "--step-length", "0.05", "--slice", "10s"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "odscen", *command, "--out", folder.parent, *w],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        while process.poll() is None and not (folder / "slices" / "0001").is_dir():
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert f"odscen resume {folder}" in err
+    again = odscen(*command, "--out", folder.parent, *w)
+    assert again.code == 2
+    assert "has not ended" in again.err
+    resumed = odscen("resume", folder, "--json", *w)
+    assert resumed.code == 0, resumed.err
+    assert "going on at" in resumed.err
+    assert resumed.json["status"] == "completed"
+    alone = odscen(*command, "--out", tmp_path / "alone", *w)
+    assert alone.code == 0
+    for name in ("actors.json", "events.json", "trajectories/part-0001.parquet"):
+        assert (folder / name).read_bytes() == (
+            tmp_path / "alone" / folder.name / name
+        ).read_bytes()
+    assert odscen("resume", folder, *w).code == 2

@@ -511,3 +511,24 @@ def test_threads_end_with_the_server(client: TestClient, sampled: str) -> None:
     finished(client, run)
     client.app.state.services.close()
     wait_for(lambda: not any(t.name.startswith(("run", "job")) for t in threading.enumerate()))
+
+
+def test_an_interrupted_long_run_is_listed_as_such_and_can_be_removed(
+    client: TestClient, workspace: Workspace
+) -> None:
+    folder = workspace.runs / "night"
+    folder.mkdir(parents=True)
+    status = {
+        "format": "odscen-status", "version": 1, "scenario": "night", "time": 7200.0,
+        "until": 86400.0, "slices": 2, "running": 5, "departed": 50, "arrived": 45, "planned": 900,
+    }  # fmt: skip
+    (folder / "status.json").write_text(json.dumps(status))
+    (folder / "run.json").write_text(json.dumps({"about": {"map": "town"}}))
+    (info,) = [row for row in client.get("/api/runs").json() if row["run"] == "night"]
+    assert (info["state"], info["map"]) == ("interrupted", "town")
+    assert info["progress"]["arrived"] == 45
+    assert info["error"].startswith("Interrupted at 2:00 of 24:00 h.")
+    for part in ("summary", "report.html", "trajectories"):
+        assert client.get(f"/api/runs/night/{part}").status_code == 404
+    assert client.delete("/api/runs/night").status_code == 204
+    assert not folder.exists()

@@ -68,12 +68,12 @@ function signed(difference: number, say: (value: number) => string): string {
   return size === say(0) ? "same" : `${difference > 0 ? "+" : "−"}${size}`;
 }
 
-const ENDED = ["completed", "stopped", "failed"];
+const ENDED = ["completed", "stopped", "failed", "interrupted"];
 export const hasEnded = (state: string): boolean => ENDED.includes(state);
 
 export const STATE_WORD: Record<string, string> = {
   preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
-  completed: "Finished", stopped: "Stopped", failed: "Failed",
+  completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
 };
 
 export interface Speed {

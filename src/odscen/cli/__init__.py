@@ -19,7 +19,7 @@ from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
 from odscen.cli.pull import pull
 from odscen.cli.regression import compare, gate
-from odscen.cli.runs import run
+from odscen.cli.runs import resume, run
 from odscen.cli.scenarios import check, export, generate
 from odscen.cli.serve import serve
 from odscen.errors import OdscenError
@@ -38,6 +38,7 @@ app.command()(generate)
 app.command()(check)
 app.command()(export)
 app.command()(run)
+app.command()(resume)
 app.command("test")(gate)
 app.command()(compare)
 app.command()(cosim)

@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.durations import clock, parse_duration
+from odscen.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunJob, RunResult
+
+
+@contextmanager
+def _hint(folder: Path) -> Iterator[None]:
+    """Tell whoever interrupts long runs how to go on with them."""
+    from odscen.sumo.long_runs import interrupted
+
+    before = set(interrupted(folder))
+    try:
+        yield
+    except KeyboardInterrupt:
+        for name in sorted(set(interrupted(folder)) - before):
+            log(f"{name} is interrupted; to go on with it: odscen resume {folder / name}")
+        raise
+
+
+def _duration(text: str) -> float:
+    try:
+        return parse_duration(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
 
 
 def run(
@@ -28,7 +52,10 @@ def run(
         int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")
     ] = None,
     until: Annotated[
-        float | None, typer.Option(min=0.1, help="Simulated seconds, at most.")
+        float | None,
+        typer.Option(
+            parser=_duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
+        ),
     ] = None,
     step_length: Annotated[
         float | None, typer.Option(min=0.01, max=1, help="Seconds per step.")
@@ -44,6 +71,30 @@ def run(
     weather: Annotated[
         bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
     ] = True,
+    trajectories: Annotated[
+        str | None,
+        typer.Option(
+            help="What of the trajectories is recorded: none, or every=TIME, "
+            "region=XMIN:YMIN:XMAX:YMAX and columns=lane+pos+slope, with commas between.",
+            metavar="WHAT",
+        ),
+    ] = None,
+    slice_: Annotated[
+        str,
+        typer.Option(
+            "--slice",
+            metavar="TIME",
+            help="A longer run goes in slices of this length and can be resumed; none: never.",
+        ),
+    ] = "1h",
+    meso: Annotated[
+        bool,
+        typer.Option(
+            "--meso",
+            help="For scale: queues on road sections instead of single vehicles; see docs/runs.md "
+            "for what this leaves out.",
+        ),
+    ] = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,12 +105,16 @@ def run(
     from odscen import workflow
     from odscen.catalog.store import Workspace
     from odscen.results.expectations import parse_expectation
+    from odscen.sumo.recording import parse_recording
 
+    recording = None if trajectories is None else parse_recording(trajectories)
+    slice_length = None if slice_ == "none" else parse_duration(slice_)
     expectations = [parse_expectation(text) for text in expect or ()]
     paths = workflow.scenario_files(scenarios)
-    with progress("running") as step:
+    store = Workspace.open(workspace)
+    with _hint(out or store.runs), progress("running") as step:
         results = workflow.run(
-            Workspace.open(workspace),
+            store,
             paths,
             out=out,
             seed=seed,
@@ -70,9 +125,40 @@ def run(
             processes=jobs,
             time_limit=time_limit,
             progress=_follow(step, len(paths)),
+            recording=recording,
+            meso=meso,
+            slice_length=slice_length,
+            tell=log,
         )
     show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
     raise typer.Exit(max(result.exit_code for result in results))
+
+
+def resume(
+    run: Annotated[Path, typer.Argument(help="An interrupted run: its folder, or its name.")],
+    time_limit: Annotated[
+        float | None, typer.Option(min=1, help="Wall seconds after which it is interrupted again.")
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Go on with an interrupted long run; it ends as if it had not been interrupted.
+
+    Exit codes as of ``run``.
+    """
+    from odscen import workflow
+    from odscen.catalog.store import Workspace
+
+    with progress("resuming") as step:
+
+        def follow(message: Progress) -> None:
+            step(_words(run.name, message), message.time / message.until)
+
+        result = workflow.resume(
+            Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
+        )
+    show_results([result], as_json=as_json, several=False)
+    raise typer.Exit(result.exit_code)
 
 
 def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) -> None:
@@ -104,7 +190,13 @@ def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob,
 
     def follow(job: RunJob, message: Progress) -> None:
         shares[job.name] = message.time / message.until if message.until else 0.0
-        what = f"{job.name}: {message.time:.0f} s, {message.running} on the road"
-        step(what, sum(shares.values()) / total)
+        step(_words(job.name, message), sum(shares.values()) / total)
 
     return follow
+
+
+def _words(name: str, message: Progress) -> str:
+    told = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
+    if message.time_left is None:
+        return told
+    return f"{told}, about {clock(message.time_left + 59)} h left"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 PLAN_FORMAT = "odscen-plan"
 EVENTS_FORMAT = "odscen-events"
@@ -74,7 +74,22 @@ class PlannedActor:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What a run is to do. ``net_offset`` is added to OpenDRIVE x and y to give SUMO's."""
+    """What a run is to do.
+
+    Attributes
+    ----------
+    until, step_length
+        Seconds.
+    net_offset
+        What is added to OpenDRIVE x and y to give SUMO's.
+    elevation
+        Whether the network has heights.
+    slice_length
+        Seconds after which the state is saved and the run goes on from what was saved; ``None``
+        for a run in one piece.
+    trajectories
+        Whether they are recorded.
+    """
 
     scenario: str
     seed: int
@@ -83,6 +98,8 @@ class Plan:
     net_offset: tuple[float, float]
     actors: tuple[PlannedActor, ...]
     elevation: bool = False
+    slice_length: float | None = None
+    trajectories: bool = True
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
@@ -95,6 +112,8 @@ class Plan:
             "step_length": self.step_length,
             "net_offset": list(self.net_offset),
             "elevation": self.elevation,
+            "slice_length": self.slice_length,
+            "trajectories": self.trajectories,
         }
         return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
 
@@ -121,6 +140,8 @@ class Plan:
                 net_offset=(x, y),
                 actors=tuple(PlannedActor(**actor) for actor in data["actors"]),
                 elevation=data["elevation"],
+                slice_length=data.get("slice_length"),
+                trajectories=data.get("trajectories", True),
             )
         except (KeyError, TypeError, ValueError) as error:
             msg = f"not a plan of a run: {error!r}"
@@ -128,7 +149,10 @@ class Plan:
 
 
 class EventKind(StrEnum):
-    """What can happen to an actor."""
+    """What can happen to an actor.
+
+    A jam is told of whoever is first in it. ``lost``: it did not come back with a saved state.
+    """
 
     DEPARTED = "departed"
     ARRIVED = "arrived"
@@ -136,6 +160,9 @@ class EventKind(StrEnum):
     TELEPORT_END = "teleport_end"
     COLLISION = "collision"
     EMERGENCY_STOP = "emergency_stop"
+    JAM_BEGIN = "jam_begin"
+    JAM_END = "jam_end"
+    LOST = "lost"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +182,11 @@ class Event:
     travel_time
         Arrivals: seconds since departure.
     detail
-        SUMO's word for the kind of collision.
+        SUMO's word for the kind of collision; why somebody was stuck (teleports, jams).
+    waited
+        Seconds that whoever is first in a jam, or was moved on, has stood there.
+    queue
+        How many stand in a jam.
     """
 
     time: float
@@ -168,6 +199,8 @@ class Event:
     error: float | None = None
     travel_time: float | None = None
     detail: str | None = None
+    waited: float | None = None
+    queue: int | None = None
 
 
 def event_row(event: Event) -> dict[str, Any]:
@@ -175,13 +208,25 @@ def event_row(event: Event) -> dict[str, Any]:
     return rounded(_without_defaults(event))
 
 
-def events_to_json(events: tuple[Event, ...]) -> str:
+def event_line(event: Event) -> str:
+    """One event as it stands in ``events.json``, without indentation and comma."""
+    return _row_text(_without_defaults(event))
+
+
+def event_from_line(line: str) -> Event:
+    """Inverse of :func:`event_line`."""
+    data = json.loads(line)
+    return Event(**{**data, "kind": EventKind(data["kind"])})
+
+
+def events_to_json(events: Iterable[Event]) -> str:
     """``events.json``: one event per line, in order of time."""
-    return json_with_rows(
-        {"format": EVENTS_FORMAT, "version": VERSION},
-        "events",
-        [_without_defaults(event) for event in events],
-    )
+    return "".join(events_text(event_line(event) for event in events))
+
+
+def events_text(lines: Iterable[str]) -> Iterator[str]:
+    """``events.json`` piece by piece, from what :func:`event_line` gives."""
+    return _text_with_rows({"format": EVENTS_FORMAT, "version": VERSION}, "events", lines)
 
 
 def events_from_json(text: str) -> tuple[Event, ...]:
@@ -205,17 +250,28 @@ def events_from_json(text: str) -> tuple[Event, ...]:
         raise InputError(msg) from error
 
 
-def json_with_rows(head: Mapping[str, Any], key: str, rows: list[dict[str, Any]]) -> str:
+def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str, Any]]) -> str:
     """JSON text of ``{**head, key: rows}`` with one row per line, which people can read and diff.
 
     Numbers are rounded to 1e-6: far below what is physical, and free of rounding noise.
     """
-    lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
-    body = ",\n".join(
-        "    " + json.dumps(rounded(row), ensure_ascii=False, allow_nan=False) for row in rows
-    )
-    listed = f"[\n{body}\n  ]" if rows else "[]"
-    return "\n".join(["{", *lines, f"  {json.dumps(key)}: {listed}", "}"]) + "\n"
+    return "".join(_text_with_rows(head, key, map(_row_text, rows)))
+
+
+def _text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:
+    yield "{\n"
+    for name, value in head.items():
+        yield f"  {json.dumps(name)}: {json.dumps(value)},\n"
+    yield f"  {json.dumps(key)}: ["
+    before = "\n    "
+    for row in rows:
+        yield before + row
+        before = ",\n    "
+    yield "]\n}\n" if before == "\n    " else "\n  ]\n}\n"
+
+
+def _row_text(row: Mapping[str, Any]) -> str:
+    return json.dumps(rounded(row), ensure_ascii=False, allow_nan=False)
 
 
 def rounded(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.results.curves import presence
+from odscen.results.gridlock import find_trouble
 from odscen.results.plots import Series, line_chart
 from odscen.results.report_map import CATEGORIES, run_map
 from odscen.results.report_tables import (
@@ -24,6 +25,7 @@ from odscen.results.report_tables import (
     expectation_table,
     report_section,
 )
+from odscen.results.report_trouble import trouble_section
 from odscen.results.summary import actor_counts, key_figures
 from odscen.results.traces import bin_width, speed_over_time, tidy, travel
 
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.catalog.drawing import MapDrawing
+    from odscen.results.gridlock import Trouble
     from odscen.results.records import Event, Plan
     from odscen.results.summary import ActorOutcome
 
@@ -47,6 +50,7 @@ def render_report(
     trajectories: pl.DataFrame,
     *,
     drawing: MapDrawing | None = None,
+    every: int = 1,
 ) -> str:
     """Write the report of one run.
 
@@ -65,6 +69,8 @@ def render_report(
         As read from ``trajectories.parquet``, in SUMO's frame.
     drawing
         Of the map, if it is to be shown below the ways.
+    every
+        Of so many records the trajectories have one only; the page says so.
 
     Returns
     -------
@@ -74,11 +80,13 @@ def render_report(
     categories = {actor.id: actor.category for actor in actors}
     traces = tidy(trajectories, categories, net_offset=plan.net_offset)
     end = _end(summary, traces)
+    trouble = find_trouble(plan, actors, events, end=end)
     title = plan.scenario or "Run"
     body = [
         _head(title, plan, summary, _in_a_sentence(actors)),
         _key_figures(summary, actors, traces),
-        _map_section(traces, plan, actors, events, drawing),
+        _map_section(traces, plan, actors, events, drawing, trouble, every),
+        trouble_section(trouble),
         _speed_section(traces, end),
         _progress_section(actors, end),
         expectation_table(summary.get("expectations") or ()),
@@ -253,14 +261,26 @@ def _map_section(
     actors: Sequence[ActorOutcome],
     events: Sequence[Event],
     drawing: MapDrawing | None,
+    trouble: Sequence[Trouble],
+    every: int,
 ) -> Markup | None:
-    figure = run_map(traces, plan, actors, events, drawing)
+    figure = run_map(traces, plan, actors, events, drawing, trouble=trouble)
     if figure is None:
         return None
     explained = (
         "every line is the way of one actor; point at it to see whose. Switch to mean speed to see "
         "where traffic was slow: red places stood, blue places flowed."
     )
+    if trouble:
+        explained += (
+            " Numbered rings are places where traffic got stuck; the table below has them. Where "
+            "rings crowd, one has its number; point at the others for theirs."
+        )
+    if every > 1:
+        explained += (
+            f" The run is long: this page is made from one in {every} records of where everybody "
+            "was, so that ways are a little straighter and shorter than they were."
+        )
     return report_section("Where they went", figure, explained=explained, ident="map")
 
 

@@ -32,6 +32,10 @@ EVENT_WORDS = {
         "stopped harder than its brakes can",
         "Usually the way ahead was closed to it at short notice.",
     ),
+    EventKind.LOST: (
+        "did not come back when the simulation was reloaded",
+        "A limit of the simulator; its trip is not counted as finished.",
+    ),
 }
 """What happened and why that may be, for the events worth telling."""
 

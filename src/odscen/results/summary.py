@@ -8,7 +8,7 @@ seed.
 from __future__ import annotations
 
 import json
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -25,7 +25,7 @@ from odscen.results.records import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 ActorStatus = Literal["arrived", "running", "waiting"]
 """``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
@@ -77,41 +77,43 @@ class ActorOutcome:
     problem: str | None = None
 
 
-def actor_outcomes(plan: Plan, events: Sequence[Event]) -> tuple[ActorOutcome, ...]:
-    """One outcome per planned actor, in the plan's order."""
-    departures = {e.actor: e for e in events if e.kind is EventKind.DEPARTED}
-    arrivals = {e.actor: e for e in events if e.kind is EventKind.ARRIVED}
-    teleports = Counter(e.actor for e in events if e.kind is EventKind.TELEPORT_START)
-    stops = Counter(e.actor for e in events if e.kind is EventKind.EMERGENCY_STOP)
-    collisions = Counter(
-        name
-        for e in events
-        if e.kind is EventKind.COLLISION
-        for name in {e.actor, e.partner}
-        if name is not None
-    )
-    return tuple(
-        _outcome(
-            actor,
-            departures.get(actor.id),
-            arrivals.get(actor.id),
-            teleports=teleports[actor.id],
-            collisions=collisions[actor.id],
-            emergency_stops=stops[actor.id],
-        )
-        for actor in plan.actors
-    )
+@dataclass(slots=True)
+class _Fate:
+    """What has been heard of an actor so far."""
+
+    departure: Event | None = None
+    arrival: Event | None = None
+    teleports: int = 0
+    collisions: int = 0
+    emergency_stops: int = 0
+
+    def hear(self, event: Event) -> None:
+        match event.kind:
+            case EventKind.DEPARTED:
+                self.departure = event
+            case EventKind.ARRIVED:
+                self.arrival = event
+            case EventKind.TELEPORT_START:
+                self.teleports += 1
+            case EventKind.COLLISION:
+                self.collisions += 1
+            case EventKind.EMERGENCY_STOP:
+                self.emergency_stops += 1
 
 
-def _outcome(
-    actor: PlannedActor,
-    departure: Event | None,
-    arrival: Event | None,
-    *,
-    teleports: int,
-    collisions: int,
-    emergency_stops: int,
-) -> ActorOutcome:
+def actor_outcomes(plan: Plan, events: Iterable[Event]) -> tuple[ActorOutcome, ...]:
+    """One outcome per planned actor, in the plan's order; events are taken one by one."""
+    fates: defaultdict[str, _Fate] = defaultdict(_Fate)
+    for event in events:
+        fates[event.actor].hear(event)
+        if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
+            fates[str(event.partner)].hear(event)
+    nothing = _Fate()
+    return tuple(_outcome(actor, fates.get(actor.id, nothing)) for actor in plan.actors)
+
+
+def _outcome(actor: PlannedActor, fate: _Fate) -> ActorOutcome:
+    departure, arrival = fate.departure, fate.arrival
     status: ActorStatus = "arrived" if arrival else "running" if departure else "waiting"
     inserted = departure.time if departure else None
     travel_time = arrival.travel_time if arrival else None
@@ -139,9 +141,9 @@ def _outcome(
         delay=delay,
         route_length=actor.route_length,
         mean_speed=mean_speed,
-        teleports=teleports,
-        collisions=collisions,
-        emergency_stops=emergency_stops,
+        teleports=fate.teleports,
+        collisions=fate.collisions,
+        emergency_stops=fate.emergency_stops,
         problem=actor.problem,
     )
 
@@ -149,7 +151,7 @@ def _outcome(
 def actors_to_json(outcomes: Sequence[ActorOutcome]) -> str:
     """``actors.json``: one actor per line."""
     head = {"format": ACTORS_FORMAT, "version": VERSION}
-    return json_with_rows(head, "actors", [asdict(outcome) for outcome in outcomes])
+    return json_with_rows(head, "actors", (asdict(outcome) for outcome in outcomes))
 
 
 def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:

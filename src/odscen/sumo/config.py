@@ -5,13 +5,17 @@ Paths are relative to the file. What each setting is for is said in ``docs/runs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
-from odscen.sumo.layout import NET_FILE, ROUTES_FILE, SIGNALS_FILE, TRAJECTORIES_FILE
-
-FCD_ATTRIBUTES = ("id", "x", "y", "angle", "speed", "lane")
-"""What is recorded of each vehicle and person in each step."""
+from odscen.sumo.layout import (
+    NET_FILE,
+    REGION_FILE,
+    ROUTES_FILE,
+    SIGNALS_FILE,
+    TRAJECTORIES_FILE,
+)
+from odscen.sumo.recording import REGION_ID, Recording
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
@@ -38,6 +42,10 @@ class RunSettings:
         Whether the network has heights, so that z is recorded.
     signals
         Whether there are programs of traffic lights beside the network's own.
+    recording
+        What of the trajectories is recorded.
+    meso
+        Queues on road sections instead of single vehicles that follow each other: for scale.
     """
 
     until: float
@@ -46,24 +54,22 @@ class RunSettings:
     time_to_teleport: float = 300.0
     elevation: bool = False
     signals: bool = False
+    recording: Recording = field(default_factory=Recording)
+    meso: bool = False
 
 
 def sumo_config(settings: RunSettings) -> str:
     """Text of ``scenario.sumocfg``."""
-    attributes = [*FCD_ATTRIBUTES]
-    if settings.elevation:
-        attributes.insert(3, "z")
+    recording = settings.recording
     inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
-    if settings.signals:
-        inputs["additional-files"] = SIGNALS_FILE
+    additional = [SIGNALS_FILE] if settings.signals else []
+    if recording.region is not None:
+        additional.append(REGION_FILE)
+    if additional:
+        inputs["additional-files"] = ",".join(additional)
     sections: dict[str, dict[str, str]] = {
         "input": inputs,
-        "output": {
-            "fcd-output": TRAJECTORIES_FILE,
-            "fcd-output.attributes": ",".join(attributes),
-            "fcd-output.skip-empty": "true",
-            "precision": "4",
-        },
+        "output": _outputs(settings),
         "time": {
             "begin": "0",
             "end": f"{settings.until:g}",
@@ -87,6 +93,14 @@ def sumo_config(settings: RunSettings) -> str:
             "xml-validation": "never",
         },
     }
+    if settings.meso:
+        sections["mesoscopic"] = {
+            "mesosim": "true",
+            "meso-junction-control": "true",
+            "meso-interpolate-pos": "true",
+        }
+        # The striping model needs lanes with places on them, which meso does not keep.
+        sections["processing"]["pedestrian.model"] = "nonInteracting"
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
     for section, options in sections.items():
         lines.append(f"    <{section}>")
@@ -95,3 +109,19 @@ def sumo_config(settings: RunSettings) -> str:
         )
         lines.append(f"    </{section}>")
     return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"
+
+
+def _outputs(settings: RunSettings) -> dict[str, str]:
+    recording = settings.recording
+    if not recording.trajectories:
+        return {"precision": "4"}
+    outputs = {
+        "fcd-output": TRAJECTORIES_FILE,
+        "fcd-output.attributes": ",".join(recording.attributes(elevation=settings.elevation)),
+        "fcd-output.skip-empty": "true",
+    }
+    if recording.every is not None:
+        outputs["device.fcd.period"] = f"{recording.every:g}"
+    if recording.region is not None:
+        outputs["fcd-output.filter-shapes"] = REGION_ID
+    return {**outputs, "precision": "4"}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from odscen.results.records import Plan, events_from_json
 from odscen.results.summary import actors_from_json
 from odscen.scenario.files import dumps
 from odscen.sumo import layout
+from odscen.sumo.forecast import forecast
 from odscen.sumo.realize import realize
+from odscen.sumo.recorded import read_trajectories
 from odscen.sumo.runner import PreparedRun
 
 if TYPE_CHECKING:
@@ -19,7 +22,18 @@ if TYPE_CHECKING:
     from odscen.catalog.drawing import MapDrawing
     from odscen.scenario.document import Scenario
     from odscen.sumo.realize import Assets
+    from odscen.sumo.recording import Recording
     from odscen.sumo.sumo_map import SumoMap
+
+SLICE = 3600.0
+"""Seconds of a slice, unless somebody wishes otherwise."""
+MESO_NOTE = (
+    "meso: queues on sections of road instead of vehicles that follow each other. No lanes, lane "
+    "changes, places across the lane, exact starts, collisions or hard braking; people on foot "
+    "meet neither each other nor vehicles; places are interpolated"
+)
+REPORT_ROWS = 2_000_000
+"""Rows of trajectories that a report is made from at most; a day of a town has far more."""
 
 
 def prepare(
@@ -32,6 +46,9 @@ def prepare(
     until: float | None = None,
     step_length: float | None = None,
     weather: bool = True,
+    recording: Recording | None = None,
+    meso: bool = False,
+    slice_length: float | None = SLICE,
 ) -> PreparedRun:
     """Realize a scenario and put together what its run folder will hold.
 
@@ -41,8 +58,11 @@ def prepare(
         Of the scenario's map; made once by :meth:`odscen.sumo.sumo_map.SumoMap.of` for many runs.
     net
         The map's ``net.net.xml``.
-    assets, seed, until, step_length, weather
+    assets, seed, until, step_length, weather, recording, meso
         See :func:`odscen.sumo.realize.realize`.
+    slice_length
+        Seconds; a run that is longer goes in slices of this length and can be resumed. ``None`` for
+        one piece, however long.
 
     Raises
     ------
@@ -57,15 +77,24 @@ def prepare(
         until=until,
         step_length=step_length,
         weather=weather,
+        recording=recording,
+        meso=meso,
     )
+    plan = realization.plan
+    if slice_length is not None and plan.until > slice_length:
+        steps = max(1, round(slice_length / plan.step_length))
+        plan = replace(plan, slice_length=steps * plan.step_length)
     return PreparedRun(
-        plan=realization.plan,
+        plan=plan,
         sumo_files=realization.files,
         net=net,
         scenario_json=dumps(scenario),
         problems=realization.problems,
-        notes=realization.notes,
-        about={"map": scenario.map.name, "map_sha256": scenario.map.sha256},
+        notes=((MESO_NOTE,) if meso else ()) + realization.notes,
+        about={"map": scenario.map.name, "map_sha256": scenario.map.sha256, "meso": meso},
+        expected=forecast(
+            plan, realization.files, every=None if recording is None else recording.every
+        ),
     )
 
 
@@ -86,13 +115,15 @@ def write_report(
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
+    recorded = read_trajectories(folder, most=REPORT_ROWS)
     page = render_report(
         summary,
         Plan.from_json(text(layout.PLAN_FILE)),
         actors_from_json(text(layout.ACTORS_FILE)),
         events_from_json(text(layout.EVENTS_FILE)),
-        pl.read_parquet(folder / layout.TRAJECTORIES_FILE),
+        recorded.rows if recorded is not None else pl.DataFrame(),
         drawing=drawing,
+        every=recorded.every if recorded is not None else 1,
     )
     report = folder / layout.REPORT_FILE
     report.write_text(page, encoding="utf-8")

@@ -77,6 +77,7 @@ def run_worker(
     progress: OnProgress | None = None,
     time_limit: float | None = None,
     live: Companion | None = None,
+    keep: tuple[int, ...] = (),
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -93,6 +94,8 @@ def run_worker(
         Wall seconds after which the process is killed.
     live
         Makes it a run that can be watched and steered, or that goes in step with another.
+    keep
+        File descriptors that the process inherits.
     """
     start = time.perf_counter()
     command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
@@ -110,6 +113,7 @@ def run_worker(
             # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
             # a failed run, and the folder of a run that was called off would appear.
             start_new_session=True,
+            pass_fds=keep,
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)

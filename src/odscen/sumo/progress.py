@@ -15,7 +15,10 @@ from typing import Any, Literal
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is: simulated seconds, counts of vehicles and persons."""
+    """How far a run is: simulated seconds, counts of vehicles and persons.
+
+    ``time_left`` is about how many wall seconds it will take at full speed; ``None`` if unknown.
+    """
 
     time: float
     until: float
@@ -23,6 +26,7 @@ class Progress:
     departed: int
     arrived: int
     planned: int
+    time_left: float | None = None
 
     @property
     def share(self) -> float:

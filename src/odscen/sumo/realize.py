@@ -25,8 +25,9 @@ from odscen.scenario.signals import signal_problems
 from odscen.sumo.config import RunSettings, sumo_config
 from odscen.sumo.demand import Demand
 from odscen.sumo.driving import KINDS, draw_factor, driver
-from odscen.sumo.layout import CONFIG_FILE, ROUTES_FILE, SIGNALS_FILE
+from odscen.sumo.layout import CONFIG_FILE, REGION_FILE, ROUTES_FILE, SIGNALS_FILE
 from odscen.sumo.people import RoadUser, road_users
+from odscen.sumo.recording import Recording, region_xml
 from odscen.sumo.routes import NoRouteError, RoutePlanner
 from odscen.sumo.signals import scenario_lights, signals_xml
 from odscen.sumo.walks import WalkPlanner
@@ -78,6 +79,8 @@ def realize(
     until: float | None = None,
     step_length: float | None = None,
     weather: bool = True,
+    recording: Recording | None = None,
+    meso: bool = False,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -90,6 +93,10 @@ def realize(
         Instead of the scenario's own.
     weather
         Whether weather acts on driving; the scenario can also switch it off itself.
+    recording
+        What of the trajectories is recorded; everything if not given.
+    meso
+        Queues on road sections instead of single vehicles that follow each other.
 
     Raises
     ------
@@ -97,6 +104,7 @@ def realize(
         With every actor and flow whose spawn or goal is not usable, or with every timing of a
         traffic light that is not possible.
     """
+    recording = recording or Recording()
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map.lights)))
     if seed is not None:
         scenario = scenario.model_copy(update={"seed": seed})
@@ -116,6 +124,7 @@ def realize(
         net_offset=sumo_map.net_offset,
         actors=planned,
         elevation=sumo_map.elevation,
+        trajectories=recording.trajectories,
     )
     signals = signals_xml(scenario.signals, sumo_map.lights)
     settings = RunSettings(
@@ -124,10 +133,14 @@ def realize(
         seed=scenario.seed,
         elevation=sumo_map.elevation,
         signals=signals is not None,
+        recording=recording,
+        meso=meso,
     )
     files = {ROUTES_FILE: writer.demand.to_xml(), CONFIG_FILE: sumo_config(settings)}
     if signals is not None:
         files[SIGNALS_FILE] = signals
+    if recording.region is not None:
+        files[REGION_FILE] = region_xml(recording.region, sumo_map.net_offset)
     return Realization(files, plan, tuple(writer.problems), tuple(writer.notes))
 
 

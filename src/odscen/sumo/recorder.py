@@ -1,19 +1,21 @@
 """What happened to whom, collected while the simulation steps.
 
 Only id lists are read per step, and poses of those who have just departed: the cost does not grow
-with the number of vehicles running. Trajectories are SUMO's own business (FCD output).
+with the number of vehicles running. Twice a minute all are looked at for jams. Trajectories are
+SUMO's own business (FCD output).
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.frames import SumoPose, sumo_to_xodr
 from odscen.results.records import Event, EventKind, Plan
+from odscen.sumo.jams import JamWatch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.sumo.session import Collision, Front, Session
 
@@ -24,13 +26,16 @@ class Recorder:
     Attributes
     ----------
     events
-        All events so far, in order of time.
+        Events since the last :meth:`drain`, in order of time.
+    drained
+        How many events were drained before.
     departed, arrived
         How many vehicles and persons so far.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.events: list[Event] = []
+        self.drained = 0
         self.departed = 0
         self.arrived = 0
         self._planned = {actor.id: actor for actor in plan.actors}
@@ -39,6 +44,52 @@ class Recorder:
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
         self._stopping: set[str] = set()
+        self._jams = JamWatch(plan.net_offset)
+
+    def since(self, number: int) -> list[Event]:
+        """Events but the first ``number`` ones, as far as they have not been drained."""
+        return self.events[max(0, number - self.drained) :]
+
+    @property
+    def count(self) -> int:
+        """How many events there have been."""
+        return self.drained + len(self.events)
+
+    def drain(self) -> list[Event]:
+        """Hand out the events and forget them: a long run keeps them on disk."""
+        events, self.events = self.events, []
+        self.drained += len(events)
+        return events
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        return {
+            "drained": self.drained,
+            "departed": self.departed,
+            "arrived": self.arrived,
+            "departures": self._departures,
+            "touching": sorted(self._touching),
+            "stopping": sorted(self._stopping),
+            "jams": self._jams.state(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self.events = []
+        self.drained = state["drained"]
+        self.departed, self.arrived = state["departed"], state["arrived"]
+        self._departures = dict(state["departures"])
+        self._touching = {(one, other) for one, other in state["touching"]}
+        self._stopping = set(state["stopping"])
+        self._jams.restore(state["jams"])
+
+    def nobody_left(self, time: float) -> None:
+        """Say that the run ends because the road is empty: every jam is over."""
+        self.events += self._jams.nobody_left(time)
+
+    def lose(self, time: float, names: Iterable[str]) -> None:
+        """Say that SUMO did not bring these back with a saved state."""
+        self.events += [Event(time, EventKind.LOST, name) for name in sorted(names)]
 
     def record(self, session: Session, time: float) -> None:
         """Record the step that began at ``time`` and has just been made."""
@@ -48,12 +99,13 @@ class Recorder:
         for person in lists.departed_persons:
             self._depart(time, person, session.person_front(person))
         for vehicle in lists.teleports_started:
-            self._place(time, EventKind.TELEPORT_START, vehicle, None)
+            self._teleport(time, vehicle)
         for vehicle in lists.teleports_ended:
             front = session.vehicle_front(vehicle)
             self._place(time, EventKind.TELEPORT_END, vehicle, front)
         self._stops(time, lists.emergency_stops, session)
         self._collisions(time, session.collisions())
+        self.events += self._jams.look(session, time)
         # The end of the step is when they left the road.
         for name in (*lists.arrived, *lists.arrived_persons):
             self._arrive(session.time, name)
@@ -75,9 +127,28 @@ class Recorder:
 
     def _arrive(self, time: float, name: str) -> None:
         self.arrived += 1
-        departed = self._departures.get(name)
+        departed = self._departures.pop(name, None)
         spent = None if departed is None else time - departed
         self.events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
+
+    def _teleport(self, time: float, vehicle: str) -> None:
+        """Tell where and why it stood until now, as it has no place any more."""
+        stuck = self._jams.stuck(vehicle)
+        if stuck is None:
+            self.events.append(Event(time, EventKind.TELEPORT_START, vehicle))
+            return
+        self.events.append(
+            Event(
+                time,
+                EventKind.TELEPORT_START,
+                vehicle,
+                x=stuck.x,
+                y=stuck.y,
+                lane=stuck.lane,
+                detail=stuck.reason,
+                waited=time - stuck.since,
+            )
+        )
 
     def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
         if front is None:

@@ -7,97 +7,37 @@ log; nothing that goes wrong inside SUMO raises here.
 
 from __future__ import annotations
 
-import os
-import shutil
-import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from odscen import __version__
 from odscen.catalog.folders import new_folder
 from odscen.errors import WorkspaceError
-from odscen.results.expectations import COUNTS, evaluate
-from odscen.results.summary import actor_counts, actors_from_json, key_figures, summary_to_json
+from odscen.results.summary import summary_to_json
 from odscen.sumo import layout
+from odscen.sumo.forecast import refuse_without_room
+from odscen.sumo.long_runs import refuse_interrupted, run_long
 from odscen.sumo.process import run_worker
+from odscen.sumo.run_folder import (
+    PreparedRun,
+    RunResult,
+    drop_torn_trajectories,
+    found_files,
+    make_summary,
+    write_run_folder,
+    write_sumo_files,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from odscen.results.expectations import Expectation
-    from odscen.results.records import Plan
-    from odscen.sumo.process import Companion, Ended
+    from odscen.sumo.process import Companion
     from odscen.sumo.progress import OnProgress, Progress
 
-RunStatus = Literal["completed", "failed"]
-
-FORMAT = "odscen-run"
-VERSION = 1
-
-
-@dataclass(frozen=True, slots=True)
-class PreparedRun:
-    """Everything that a run is made of; nothing on disk yet but the network.
-
-    Attributes
-    ----------
-    plan
-        What is to happen, actor by actor.
-    sumo_files
-        Text by file name: routes, configuration and perhaps signals, from
-        :func:`odscen.sumo.realize.realize`.
-    net
-        SUMO network file of the map.
-    scenario_json
-        The scenario document, kept in the run folder.
-    problems, notes
-        What could not be realized, and which routes had to be repaired, in words.
-    about
-        Further fields of the summary, for example the map's name and hash.
-    """
-
-    plan: Plan
-    sumo_files: Mapping[str, str]
-    net: Path
-    scenario_json: str | None = None
-    problems: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class RunResult:
-    """A finished run: its folder, and ``summary`` as in ``summary.json``."""
-
-    folder: Path
-    summary: Mapping[str, Any]
-
-    @property
-    def status(self) -> RunStatus:
-        """``completed`` if the simulation ended by itself, whatever became of the actors."""
-        status: RunStatus = self.summary["status"]
-        return status
-
-    @property
-    def expectations_met(self) -> bool:
-        """Whether every expectation has passed; true if there is none."""
-        return all(verdict["passed"] for verdict in self.summary["expectations"])
-
-    @property
-    def exit_code(self) -> int:
-        """0 completed, 1 completed with failed expectations, 3 failed."""
-        if self.status == "failed":
-            return 3
-        return 0 if self.expectations_met else 1
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the summary with the folder and absolute paths of its files."""
-        files = {name: str(self.folder / file) for name, file in self.summary["files"].items()}
-        return {**self.summary, "folder": str(self.folder), "files": files}
+__all__ = ["PreparedRun", "RunJob", "RunResult", "run_many", "run_prepared", "write_sumo_files"]
 
 
 def run_prepared(
@@ -109,8 +49,11 @@ def run_prepared(
     time_limit: float | None = None,
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
     live: Companion | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> RunResult:
     """Run in a new folder ``out``; whatever was there is replaced.
+
+    A run in slices is there while it goes on, see :mod:`odscen.sumo.long_runs`.
 
     Parameters
     ----------
@@ -123,22 +66,41 @@ def run_prepared(
         the place to add a report.
     live
         Makes it a run that can be watched and steered, or that goes in step with another.
+    tell
+        Called with what the user should know before a long run.
 
     Raises
     ------
     WorkspaceError
-        If the folder cannot be written.
+        If the folder cannot be written, or the disk cannot hold the run.
+    ConflictError
+        If a run that has not ended is in ``out``.
     """
+    refuse_interrupted(out)
+    if prepared.expected is not None:
+        refuse_without_room(prepared.expected, out)
+    if prepared.plan.slice_length is not None:
+        if tell is not None and prepared.expected is not None:
+            tell(f"{out.name}: {prepared.expected}")
+        return run_long(
+            prepared,
+            out,
+            expectations=expectations,
+            progress=progress,
+            time_limit=time_limit,
+            finish=finish,
+            live=live,
+        )
     try:
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
             ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
             if ended.done is None:
-                _drop_torn_trajectories(folder)
-            summary = _summary(prepared, folder, ended, expectations)
+                drop_torn_trajectories(folder)
+            summary = make_summary(prepared, folder, ended, expectations)
             if finish is not None and ended.done is not None:
                 finish(folder, summary)
-                summary["files"] = _files(folder)
+                summary["files"] = found_files(folder)
             (folder / layout.SUMMARY_FILE).write_text(summary_to_json(summary), encoding="utf-8")
     except OSError as error:
         msg = f"run folder {out}: {error.strerror or error} ({error.filename or ''})"
@@ -168,6 +130,7 @@ def run_many(
     done: Callable[[RunJob, RunResult], None] | None = None,
     time_limit: float | None = None,
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> tuple[RunResult, ...]:
     """Run several scenarios, ``processes`` at a time; results in the order of ``jobs``.
 
@@ -191,6 +154,7 @@ def run_many(
             progress=follow,
             time_limit=time_limit,
             finish=finish,
+            tell=tell,
         )
         if done is not None:
             done(job, result)
@@ -204,109 +168,3 @@ def run_many(
             stopping.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
-    """Write what a run starts from: the scenario, the plan, and the SUMO files."""
-    if prepared.scenario_json is not None:
-        (folder / layout.SCENARIO_FILE).write_text(prepared.scenario_json, encoding="utf-8")
-    (folder / layout.PLAN_FILE).write_text(prepared.plan.to_json(), encoding="utf-8")
-    sumo = folder / layout.SUMO_FOLDER
-    sumo.mkdir()
-    write_sumo_files(prepared.sumo_files, prepared.net, sumo, link=True)
-
-
-def write_sumo_files(files: Mapping[str, str], net: Path, folder: Path, *, link: bool) -> None:
-    """Write the SUMO files and the network into ``folder``.
-
-    With ``link`` the network is a hard link where the file system has them: many runs on one map
-    then hold it once. What a user takes away should be a copy.
-    """
-    for name, text in sorted(files.items()):
-        (folder / name).write_text(text, encoding="utf-8")
-    target = folder / layout.NET_FILE
-    if link:
-        try:
-            os.link(net, target)
-        except OSError:
-            pass
-        else:
-            return
-    shutil.copyfile(net, target)
-
-
-def _summary(
-    prepared: PreparedRun, folder: Path, ended: Ended, expectations: Sequence[Expectation]
-) -> dict[str, Any]:
-    plan, done = prepared.plan, ended.done
-    summary: dict[str, Any] = {
-        "format": FORMAT,
-        "version": VERSION,
-        "status": "completed" if done else "failed",
-        "error": ended.error,
-        "stopped": bool(done and done.stopped),
-        "scenario": plan.scenario,
-        **prepared.about,
-        "seed": plan.seed,
-        "until": plan.until,
-        "step_length": plan.step_length,
-        "sim_seconds": done.sim_seconds if done else None,
-        "steps": done.steps if done else None,
-        "wall_seconds": round(ended.wall_seconds, 3),
-        "real_time_factor": round(done.sim_seconds / ended.wall_seconds, 2) if done else None,
-        "actors": dict.fromkeys(COUNTS) | {"planned": len(plan.actors)},
-        "insertion_error_max": None,
-        "figures": {},
-    }
-    if done:
-        text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
-        outcomes = actors_from_json(text)
-        figures = key_figures(outcomes)
-        summary["actors"] = actor_counts(outcomes)
-        summary["insertion_error_max"] = figures["insertion_error_max"]
-        summary["figures"] = figures
-    summary["expectations"] = [
-        {"expectation": v.expectation, "value": v.value, "passed": v.passed}
-        for v in evaluate(expectations, summary)
-    ]
-    summary["problems"] = list(prepared.problems)
-    summary["notes"] = list(prepared.notes)
-    summary["files"] = _files(folder)
-    summary["versions"] = {
-        "odscen": __version__,
-        "sumo": version("libsumo"),
-        "python": ".".join(map(str, sys.version_info[:3])),
-    }
-    return summary
-
-
-def _drop_torn_trajectories(folder: Path) -> None:
-    """Remove a Parquet file without its end: a killed run leaves one, and nothing can read it."""
-    file = folder / layout.TRAJECTORIES_FILE
-    if not file.is_file():
-        return
-    with file.open("rb") as opened:
-        opened.seek(max(0, file.stat().st_size - 4))
-        whole = opened.read() == b"PAR1"
-    if not whole:
-        file.unlink()
-
-
-def _files(folder: Path) -> dict[str, str]:
-    """Files of a run by what they are, relative to its folder; only those that are there."""
-    sumo = layout.SUMO_FOLDER
-    names = {
-        "scenario": layout.SCENARIO_FILE,
-        "plan": layout.PLAN_FILE,
-        "net": f"{sumo}/{layout.NET_FILE}",
-        "routes": f"{sumo}/{layout.ROUTES_FILE}",
-        "signals": f"{sumo}/{layout.SIGNALS_FILE}",
-        "config": f"{sumo}/{layout.CONFIG_FILE}",
-        "trajectories": layout.TRAJECTORIES_FILE,
-        "events": layout.EVENTS_FILE,
-        "actors": layout.ACTORS_FILE,
-        "report": layout.REPORT_FILE,
-        "log": layout.LOG_FILE,
-    }
-    found = {key: name for key, name in names.items() if (folder / name).is_file()}
-    return {**found, "summary": layout.SUMMARY_FILE}

@@ -34,6 +34,12 @@ _EDGES_AHEAD = 3
 """Edges that the route of a vehicle driven from outside has at least, its own included."""
 
 
+_CLOSE = 5.0
+"""Metres that a standing vehicle ahead may be away and be the reason for standing."""
+_STANDS = 0.1
+"""Speed, m/s, below which SUMO counts a vehicle as waiting."""
+
+
 class Front(NamedTuple):
     """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
 
@@ -80,6 +86,40 @@ class StepLists(NamedTuple):
     teleports_started: Sequence[str]
     teleports_ended: Sequence[str]
     emergency_stops: Sequence[str]
+
+
+class Standing(NamedTuple):
+    """A vehicle that stands: where its front is, metres along ``lane``, and for how long, s."""
+
+    vehicle: str
+    lane: str
+    pos: float
+    waited: float
+
+
+class Ahead(NamedTuple):
+    """What a vehicle has before it.
+
+    Attributes
+    ----------
+    onwards
+        Whether its lane leads on along its way.
+    light
+        Letter of the next link: ``r`` red, ``y`` yellow, ``G``, ``g`` green; others without light.
+    open
+        Whether right of way and light let it pass.
+    leader
+        Vehicle that stands so close ahead that there is no room to go on: right in front, or just
+        behind the junction, which must be kept clear.
+    people
+        Whether somebody is on a crossing that its next link runs over.
+    """
+
+    onwards: bool
+    light: str
+    open: bool
+    leader: str | None
+    people: bool
 
 
 class Session:
@@ -221,6 +261,85 @@ class Session:
         """State of each traffic light, a letter per link."""
         state = self._sumo.trafficlight.getRedYellowGreenState
         return {name: state(name) for name in self._sumo.trafficlight.getIDList()}
+
+    def present(self) -> set[str]:
+        """Ids of all vehicles and persons on the road, and of vehicles that wait for room."""
+        waiting = self._simulation.getPendingVehicles()
+        return {*self._sumo.vehicle.getIDList(), *self._sumo.person.getIDList(), *waiting}
+
+    def knows(self, name: str) -> bool:
+        """Whether there is such a vehicle or person, on the road or still to come.
+
+        :meth:`present` does not tell right after a state is loaded: SUMO lists vehicles that wait
+        for room only after its first step.
+        """
+        for domain in (self._sumo.vehicle, self._sumo.person):
+            with suppress(*self._errors):
+                domain.getTypeID(name)
+                return True
+        return False
+
+    def save(self, path: Path) -> None:
+        """Write the state to ``path``, which ends in ``.xml.gz``.
+
+        Raises
+        ------
+        SimulationError
+            If SUMO cannot.
+        """
+        try:
+            self._simulation.saveState(str(path))
+        except self._errors as error:
+            msg = f"SUMO could not save its state at {self.time:g} s: {error}"
+            raise SimulationError(msg) from error
+
+    def standing(self, seconds: float) -> list[Standing]:
+        """Vehicles on the road that have stood for so long; a microsecond for each on the road."""
+        vehicle = self._sumo.vehicle
+        found = []
+        for name in vehicle.getIDList():
+            waited = vehicle.getWaitingTime(name)
+            if waited >= seconds and (lane := vehicle.getLaneID(name)):
+                found.append(Standing(name, lane, vehicle.getLanePosition(name), waited))
+        return found
+
+    def ahead(self, name: str) -> Ahead | None:
+        """What a vehicle has before it; ``None`` if it is not on the road."""
+        vehicle = self._sumo.vehicle
+        try:
+            links = vehicle.getNextLinks(name)
+            leader = self._standing_leader(name, float(links[0][7]) if links else 0.0)
+            at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
+        except self._errors:
+            return None
+        if not links:
+            return Ahead(at_end, "", at_end, leader, people=False)
+        link = links[0]
+        # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
+        people = bool(link[3]) and self._people_cross(link[4])
+        return Ahead(True, str(link[5]), bool(link[2]), leader, people)
+
+    def _standing_leader(self, name: str, junction: float) -> str | None:
+        """Return who leaves no room for the vehicle behind ``junction`` metres of junction."""
+        vehicle = self._sumo.vehicle
+        lane = vehicle.getLaneID(name)
+        rest = self._sumo.lane.getLength(lane) - vehicle.getLanePosition(name) if lane else 0.0
+        gap = vehicle.getMinGap(name)
+        needed = max(_CLOSE, rest + junction + vehicle.getLength(name) + 2.0 * gap)
+        leader = vehicle.getLeader(name, needed)
+        if not leader or not leader[0] or leader[1] > needed:
+            return None
+        return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STANDS else None
+
+    def _people_cross(self, internal: str) -> bool:
+        if not internal:
+            return False
+        lane, edge = self._sumo.lane, self._sumo.edge
+        return any(
+            lane.getAllowed(foe) == ("pedestrian",)
+            and edge.getLastStepPersonIDs(lane.getEdgeID(foe))
+            for foe in lane.getInternalFoes(internal)
+        )
 
     def _poses(self, domain: Any, signals: Callable[[str], int] | None) -> Poses:
         ids = domain.getIDList()

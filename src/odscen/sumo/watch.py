@@ -28,7 +28,7 @@ LEAST_PAUSE = 1 / 30
 """Wall seconds between two frames of a run in a hurry."""
 _WINDOW = 0.5
 """Wall seconds that the real-time factor is measured over."""
-_PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED)
+_PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED, EventKind.JAM_END)
 
 
 class Watch:
@@ -111,8 +111,8 @@ class Watch:
             self._send(self._pace, b"")
 
     def _tell_incidents(self, recorder: Recorder) -> None:
-        new = recorder.events[self._told :]
-        self._told = len(recorder.events)
+        new = recorder.since(self._told)
+        self._told = recorder.count
         rows = [event_row(event) for event in new if event.kind not in _PLAIN]
         if rows:
             self._send(Incidents(rows), b"")

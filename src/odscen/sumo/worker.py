@@ -2,11 +2,12 @@
 
 libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
 run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
-beside it, steps until nobody is left or the end is reached, writes ``events.json`` and
-``actors.json``, and sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says
-goes to ``sumo.log``. With a :class:`~odscen.sumo.progress.Pace` as second argument the run can be
-watched and takes commands on its stdin; with a :class:`~odscen.sumo.progress.Lockstep` it makes
-each step when it is told to.
+beside it, steps until nobody is left or the end is reached (in slices, see
+:mod:`odscen.sumo.slices`, if the plan says so), writes ``events.json`` and ``actors.json``, and
+sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says goes to ``sumo.log``.
+With a :class:`~odscen.sumo.progress.Pace` as second argument the run can be watched and takes
+commands on its stdin; with a :class:`~odscen.sumo.progress.Lockstep` it makes each step when it is
+told to.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.errors import OdscenError
-from odscen.results.records import Plan, events_to_json
+from odscen.results.records import Plan, event_line, events_text
 from odscen.results.summary import actor_outcomes, actors_to_json
 from odscen.sumo.layout import (
     ACTORS_FILE,
@@ -28,26 +29,17 @@ from odscen.sumo.layout import (
     TRAJECTORIES_FILE,
 )
 from odscen.sumo.lockstep import LockstepWatch
-from odscen.sumo.progress import (
-    Done,
-    Failed,
-    Lockstep,
-    Message,
-    Pace,
-    Progress,
-    decode,
-    encode,
-)
-from odscen.sumo.recorder import Recorder
+from odscen.sumo.progress import Done, Failed, Lockstep, Message, Pace, decode, encode
 from odscen.sumo.session import captured_output, open_session
+from odscen.sumo.slices import event_lines, recorded_events, run_slices
 from odscen.sumo.steering import Steering
+from odscen.sumo.stepping import Stepper
 from odscen.sumo.watch import Watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
-MESSAGE_PAUSE = 0.25
-"""Least wall seconds between two progress messages."""
+    from odscen.results.records import Event
 
 
 def main() -> int:
@@ -83,16 +75,31 @@ def simulate(
     SimulationError
         If SUMO refuses to start or stops with an error.
     """
-    start = time.perf_counter()
-    recorder = Recorder(plan)
-    sim_seconds, steps = _steps(plan, folder, recorder, send, watch)
-    wall_seconds = time.perf_counter() - start
-    events = tuple(recorder.events)
+    stepper = Stepper(plan, send, watch)
+    lines: Iterable[str]
+    events: Iterable[Event]
+    if plan.slice_length is None:
+        done = _in_one_piece(plan, folder, stepper)
+        events = stepper.recorder.events
+        lines = map(event_line, events)
+    else:
+        done = run_slices(plan, folder, stepper)
+        lines, events = event_lines(folder), recorded_events(folder)
+    with (folder / EVENTS_FILE).open("w", encoding="utf-8") as out:
+        out.writelines(events_text(lines))
     outcomes = actor_outcomes(plan, events)
-    (folder / EVENTS_FILE).write_text(events_to_json(events), encoding="utf-8")
     (folder / ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
-    stopped = watch is not None and watch.stopped
-    return Done(sim_seconds, steps, wall_seconds, stopped)
+    return done
+
+
+def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
+    start = time.perf_counter()
+    arguments = ["--configuration-file", str(folder / SUMO_FOLDER / CONFIG_FILE)]
+    if plan.trajectories:
+        arguments += ["--fcd-output", str(folder / TRAJECTORIES_FILE)]
+    with open_session(arguments) as session:
+        now = stepper.run(session, plan.until)
+    return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
 
 
 def _watch(plan: Plan, how: str, send: Callable[[Message, bytes], None]) -> Watch | LockstepWatch:
@@ -105,43 +112,6 @@ def _watch(plan: Plan, how: str, send: Callable[[Message, bytes], None]) -> Watc
         step_length=plan.step_length,
     )
     return Watch(plan, steering, send)
-
-
-def _steps(
-    plan: Plan,
-    folder: Path,
-    recorder: Recorder,
-    send: Callable[[Message], None],
-    watch: Watch | LockstepWatch | None,
-) -> tuple[float, int]:
-    arguments = [
-        "--configuration-file",
-        str(folder / SUMO_FOLDER / CONFIG_FILE),
-        "--fcd-output",
-        str(folder / TRAJECTORIES_FILE),
-    ]
-    planned, steps, sent = len(plan.actors), 0, 0.0
-    with open_session(arguments) as session:
-        now = session.time
-        while now < plan.until and session.expected() > 0:
-            if watch is not None and not watch.next_step(session, recorder):
-                break
-            session.step()
-            recorder.record(session, now)
-            now = session.time
-            steps += 1
-            clock = time.monotonic()
-            if clock - sent >= MESSAGE_PAUSE:
-                sent = clock
-                running = session.running()
-                send(
-                    Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned)
-                )
-        if watch is not None:  # whoever watches sees how it ends
-            watch.show_last(session, recorder)
-            running = session.running()
-            send(Progress(now, plan.until, running, recorder.departed, recorder.arrived, planned))
-        return now, steps
 
 
 if __name__ == "__main__":

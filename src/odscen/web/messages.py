@@ -14,7 +14,9 @@ from odscen.scenario.document import Scenario
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Version = Annotated[int, Field(ge=0, lt=2**53)]
-RunState = Literal["preparing", "running", "paused", "finishing", "completed", "stopped", "failed"]
+RunState = Literal[
+    "preparing", "running", "paused", "finishing", "completed", "stopped", "failed", "interrupted"
+]
 
 
 class Body(BaseModel):
@@ -255,7 +257,7 @@ class Control(Body):
 
 
 class RunProgress(Answer):
-    """How far a run is."""
+    """How far a run is; ``time_left`` in wall seconds at full speed, if it can be told."""
 
     time: float
     until: float
@@ -263,6 +265,7 @@ class RunProgress(Answer):
     departed: int
     arrived: int
     planned: int
+    time_left: float | None = None
 
 
 class RunInfo(Answer):

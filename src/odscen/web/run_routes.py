@@ -20,6 +20,7 @@ from odscen.results.replay import replay_columns
 from odscen.results.summary import actors_from_json
 from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
+from odscen.sumo.recorded import read_trajectories
 from odscen.web.live import LiveView
 from odscen.web.messages import (
     Control,
@@ -38,6 +39,9 @@ from odscen.web.services import Shared
 
 if TYPE_CHECKING:
     import polars as pl
+
+REPLAY_ROWS = 4_000_000
+"""Rows that are read at most; of a longer run every second, third, ... record is left out."""
 
 router = APIRouter(prefix="/api/runs")
 
@@ -91,6 +95,9 @@ def report(run: str, shared: Shared) -> Response:
 def summary(run: str, shared: Shared) -> dict[str, Any]:
     """Key figures of a finished run: its ``summary.json``."""
     path = shared.runs.folder(run) / layout.SUMMARY_FILE
+    if not path.is_file():
+        what = "summary of run"
+        raise NotFoundError(what, run, [])
     found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
@@ -116,7 +123,7 @@ def events(run: str, shared: Shared) -> RunEvents:
 @router.get("/{run}/curves")
 def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
-    table, plan = _recorded(shared, run)
+    table, plan, _ = _recorded(shared, run)
     actors = actors_from_json(_kept(shared, run, layout.ACTORS_FILE).read_text(encoding="utf-8"))
     found = run_curves(plan, actors, table, end=_sim_seconds(summary(run, shared)))
     return RunCurves(
@@ -137,10 +144,10 @@ def trajectories(
     ] = None,
 ) -> Any:
     """Where everybody was, as columns; see ``docs/server.md``."""
-    table, plan = _recorded(shared, run)
+    table, plan, read = _recorded(shared, run)
     if most is not None:
-        every = max(every, math.ceil(table.height / most))
-    columns = replay_columns(table, plan, every=every)
+        every = max(every, math.ceil(table.height * read / most))
+    columns = replay_columns(table, plan, every=max(1, every // read))
     columns["actors"] = [
         {"id": a.id, "category": a.category, "length": a.length, "width": a.width, "ego": a.ego}
         for a in plan.actors
@@ -157,17 +164,22 @@ def _kept(shared: Shared, run: str, name: str) -> Path:
     return path
 
 
-def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan]:
-    """Trajectories and plan; a run that was killed has left no trajectories that can be read."""
+def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
+    """Trajectories, the plan, and every how manyth record was read.
+
+    A run that was killed has left no trajectories that can be read.
+    """
     import polars as pl
 
-    file = _kept(shared, run, layout.TRAJECTORIES_FILE)
     plan = Plan.from_json(_kept(shared, run, layout.PLAN_FILE).read_text(encoding="utf-8"))
+    what = "complete trajectories of run"
     try:
-        return pl.read_parquet(file), plan
+        recorded = read_trajectories(shared.runs.folder(run), most=REPLAY_ROWS)
     except pl.exceptions.PolarsError as error:
-        what = "complete trajectories of run"
         raise NotFoundError(what, run, []) from error
+    if recorded is None:
+        raise NotFoundError(what, run, [])
+    return recorded.rows, plan, recorded.every
 
 
 def _sim_seconds(said: dict[str, Any]) -> float:

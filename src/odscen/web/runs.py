@@ -15,13 +15,16 @@ from typing import TYPE_CHECKING, Any
 from odscen.catalog.assets import shipped_assets
 from odscen.catalog.folders import discard
 from odscen.catalog.store import check_name
+from odscen.durations import clock
 from odscen.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo import layout
 from odscen.sumo.live import Live
+from odscen.sumo.long_runs import about
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.progress import Command, Pace
 from odscen.sumo.runner import run_prepared
+from odscen.sumo.status import going, read_status
 from odscen.web.messages import RunInfo, RunProgress, RunState
 from odscen.workflow import check_scenario, load_map
 
@@ -165,10 +168,12 @@ class Runs:
         with self._lock:
             names = dict.fromkeys(filter(wanted, self._active))
         folders = self._workspace.runs.iterdir() if self._workspace.runs.is_dir() else ()
-        done = [
-            path for path in folders if wanted(path.name) and (path / layout.SUMMARY_FILE).is_file()
+        found = [
+            (file.stat().st_mtime, path)
+            for path in folders
+            if wanted(path.name) and (file := _shown(path))
         ]
-        done.sort(key=lambda path: ((path / layout.SUMMARY_FILE).stat().st_mtime, path.name))
+        done = [path for _, path in sorted(found)]
         order = dict.fromkeys([*(p.name for p in done if p.name not in names), *names])
         rows = []
         for name in order:
@@ -177,7 +182,7 @@ class Runs:
         return rows
 
     def folder(self, run: str) -> Path:
-        """Folder of a finished run.
+        """Folder of a run that is finished, or in slices and interrupted.
 
         Raises
         ------
@@ -185,7 +190,7 @@ class Runs:
             If there is none.
         """
         folder = self._workspace.runs / check_name(run, what="run")
-        if not (folder / layout.SUMMARY_FILE).is_file():
+        if _shown(folder) is None:
             what = "finished run"
             raise NotFoundError(what, run, [])
         return folder
@@ -203,7 +208,7 @@ class Runs:
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
     def remove(self, run: str) -> None:
-        """Remove a finished run."""
+        """Remove a finished or interrupted run."""
         with self._lock:
             active = self._active.get(run)
             if active is not None and active.ended is None:
@@ -213,6 +218,9 @@ class Runs:
         if active is not None and not (self._workspace.runs / run).exists():
             return  # it failed before it had anything to keep
         folder = self.folder(run)
+        if going(folder) == "running":
+            msg = f"run {run!r} is going on in another process"
+            raise ConflictError(msg)
         try:
             discard(folder)
         except OSError as error:
@@ -278,6 +286,8 @@ class Runs:
 
     def _finished(self, run: str) -> RunInfo:
         folder = self.folder(run)
+        if not (folder / layout.SUMMARY_FILE).is_file():
+            return _unfinished(folder)
         summary = self._summary(folder.name) or {}
         failed = summary.get("status") != "completed"
         return RunInfo(
@@ -313,3 +323,29 @@ def _stem(scenario: str) -> str:
 def _names_of(scenario: str) -> re.Pattern[str]:
     """Ids of a scenario's runs that a server has started."""
     return re.compile(rf"{re.escape(_stem(scenario))}-[1-9]\d*")
+
+
+def _shown(folder: Path) -> Path | None:
+    """Return the file that makes a folder a run: its summary, or its status if it has not ended."""
+    files = (folder / name for name in (layout.SUMMARY_FILE, layout.STATUS_FILE))
+    return next((file for file in files if file.is_file()), None)
+
+
+def _unfinished(folder: Path) -> RunInfo:
+    """Describe a run in slices that has not ended, from what it last said of itself."""
+    status = read_status(folder) or {}
+    at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))
+    state: RunState = going(folder) or "interrupted"
+    told = f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} goes on."
+    return RunInfo(
+        run=folder.name,
+        state=state,
+        scenario=str(status.get("scenario", folder.name)),
+        map=about(folder).get("map"),
+        progress=RunProgress(
+            time=at,
+            until=until,
+            **{key: status.get(key, 0) for key in ("running", "departed", "arrived", "planned")},
+        ),
+        error=told if state == "interrupted" else None,
+    )

@@ -1,0 +1,116 @@
+"""A long run killed with signal 9 again and again, against the same run left alone.
+
+``python -m bench.interruptions [MAP.xodr] [HOURS]``: traffic on a map (the shipped town, 2 hours,
+if not given) in slices of 10 minutes. The command line is killed at :data:`KILLS` random moments,
+half of the time together with its worker, and resumed each time. The results must be the same
+bytes, and nothing that was there before a kill may be gone or different after it.
+"""
+
+from __future__ import annotations
+
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from odscen import workflow
+from odscen.catalog.shipped import shipped_maps
+from odscen.catalog.store import Workspace
+from odscen.scenario.document import Flow
+from odscen.scenario.files import dumps
+from odscen.sumo.recorded import trajectory_files
+
+KILLS = 20
+SLICE = 600.0
+FLOWS = 40
+PER_HOUR = 900.0
+LONGEST = 8.0
+"""Wall seconds until a kill at most."""
+
+
+def main() -> None:
+    given = [Path(name) for name in sys.argv[1:2]]
+    path = given[0] if given else next(p for p in shipped_maps() if p.stem == "town_5x5")
+    hours = float(sys.argv[2]) if len(sys.argv) > 2 else 2.0
+    chance = random.Random(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        workspace = Workspace.open(folder / "workspace")
+        scenario = traffic(workspace, workspace.add_map(path).name, hours)
+        cli = [sys.executable, "-m", "odscen"]
+        options = ["--workspace", str(workspace.root)]
+        run = [*cli, "run", str(scenario), *options, "--slice", f"{SLICE:g}"]
+        start = time.perf_counter()
+        subprocess.run([*run, "--out", str(folder / "alone")], check=True, capture_output=True)
+        alone = time.perf_counter() - start
+        target = folder / "killed" / scenario.name.removesuffix(workflow.SUFFIX)
+        command = run = [*run, "--out", str(target.parent)]
+        resume = [*cli, "resume", str(target), *options]
+        expected = results(folder / "alone" / target.name)
+        moments = lost = compared = differing = 0
+        while moments < KILLS or (target / "status.json").is_file():
+            before = recorded(target)
+            patience = chance.uniform(0.2, LONGEST) if moments < KILLS else None
+            if kill(command, patience, worker=chance.random() < 0.5):
+                compared += 1
+                differing += results(target) != expected
+                shutil.rmtree(target)
+                command = run
+                continue
+            moments += 1
+            after = recorded(target)
+            lost += sum(after.get(file) != content for file, content in before.items())
+            command = resume if (target / "status.json").is_file() else run
+    print(
+        f"{path.stem}, {hours:g} h in slices of {SLICE:g} s, {alone:.0f} s of wall time alone: "
+        f"killed {moments} times; {lost} files lost or changed by a kill; "
+        f"{compared} runs came to their end, {differing} with other results"
+    )
+
+
+def traffic(workspace: Workspace, name: str, hours: float) -> Path:
+    """Write a scenario of flows from places that sampling has chosen."""
+    (path,) = workflow.generate(workspace, map_name=name, seed=1, fill=0.5)
+    sampled = workflow.read_scenario(path)
+    flows = tuple(
+        Flow(
+            id=f"flow{i}", spawn=actor.spawn, per_hour=PER_HOUR / FLOWS, end=hours * 3600.0,
+            mix={actor.category: 1.0},
+        )
+        for i, actor in enumerate(sampled.actors[:FLOWS])
+    )  # fmt: skip
+    simulation = sampled.simulation.model_copy(update={"duration": hours * 3600.0})
+    update = {"actors": (), "flows": flows, "simulation": simulation}
+    path.write_text(dumps(sampled.model_copy(update=update)), encoding="utf-8")
+    return path
+
+
+def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:
+    """Start a command and kill it after so many seconds; whether it had ended by then."""
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            process.send_signal(signal.SIGKILL)
+            for child in children if worker else []:
+                subprocess.run(["kill", "-9", child], check=False, capture_output=True)
+            return False
+    return True
+
+
+def recorded(run: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in trajectory_files(run)}
+
+
+def results(run: Path) -> dict[str, bytes]:
+    files = [run / "actors.json", run / "events.json"]
+    return recorded(run) | {file.name: file.read_bytes() for file in files}
+
+
+if __name__ == "__main__":
+    main()

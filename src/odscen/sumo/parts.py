@@ -1,0 +1,68 @@
+"""Parquet parts of a long run: made alike, so that they read as one table; and room for the next.
+
+SUMO names the columns after whatever comes first in a file, ``vehicle_x`` or ``person_x``, and
+writes a file without columns if nobody is there.
+"""
+
+from __future__ import annotations
+
+import shutil
+from typing import TYPE_CHECKING
+
+from odscen.errors import SimulationError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from odscen.sumo.checkpoint import Checkpoint
+
+RESERVE = 1.5
+"""Room that a slice must find, as a multiple of what the one before it took."""
+
+
+def tidy_part(path: Path) -> None:
+    """Give a part the columns that every part has; remove one in which nobody is.
+
+    Raises
+    ------
+    SimulationError
+        If it is not a whole Parquet file.
+    """
+    if not path.is_file():
+        return
+    import polars as pl
+
+    try:
+        columns = list(pl.read_parquet_schema(path))
+    except (OSError, pl.exceptions.PolarsError) as error:
+        msg = f"SUMO has not written the trajectories to the end; the disk may be full: {error}"
+        raise SimulationError(msg) from error
+    if "timestep_time" not in columns or len(columns) < 2:
+        path.unlink()
+        return
+    names = {name: f"vehicle_{name.removeprefix('person_')}" for name in columns}
+    names = {old: new for old, new in names.items() if old.startswith("person_")}
+    if names:
+        renamed = path.with_suffix(".renamed")
+        pl.scan_parquet(path).rename(names).sink_parquet(renamed)
+        renamed.replace(path)
+
+
+def check_room(run: Path, before: Checkpoint | None) -> None:
+    """Make sure that the disk holds another slice like the one before.
+
+    Raises
+    ------
+    SimulationError
+        If not; nothing is torn then.
+    """
+    if before is None:
+        return
+    needed = int(RESERVE * sum(size for size, _ in before.files.values()))
+    free = shutil.disk_usage(run).free
+    if free < needed:
+        msg = (
+            f"the disk is nearly full: slice {before.number + 1} needs about "
+            f"{needed / 1e6:,.0f} MB, {free / 1e6:,.0f} MB are free"
+        )
+        raise SimulationError(msg)

@@ -1,0 +1,187 @@
+"""A long run: a chain of slices, each started from the state that the one before has saved.
+
+Going on after loading a state is not what SUMO would have done without saving: so every long run
+goes through the same reloads, interrupted or not, and one that goes on from slice ``k`` ends with
+the same results as one that was never interrupted. At each boundary SUMO closes its outputs.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from odscen.errors import SimulationError
+from odscen.results.records import Plan, event_from_line, event_line
+from odscen.sumo import layout
+from odscen.sumo.checkpoint import (
+    EVENTS_LINES,
+    STATE_FILE,
+    Checkpoint,
+    check_state,
+    complete,
+    fingerprints,
+    last_number,
+    part_folder,
+    read_checkpoint,
+    slice_folder,
+)
+from odscen.sumo.parts import check_room, tidy_part
+from odscen.sumo.progress import Done
+from odscen.sumo.route_slices import RouteSlices
+from odscen.sumo.session import open_session
+from odscen.sumo.status import write_status
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from odscen.results.records import Event
+    from odscen.sumo.session import Session
+    from odscen.sumo.stepping import Stepper
+
+_CONTENTS = (STATE_FILE, EVENTS_LINES, layout.TRAJECTORIES_FILE)
+_SAVING = (
+    "--save-state.rng", "true",
+    "--save-state.transportables", "true",
+    "--save-state.precision", "6",
+)  # fmt: skip
+
+
+def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
+    """Run what is left of a long run, from its last complete slice on.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO stops with an error, or what it wrote is not whole.
+    OSError
+        If the disk is full, for example.
+    """
+    number = last_number(run)
+    done = read_checkpoint(run, number) if number else None
+    if done is not None:
+        stepper.recorder.restore(done.recorder)
+        stepper.steps = done.steps
+    routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
+    while done is None or not done.last:
+        done = _Slice(plan, run, done, routes).run(stepper)
+        write_status(run, plan, done, stepper)
+    return Done(done.time, done.steps, done.wall_seconds, done.stopped)
+
+
+def recorded_events(run: Path) -> Iterator[Event]:
+    """Events of all complete slices, one by one."""
+    return map(event_from_line, event_lines(run))
+
+
+def event_lines(run: Path) -> Iterator[str]:
+    """Yield the same as lines, for a file."""
+    for number in range(1, last_number(run) + 1):
+        with (slice_folder(run, number) / EVENTS_LINES).open(encoding="utf-8") as lines:
+            for line in lines:
+                yield line.rstrip("\n")
+
+
+class _Slice:
+    """One slice: begun from ``before``, the slice before it."""
+
+    def __init__(
+        self, plan: Plan, run: Path, before: Checkpoint | None, routes: RouteSlices
+    ) -> None:
+        self._plan = plan
+        self._run = run
+        self._before = before
+        self._routes = routes
+        self._number = 1 if before is None else before.number + 1
+        length = plan.slice_length or plan.until
+        self._end = min(self._number * length, plan.until)
+
+    def run(self, stepper: Stepper) -> Checkpoint:
+        """Simulate it and make it complete."""
+        before, start = self._before, time.perf_counter()
+        check_room(self._run, before)
+        part = part_folder(self._run, self._number)
+        routes = part / layout.ROUTES_FILE
+        offset = self._routes.cut(before.routes if before else 0, self._end, routes)
+        more = self._end < self._plan.until and self._routes.more(offset)
+        with _session(self._arguments(part), self._number) as session:
+            self._compare(session, stepper)
+            now = stepper.run(session, self._end, more=more)
+            last = self._is_last(session, stepper, now, more=more)
+            present = session.present()
+            running = session.running()
+            if not last:
+                session.save(part / STATE_FILE)
+        routes.unlink()
+        self._write_events(part, stepper)
+        if not last:
+            check_state(part / STATE_FILE)
+        tidy_part(part / layout.TRAJECTORIES_FILE)
+        seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)
+        checkpoint = Checkpoint(
+            number=self._number,
+            time=now,
+            last=last,
+            stopped=stepper.stopped,
+            routes=offset,
+            steps=stepper.steps,
+            wall_seconds=seconds,
+            memory=memory_now(),
+            running=running,
+            present=sorted(present),
+            recorder=stepper.recorder.state(),
+            files=fingerprints(part, _CONTENTS),
+        )
+        complete(self._run, part, checkpoint)
+        return checkpoint
+
+    def _arguments(self, part: Path) -> list[str]:
+        sumo = self._run / layout.SUMO_FOLDER
+        arguments = ["--configuration-file", str(sumo / layout.CONFIG_FILE)]
+        arguments += ["--route-files", str(part / layout.ROUTES_FILE), *_SAVING]
+        if self._plan.trajectories:
+            arguments += ["--fcd-output", str(part / layout.TRAJECTORIES_FILE)]
+        if self._before is not None:
+            state = slice_folder(self._run, self._before.number) / STATE_FILE
+            arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]
+        return arguments
+
+    def _compare(self, session: Session, stepper: Stepper) -> None:
+        """Say who has not come back; nobody has ever been seen to be lost, but we look."""
+        if self._before is None:
+            return
+        if abs(session.time - self._before.time) > 1e-6:
+            msg = f"SUMO goes on at {session.time:g} s instead of {self._before.time:g} s"
+            raise SimulationError(msg)
+        missing = [name for name in self._before.present if not session.knows(name)]
+        stepper.recorder.lose(session.time, missing)
+
+    def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
+        nobody = not more and session.expected() == 0
+        return now >= self._plan.until or nobody or stepper.stopped
+
+    def _write_events(self, part: Path, stepper: Stepper) -> None:
+        with (part / EVENTS_LINES).open("w", encoding="utf-8") as out:
+            out.writelines(event_line(event) + "\n" for event in stepper.recorder.drain())
+
+
+@contextmanager
+def _session(arguments: list[str], number: int) -> Iterator[Session]:
+    try:
+        with open_session(arguments) as session:
+            yield session
+    except SimulationError as error:
+        msg = f"slice {number}: {error}"
+        raise SimulationError(msg) from error
+
+
+def memory_now() -> int:
+    """Bytes that this process holds in memory; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+    import os
+
+    return pages * os.sysconf("SC_PAGE_SIZE")

@@ -1,0 +1,319 @@
+from __future__ import annotations
+
+import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from odscen.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
+from odscen.results.expectations import parse_expectation
+from odscen.results.records import EventKind, Plan, PlannedActor, events_from_json
+from odscen.results.summary import actors_from_json
+from odscen.sumo import checkpoint, forecast, process, status
+from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.live import Live
+from odscen.sumo.long_runs import resume
+from odscen.sumo.parts import check_room
+from odscen.sumo.progress import Command, Pace, Progress
+from odscen.sumo.recorded import read_trajectories, trajectory_files
+from odscen.sumo.runner import PreparedRun, run_prepared
+from tests.sumo.conftest import TYPES
+
+SLICE, UNTIL = 60.0, 200.0
+ROWS = ("A0B0 B0C0 C0C1", "A1B1 B1C1", "C2B2 B2A2 A2A1", "C0C1 C1C2", "B2B1 B1B0 B0A0")
+WALKS = ("A0B0 B0C0", "C1B1 B1A1", "B2B1 B1B0")
+
+
+@pytest.fixture(scope="module")
+def long(grid: Path) -> PreparedRun:
+    """Cars whose drivers dawdle at random, and walkers, over 200 s in slices of 60 s."""
+    chance = random.Random(3)
+    departs = sorted(round(chance.uniform(0.0, 150.0), 2) for _ in range(90))
+    lines, actors = ["<routes>", TYPES], []
+    for index, depart in enumerate(departs):
+        walker = index % 5 == 0
+        name = f"{'walker' if walker else 'car'}{index}"
+        actors.append(
+            PlannedActor(
+                id=name, category="pedestrian" if walker else "car", spawn="1.0.-1.0", goal=None,
+                depart=depart, length=0.4 if walker else 4.5, width=0.5, x=0.0, y=0.0, z=0.0,
+                hdg=0.0, free_flow_time=40.0,
+            )
+        )  # fmt: skip
+        if walker:
+            lines.append(
+                f'<person id="{name}" type="walker" depart="{depart}" departPos="5">'
+                f'<walk edges="{WALKS[index % 3]}"/></person>'
+            )
+        else:
+            lines.append(
+                f'<vehicle id="{name}" type="car" depart="{depart}" departLane="1">'
+                f'<route edges="{ROWS[index % 5]}"/></vehicle>'
+            )
+    settings = RunSettings(until=UNTIL, step_length=0.5, seed=7)
+    files = {
+        "routes.rou.xml": "\n".join([*lines, "</routes>", ""]),
+        "scenario.sumocfg": sumo_config(settings),
+    }
+    plan = Plan("grid", 7, UNTIL, 0.5, (0.0, 0.0), tuple(actors), slice_length=SLICE)
+    return PreparedRun(plan, files, grid, scenario_json="{}")
+
+
+@pytest.fixture(scope="module")
+def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Results of the run that nobody interrupts, by file."""
+    result = run_prepared(long, tmp_path_factory.mktemp("whole") / "run")
+    assert result.status == "completed"
+    return results(result.folder)
+
+
+def results(run: Path) -> dict[str, bytes]:
+    files = [run / "actors.json", run / "events.json", *trajectory_files(run)]
+    return {str(file.relative_to(run)): file.read_bytes() for file in files}
+
+
+def killed(
+    long: PreparedRun, run: Path, monkeypatch: pytest.MonkeyPatch, **environment: int
+) -> str:
+    """Run, interrupted by ``killed_worker``; what the runner says of it."""
+    with monkeypatch.context() as patch:
+        patch.setattr(process, "WORKER", "tests.sumo.killed_worker")
+        for name, value in environment.items():
+            patch.setenv(name, str(value))
+        result = run_prepared(long, run)
+    return str(result.summary["error"]) if result.status == "failed" else ""
+
+
+def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    result = run_prepared(long, tmp_path / "run", expectations=[parse_expectation("inserted==90")])
+    assert result.exit_code == 0
+    assert result.summary["actors"]["arrived"] + result.summary["actors"]["running"] == 90
+    assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]
+    left = {path.name for path in result.folder.iterdir()}
+    assert left == {
+        "actors.json", "events.json", "plan.json", "scenario.json", "summary.json", "sumo",
+        "sumo.log", "trajectories",
+    }  # fmt: skip
+    assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
+
+
+def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    run_prepared(long, tmp_path / "run")
+    files = trajectory_files(tmp_path / "run")
+    assert len(files) == 4
+    table = pl.read_parquet(tmp_path / "run" / "trajectories" / "*.parquet")
+    assert table.select("timestep_time", "vehicle_id").is_duplicated().sum() == 0
+    steps = table.sort("vehicle_id", "timestep_time").select(
+        pl.col("timestep_time").diff().over("vehicle_id").alias("pause")
+    )
+    assert set(steps["pause"].drop_nulls()) == {0.5}
+    outcomes = actors_from_json((tmp_path / "run" / "actors.json").read_text())
+    assert {one.id for one in outcomes} == set(table["vehicle_id"])
+
+
+def test_a_table_with_too_many_rows_is_read_with_every_nth_record(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    run_prepared(long, tmp_path / "run")
+    everything = read_trajectories(tmp_path / "run")
+    some = read_trajectories(tmp_path / "run", most=1000)
+    assert everything is not None
+    assert some is not None
+    assert everything.every == 1
+    assert some.every == -(-everything.rows.height // 1000)
+    times = sorted(set(everything.rows["timestep_time"]))
+    assert sorted(set(some.rows["timestep_time"])) == times[:: some.every]
+
+
+@pytest.mark.parametrize("kill_at", [3, 8, 13, 15, 16, 24, 34, 40])
+def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_bytes(
+    long: PreparedRun,
+    whole: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    kill_at: int,
+) -> None:
+    run = tmp_path / "run"
+    error = killed(long, run, monkeypatch, KILL_AT=kill_at)
+    assert "SIGKILL" in error
+    assert f"odscen resume {run}" in error
+    before = {file.name: file.read_bytes() for file in trajectory_files(run)}
+    told: list[str] = []
+    result = resume(run, tell=told.append)
+    assert result.status == "completed"
+    assert results(run) == whole
+    assert all(whole[f"trajectories/{name}"] == content for name, content in before.items())
+    assert len(told) == 1
+
+
+def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=30)
+    last = checkpoint.last_number(run)
+    assert last > 1
+    state = checkpoint.slice_folder(run, last) / checkpoint.STATE_FILE
+    content = bytearray(state.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    state.write_bytes(content)
+    told: list[str] = []
+    resume(run, tell=told.append)
+    assert told[0] == f"slice {last} is damaged: state.xml.gz is not as it was written"
+    assert told[1] == f"going on at {(last - 1) * SLICE:g} s, after slice {last - 1}"
+    assert results(run) == whole
+
+
+def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = {name: len(content) for name, content in whole.items() if "part" in name}
+    assert sizes["trajectories/part-0001.parquet"] < sizes["trajectories/part-0002.parquet"]
+    run = tmp_path / "run"
+    limit = sizes["trajectories/part-0002.parquet"] - 1000
+    error = killed(long, run, monkeypatch, FILE_LIMIT=limit)
+    assert f"odscen resume {run}" in error
+    assert "What happened up to 60 s is kept" in error
+    assert list(map(str, trajectory_files(run))) == [str(run / "trajectories/part-0001.parquet")]
+    resume(run)
+    assert results(run) == whole
+
+
+def test_a_disk_without_room_for_another_slice_stops_the_run_before_anything_is_torn(
+    tmp_path: Path,
+) -> None:
+    one = checkpoint.Checkpoint(
+        number=4, time=240.0, last=False, stopped=False, routes=0, steps=0, wall_seconds=0.0,
+        memory=0, running=0, present=[], recorder={}, files={"x": [1 << 60, 0]},
+    )  # fmt: skip
+    with pytest.raises(SimulationError, match=r"slice 5 needs about .* MB, .* MB are free"):
+        check_room(tmp_path, one)
+
+
+def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=20)
+    assert status.going(run) == "interrupted"
+    monkeypatch.setattr(status, "PATIENCE", 0.1)
+    with status.locked(run):
+        assert status.going(run) == "running"
+        with pytest.raises(ConflictError, match="going on in another process"):
+            resume(run)
+    with pytest.raises(ConflictError, match=r"odscen resume .*run goes on with it"):
+        run_prepared(long, run)
+    resume(run)
+    assert status.going(run) is None
+    with pytest.raises(ConflictError, match="has ended"):
+        resume(run)
+    with pytest.raises(NotFoundError, match="interrupted run"):
+        resume(tmp_path)
+
+
+def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = forecast.forecast(long.plan, long.sumo_files, every=None)
+    monkeypatch.setattr(
+        forecast.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(1, 1, 1000)
+    )
+    with pytest.raises(WorkspaceError, match=r"of disk, .* are free; record less"):
+        run_prepared(replace(long, expected=expected), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_forecast_holds_for_a_run_like_this(long: PreparedRun, tmp_path: Path) -> None:
+    expected = forecast.forecast(long.plan, long.sumo_files, every=None)
+    run_prepared(long, tmp_path / "run")
+    sizes = sum(file.stat().st_size for file in trajectory_files(tmp_path / "run"))
+    assert sizes < expected.disk < 20 * sizes
+    fewer = forecast.forecast(long.plan, long.sumo_files, every=10.0)
+    assert fewer.disk < expected.disk
+    assert 10 < expected.running < 90
+
+
+def test_watching_goes_on_across_slices_and_changes_nothing(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    live = Live(Pace())
+    times: list[float] = []
+
+    def look() -> None:
+        if live.picture.number > len(times):
+            times.append(float(np.frombuffer(live.picture.frame, "<f4")[1]))
+        live.ask_frame()
+
+    live.add_watcher(look)
+    live.ask_frame()
+    result = run_prepared(long, tmp_path / "run", live=live)
+    assert result.status == "completed"
+    assert {int(time // SLICE) for time in times} == {0, 1, 2, 3}
+    assert results(tmp_path / "run") == whole
+
+
+def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    live = Live(Pace())
+
+    def stop(message: Progress) -> None:
+        if message.time > SLICE + 10.0:
+            live.command(Command("stop"))
+
+    live.command(Command("speed", 100.0))
+    result = run_prepared(long, tmp_path / "run", live=live, progress=stop)
+    assert result.status == "completed"
+    assert result.summary["stopped"]
+    end = result.summary["sim_seconds"]
+    assert SLICE + 10.0 < end < UNTIL
+    table = pl.read_parquet(trajectory_files(tmp_path / "run"))
+    assert table["timestep_time"].max() == end - 0.5
+    assert status.going(tmp_path / "run") is None
+
+
+def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    """The number of vehicles in the queue is more than can start before the boundary."""
+    cars = "".join(
+        f'<vehicle id="queue{i}" type="car" depart="55" departLane="1">'
+        '<route edges="A0B0 B0C0"/></vehicle>\n'
+        for i in range(20)
+    )
+    plan = replace(
+        long.plan, actors=tuple(replace(long.plan.actors[0], id=f"queue{i}") for i in range(20))
+    )
+    files = {**long.sumo_files, "routes.rou.xml": f"<routes>\n{TYPES}\n{cars}</routes>\n"}
+    result = run_prepared(replace(long, plan=plan, sumo_files=files), tmp_path / "run")
+    assert result.summary["actors"]["inserted"] == 20
+    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    late = [event for event in events if event.kind is EventKind.DEPARTED and event.time >= SLICE]
+    assert late
+    assert not [event for event in events if event.kind is EventKind.LOST]
+
+
+def test_whoever_does_not_come_back_with_a_saved_state_is_told(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SUMO is made to forget a car; the run is resumed in a worker that is told so."""
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=13)
+    assert checkpoint.last_number(run) == 1
+    on_road = checkpoint.read_checkpoint(run, 1).present
+    car = next(name for name in on_road if name.startswith("car"))
+    config = run / "sumo" / "scenario.sumocfg"
+    forget = f'<processing>\n<load-state.remove-vehicles value="{car}"/>'
+    config.write_text(config.read_text().replace("<processing>", forget))
+    resume(run)
+    events = events_from_json((run / "events.json").read_text())
+    lost = [event for event in events if event.kind is EventKind.LOST]
+    assert [(event.actor, event.time) for event in lost] == [(car, SLICE)]
