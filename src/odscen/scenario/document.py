@@ -1,7 +1,8 @@
 """The scenario document: one small JSON file, versioned, with a published schema.
 
 Units are SI: metres, seconds, m/s; flows count per hour, as traffic engineers do, and say so in the
-name. Times are seconds after the start of the run. Node, segment and map names refer to the lane graph of one map, named with its content hash.
+name. Times are seconds after the start of the run. Node, segment and map names refer to the lane
+graph of one map, named with its content hash.
 Rules that need the graph live in :mod:`odscen.scenario.checks`, not here.
 """
 
