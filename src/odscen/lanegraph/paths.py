@@ -275,18 +275,31 @@ class WaysTo:
         table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
         return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
 
-    def after(self, marks: IntArray) -> NDArray[np.integer]:
-        """First node on the way from each node of ``nodes`` that has another mark, or -1.
+    def stretches(
+        self, sources: NDArray[np.integer], marks: IntArray
+    ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+        """Follow the marks of the nodes along each way, each run of equal ones once.
 
         Parameters
         ----------
         marks
-            A number for each node of the map, such as the row of its segment.
+            A number from 0 on for each node of the map, such as the row of its segment.
 
         Returns
         -------
-        Positions in ``nodes``, shape of ``nodes``.
+        Marks in the order in which they are met, and the first node with each: two arrays of shape
+        ``(len(sources), most)``, with -1 behind the end of a way.
         """
+        after = self._after(marks)
+        steps = [self._local[sources]]
+        while (steps[-1] >= 0).any():
+            steps.append(np.where(steps[-1] >= 0, after[steps[-1]], -1))
+        table = np.stack(steps[:-1], axis=1)
+        nodes = np.where(table >= 0, self.nodes[table], -1)
+        return np.where(table >= 0, marks[nodes], -1), nodes
+
+    def _after(self, marks: IntArray) -> NDArray[np.integer]:
+        """First node on the way from each node of the region that has another mark, or -1."""
         mark = marks[self.nodes]
         jump = np.where(self._next == _NO_PREDECESSOR, np.arange(len(mark)), self._next)
         # Pointers are doubled: as many rounds as the logarithm of the longest stretch.

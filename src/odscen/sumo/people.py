@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.categories import Category
+from odscen.scenario.counting import observations
 from odscen.scenario.goals import flow_goals, resolve_goals, stream
 from odscen.scenario.profiles import curve
 from odscen.scenario.region import place_of
 from odscen.scenario.trips import background_trips, matrix_trips
 from odscen.scenario.zones import Ground
+from odscen.sumo.counts import counted_trips
+from odscen.sumo.fit import planned_passages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from odscen.lanegraph.model import IntArray, MapGraph
     from odscen.scenario.document import DrivingStyle, Flow, Scenario
@@ -138,24 +141,39 @@ def flow_users(
 
 
 def demand_users(
-    scenario: Scenario, region: Region, usable: Usable, *, until: float
+    scenario: Scenario,
+    region: Region,
+    usable: Usable,
+    placed: Sequence[RoadUser],
+    *,
+    until: float,
 ) -> tuple[list[RoadUser], list[str]]:
-    """Members of the scenario's demand who depart before ``until``, and what of it is not met."""
+    """Members of the scenario's demand who depart before ``until``, and what of it is not met.
+
+    Counts come last: they are made up for what everybody else, ``placed`` and the rest of the
+    demand, leaves of them.
+    """
     taken = [place for actor in scenario.actors if (place := region.place(actor.spawn))]
     ground = Ground(region, usable, taken=taken)
-    drawn: list[Iterable[Trips]] = [
-        matrix_trips(scenario, ground, matrix) for matrix in scenario.demand.matrices
-    ]
-    drawn += [
-        background_trips(scenario, ground, background, usable)
-        for background in scenario.demand.background
-    ]
     users: list[RoadUser] = []
     unmet: list[str] = []
-    for trips in (one for part in drawn for one in part):
-        users += trip_users(trips, until=until)
-        if trips.unmet:
-            unmet.append(f"{trips.name}: {trips.unmet} trips left out: {trips.why}")
+
+    def add(part: Iterable[Trips]) -> None:
+        for trips in part:
+            users.extend(trip_users(trips, until=until))
+            if trips.unmet:
+                unmet.append(f"{trips.name}: {trips.unmet} trips left out: {trips.why}")
+
+    for matrix in scenario.demand.matrices:
+        add(matrix_trips(scenario, ground, matrix))
+    for background in scenario.demand.background:
+        add(background_trips(scenario, ground, background, usable))
+    if scenario.demand.counts:
+        others = [*placed, *users]
+        seen = observations(scenario.demand)
+        passages = planned_passages(others, region, ground.router, seen)
+        for counts in scenario.demand.counts:
+            add(counted_trips(scenario, ground, counts, passages))
     return users, unmet
 
 

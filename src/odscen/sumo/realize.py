@@ -105,11 +105,7 @@ def realize(
     until = scenario.simulation.duration if until is None else until
     step_length = scenario.simulation.step_length if step_length is None else step_length
     region = Region.of(sumo_map.graph, scenario.roi)
-    users = road_users(scenario, sumo_map.graph, region, until=until)
-    unmet: list[str] = []
-    if scenario.demand.parts:
-        more, unmet = demand_users(scenario, region, usable_places(sumo_map), until=until)
-        users = tuple(sorted((*users, *more), key=lambda user: (user.depart, user.id)))
+    users, unmet = everybody(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if weather else NO_EFFECT
     writer = _Writer(sumo_map, region, assets, scenario.seed, effect)
@@ -135,6 +131,24 @@ def realize(
     if signals is not None:
         files[SIGNALS_FILE] = signals
     return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+
+
+def everybody(
+    scenario: Scenario, sumo_map: SumoMap, region: Region, *, until: float
+) -> tuple[tuple[RoadUser, ...], list[str]]:
+    """Road users of a scenario by departure, then id, and what of its demand is not met.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    users = road_users(scenario, sumo_map.graph, region, until=until)
+    if not scenario.demand.parts:
+        return users, []
+    usable = usable_places(sumo_map)
+    more, unmet = demand_users(scenario, region, usable, users, until=until)
+    return tuple(sorted((*users, *more), key=lambda user: (user.depart, user.id))), unmet
 
 
 class _Way(NamedTuple):
