@@ -1,43 +1,27 @@
-"""How well traffic meets counts: planned, from the ways of a scenario, or seen, from a run."""
+"""How well traffic meets counts: as planned, or as a run had it."""
 
 from __future__ import annotations
 
-import bisect
 import math
-from collections import Counter, defaultdict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from odscen.scenario.counting import (
-    GOOD,
-    Passing,
-    contradictions,
-    geh,
-    observations,
-    transitions,
-)
-from odscen.sumo.paths import each_path
+from odscen.scenario.counting import GOOD, Passing, contradictions, geh, observations
+from odscen.scenario.region import Region
+from odscen.scenario.zones import Ground
+from odscen.sumo.counts import ways_past
+from odscen.sumo.passages import planned_passages, seen_passages
+from odscen.sumo.realize import everybody
+from odscen.sumo.usable import usable_places
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping
 
     import polars as pl
 
-    from odscen.lanegraph.model import LaneGraph, MapGraph
-    from odscen.lanegraph.paths import Router
-    from odscen.scenario.counting import Observation
     from odscen.scenario.document import Scenario
-    from odscen.scenario.region import Region
-    from odscen.sumo.people import RoadUser
     from odscen.sumo.sumo_map import SumoMap
-
-Passages = Counter[tuple[str, float, float]]
-"""Vehicles by place, begin and end of the slice."""
-
-UNKNOWN_LIMIT = 13.89
-"""m/s assumed where the map gives no limit: 50 km/h."""
 
 
 class CountFit(NamedTuple):
@@ -106,87 +90,38 @@ class Fit:
         }
 
 
-def planned_passages(
-    users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
-) -> Passages:
-    """Count vehicles at the places of observations, as they would pass with nobody in their way."""
-    lanes = region.graph.lanes
-    passing = Passing(region.graph, [one.place for one in seen])
-    clock = _Slices(seen)
-    found: Passages = Counter()
-    vehicles = [user for user in users if not user.person]
-    for index, path in each_path(vehicles, region, drivable):
-        if len(path):
-            segment = lanes.segment[path]
-            first = np.flatnonzero(np.diff(segment, prepend=-1))
-            times = _times(lanes, path)[first] + vehicles[index].depart
-            for place, step in passing.of(segment[first].tolist()):
-                clock.count(found, passing.places[place], float(times[step]))
-    return found
+def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> Fit:
+    """Hold the traffic that a scenario plans, with nobody in its way, against its counts.
 
-
-def seen_passages(
-    trajectories: pl.LazyFrame, sumo_map: SumoMap, seen: Sequence[Observation]
-) -> tuple[Passages, int]:
-    """Count vehicles at the places of observations, as a run's trajectories have them.
-
-    Parameters
-    ----------
-    trajectories
-        As the run wrote them, see docs/runs.md.
-
-    Returns
-    -------
-    The vehicles by observation, and how many vehicles there are in all.
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
     """
-    import polars as pl
-
-    passing = Passing(sumo_map.graph, [one.place for one in seen])
-    clock = _Slices(seen)
-    found: Passages = Counter()
-    segments = _segment_of_lane(sumo_map)
-    known = pl.DataFrame(
-        {"lane": list(segments), "segment": list(segments.values())},
-        schema={"lane": pl.String, "segment": pl.Int64},
-    )
-    changes = (
-        trajectories.select(
-            time=pl.col("timestep_time"),
-            id=pl.col("vehicle_id").cast(pl.String),
-            lane=pl.col("vehicle_lane").cast(pl.String),
-        )
-        .join(known.lazy(), on="lane", how="inner")
-        .sort("id", "time")
-        .filter((pl.col("segment") != pl.col("segment").shift(1).over("id")).fill_null(value=True))
-        .group_by("id", maintain_order=True)
-        .agg("time", "segment")
-        .collect()
-    )
-    between = _Between(sumo_map.graph)
-    for times, way in zip(changes["time"].to_list(), changes["segment"].to_list(), strict=True):
-        whole, moments = between.filled(way, times)
-        for place, step in passing.of(whole):
-            clock.count(found, passing.places[place], moments[step])
-    return found, len(changes)
+    region = Region.of(sumo_map.graph, scenario.roi)
+    users, _ = everybody(scenario, sumo_map, region, until=scenario.simulation.duration)
+    ground = Ground(region, usable_places(sumo_map))
+    seen = observations(scenario.demand)
+    passages = planned_passages(users, region, ground.router, seen)
+    vehicles = sum(not user.person for user in users)
+    return _fit(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
 
 
-def fit(
+def run_fit(scenario: Scenario, sumo_map: SumoMap, trajectories: pl.LazyFrame) -> Fit:
+    """Hold the traffic of a run against the counts of its scenario."""
+    seen = observations(scenario.demand)
+    passages, vehicles = seen_passages(trajectories, sumo_map, seen)
+    return _fit(scenario, sumo_map, passages, source="run", vehicles=vehicles)
+
+
+def _fit(
     scenario: Scenario,
     sumo_map: SumoMap,
     passages: Mapping[tuple[str, float, float], int],
     *,
     source: str,
     vehicles: int,
-    passable: Iterable[str] | None = None,
 ) -> Fit:
-    """Hold passages against the counts of a scenario.
-
-    Parameters
-    ----------
-    passable
-        Places that some way passes, if known: the others are told from those that are missed for
-        another reason.
-    """
     opposed: dict[tuple[str, str, float, float], str] = {}
     told: list[str] = []
     for part in scenario.demand.counts:
@@ -194,19 +129,19 @@ def fit(
             told.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
             for place in one.places:
                 opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
-    ways = None if passable is None else set(passable)
+    passable = _Passable(scenario, sumo_map)
     rows = []
-    for part, place, begin, end, counted in observations(scenario.demand):
+    for name, place, begin, end, counted in observations(scenario.demand):
         modelled = passages.get((place, begin, end), 0)
         value = geh(modelled, counted, end - begin)
         why = ""
         if value > GOOD:
-            why = opposed.get((part, place, begin, end), "")
-            if not why and ways is not None and place not in ways:
+            why = opposed.get((name, place, begin, end), "")
+            if not why and place not in passable:
                 why = "no way inside the region passes here"
             if not why:
                 why = _otherwise(modelled, counted, source)
-        rows.append(CountFit(part, place, begin, end, counted, modelled, value, why))
+        rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
     return Fit(source, tuple(rows), vehicles, tuple(told))
 
 
@@ -218,69 +153,23 @@ def _otherwise(modelled: float, counted: float, source: str) -> str:
     return "other counts on the ways past this place allow no more"
 
 
-class _Slices:
-    """The slices of time of each place, to count passages in."""
+class _Passable:
+    """Places that some way inside the region passes; found out when first asked."""
 
-    def __init__(self, seen: Sequence[Observation]) -> None:
-        self._of_place: dict[str, list[tuple[float, float]]] = defaultdict(list)
-        for one in seen:
-            self._of_place[one.place].append((one.begin, one.end))
-        for slices in self._of_place.values():
-            slices[:] = sorted(set(slices))
+    def __init__(self, scenario: Scenario, sumo_map: SumoMap) -> None:
+        self._scenario = scenario
+        self._map = sumo_map
 
-    def count(self, passages: Passages, place: str, time: float) -> None:
-        slices = self._of_place[place]
-        row = bisect.bisect_right(slices, (time, math.inf)) - 1
-        if row >= 0 and time < slices[row][1]:
-            passages[place, *slices[row]] += 1
+    def __contains__(self, place: str) -> bool:
+        return place in self._places
 
-
-class _Between:
-    """Fills segments in that a vehicle crossed from one record to the next, such as a junction."""
-
-    def __init__(self, graph: MapGraph) -> None:
-        row = {str(name): index for index, name in enumerate(graph.segments.ids)}
-        self._onwards = {
-            row[one]: {row[other] for other in others} for one, others in transitions(graph).items()
-        }
-
-    def filled(self, way: Sequence[int], times: Sequence[float]) -> tuple[list[int], list[float]]:
-        """Segments and times of a way with what lies between two that do not touch, if one does."""
-        whole, moments = [way[0]], [times[0]]
-        for segment, time in zip(way[1:], times[1:], strict=True):
-            onwards = self._onwards.get(whole[-1], set())
-            if segment not in onwards:
-                steps = [one for one in sorted(onwards) if segment in self._onwards.get(one, ())]
-                if len(steps) == 1:
-                    whole.append(steps[0])
-                    moments.append(time)
-            whole.append(segment)
-            moments.append(time)
-        return whole, moments
-
-
-def _times(lanes: LaneGraph, path: np.ndarray) -> np.ndarray:
-    """Seconds after departure at each node of a path, at the limit."""
-    limit = lanes.speed_limit[path[:-1]]
-    limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
-    steps = np.hypot(np.diff(lanes.x[path]), np.diff(lanes.y[path]))
-    return np.concatenate([[0.0], np.cumsum(steps / limit)])
-
-
-def _segment_of_lane(sumo_map: SumoMap) -> dict[str, int]:
-    """Row of the segment in which each SUMO lane lies, by the lane's id.
-
-    The one with most of its nodes; the lanes inside SUMO's junctions begin a little before those
-    of OpenDRIVE and count as the junction.
-    """
-    places = sumo_map.lane_places
-    on_lane = places.lane >= 0
-    pairs = np.stack([places.lane[on_lane], sumo_map.graph.lanes.segment[on_lane]], axis=1)
-    unique, number = np.unique(pairs, axis=0, return_counts=True)
-    kinds = np.array(sumo_map.graph.segments.kinds)
-    internal = np.array([sumo_map.net.lanes[name].internal for name in places.lanes])
-    inside = internal[unique[:, 0]] & (kinds[unique[:, 1]] == "junction")
-    found: dict[str, int] = {}
-    for row in np.lexsort((number, inside)).tolist():
-        found[places.lanes[unique[row, 0]]] = int(unique[row, 1])
-    return found
+    @cached_property
+    def _places(self) -> set[str]:
+        region = Region.of(self._map.graph, self._scenario.roi)
+        ground = Ground(region, usable_places(self._map))
+        found: set[str] = set()
+        for part in self._scenario.demand.counts:
+            passing = Passing(region.graph, [row[0] for row in part.rows])
+            kinds = ways_past(ground, part, passing)
+            found.update(passing.places[place] for kind in kinds for place in kind)
+        return found

@@ -20,7 +20,7 @@ from odscen.scenario.region import place_of
 from odscen.scenario.trips import background_trips, matrix_trips
 from odscen.scenario.zones import Ground
 from odscen.sumo.counts import counted_trips
-from odscen.sumo.fit import planned_passages
+from odscen.sumo.passages import planned_passages
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
