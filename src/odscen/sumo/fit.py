@@ -149,7 +149,7 @@ def _otherwise(modelled: float, counted: float, source: str) -> str:
     if source == "run":
         return "vehicles were late" if modelled < counted else "vehicles of another slice came late"
     if modelled > counted:
-        return "placed actors, flows and other demand alone bring more"
+        return "other counts, or other traffic of the scenario, bring more"
     return "other counts on the ways past this place allow no more"
 
 
