@@ -1,4 +1,4 @@
-"""Demand from CSV files: matrices, counts and day profiles, read once, at import.
+"""Demand from CSV files: zones, matrices, counts and day profiles, read once, at import.
 
 The first line names the columns; further columns are an error, so that a misspelt one does not pass
 unnoticed. Times are seconds after the start of the run, or times of day such as ``7:15``.
@@ -82,6 +82,20 @@ def read_profile(text: str) -> tuple[float, ...]:
             )
             raise InputError(msg, element=line.where)
     return tuple(line.number("share") for line in lines)
+
+
+def read_zones(text: str) -> dict[str, tuple[str, ...]]:
+    """Read zones: columns ``zone`` and ``segment``, one line for each segment of a zone.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    found: dict[str, list[str]] = {}
+    for line in _lines(text, ("zone", "segment")):
+        found.setdefault(line["zone"], []).append(line["segment"])
+    return {zone: tuple(segments) for zone, segments in found.items()}
 
 
 class _Line:
