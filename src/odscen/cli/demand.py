@@ -125,9 +125,8 @@ def add(
 def weekday(
     map_name: Annotated[str, typer.Option("--map", help="Map to use, the whole of it.")],
     trips: Annotated[
-        float | None,
-        typer.Option(min=1, help="Trips of the day. [default: what the junctions carry]"),
-    ] = None,
+        float, typer.Option(min=1, help="Trips of the day, if the junctions carry so many.")
+    ] = 50_000,
     day: Annotated[str, typer.Option(help="Day profile: weekday or weekend.")] = "weekday",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
     out: Annotated[
@@ -138,8 +137,8 @@ def weekday(
 ) -> None:
     """Make a day of traffic on a whole map, 24 hours from midnight on.
 
-    Without --trips there are as many as the busiest junction carries in the busiest hour, with some
-    to spare; what that is based on is printed.
+    Trips start and end anywhere, fewer of them where junctions would be too busy; what that is
+    based on is printed. If the junctions do not carry as many as asked for, there are fewer.
     """
     from odscen import demands, workflow
     from odscen.catalog.store import Workspace
@@ -150,9 +149,9 @@ def weekday(
         document, out or store.scenarios / f"{map_name}-{day}{workflow.SUFFIX}"
     )
     log(
-        f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; the busiest way into "
-        f"a junction, {load.place}, gets {load.volume:,.0f} vehicles in it and carries about "
-        f"{load.capacity:,.0f} ({load.volume / load.capacity:.0%})"
+        f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; then the busiest "
+        f"way into a junction, {load.place}, gets {load.volume:,.0f} of the {load.capacity:,.0f} "
+        f"vehicles that it carries ({load.volume / load.capacity:.0%})"
     )
     log(f"Wrote {path}")
     if as_json:

@@ -13,7 +13,7 @@ from odscen.scenario.counting import Passing, transitions
 from odscen.sumo.paths import each_path
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import polars as pl
 
@@ -35,19 +35,31 @@ def planned_passages(
     users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
 ) -> Passages:
     """Count vehicles at the places of observations, as they would pass with nobody in their way."""
-    lanes = region.graph.lanes
     passing = Passing(region.graph, [one.place for one in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
+    for _, passed in each_passing(users, region, drivable, passing):
+        for place, time in passed:
+            clock.count(found, passing.places[place], time)
+    return found
+
+
+def each_passing(
+    users: Sequence[RoadUser], region: Region, drivable: Router, passing: Passing
+) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
+    """Yield vehicles with the places that they pass, by number, and when, with a free road.
+
+    The order is not that of ``users``; pedestrians and those without a way are left out.
+    """
+    lanes = region.graph.lanes
     vehicles = [user for user in users if not user.person]
     for index, path in each_path(vehicles, region, drivable):
         if len(path):
             segment = lanes.segment[path]
             first = np.flatnonzero(np.diff(segment, prepend=-1))
             times = _times(lanes, path)[first] + vehicles[index].depart
-            for place, step in passing.of(segment[first].tolist()):
-                clock.count(found, passing.places[place], float(times[step]))
-    return found
+            passed = passing.of(segment[first].tolist())
+            yield vehicles[index], [(place, float(times[step])) for place, step in passed]
 
 
 def seen_passages(
