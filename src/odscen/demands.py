@@ -101,7 +101,7 @@ def whole_day(
     workspace: Workspace,
     map_name: str,
     *,
-    trips: float = 50_000.0,
+    trips: float = 51_000.0,
     day: str = "weekday",
     seed: int = 0,
 ) -> tuple[Scenario, Load]:

@@ -126,7 +126,7 @@ def weekday(
     map_name: Annotated[str, typer.Option("--map", help="Map to use, the whole of it.")],
     trips: Annotated[
         float, typer.Option(min=1, help="Trips of the day, if the junctions carry so many.")
-    ] = 50_000,
+    ] = 51_000,
     day: Annotated[str, typer.Option(help="Day profile: weekday or weekend.")] = "weekday",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
     out: Annotated[
