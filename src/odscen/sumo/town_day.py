@@ -36,10 +36,15 @@ SATURATION = 1800.0
 """Vehicles per hour that a lane lets off while it has green, the textbook's value."""
 LOST = 0.2
 """Share of the time in which nobody has green, or nobody makes use of a gap."""
+MEETING = 800.0
+"""Vehicles per hour that a junction without a light carries in all if its ways have one lane each:
+above that, ways of which none has priority lock each other up in SUMO."""
 SPARE = 0.7
 """Share of what a way into a junction carries that a day's demand uses of it at most."""
 ROUNDS = 200
 """Rounds of making fewer trips past busy junctions and more elsewhere."""
+OFTEN = 5.0
+"""Times as often as on average that a trip is made at most, however free its way is."""
 STEP = 0.9
 """Times the trips, if the junctions do not carry so many."""
 
@@ -133,18 +138,19 @@ def balanced(uses: sparse.csr_array, most: FloatArray, total: float) -> FloatArr
     -------
     Shape ``(trips,)``; ``None`` if that many cannot be reached.
     """
-    weights = np.full(uses.shape[0], total / uses.shape[0])
+    even = total / uses.shape[0]
+    weights = np.full(uses.shape[0], even)
     passes = np.flatnonzero(np.diff(uses.indptr))
     for _ in range(ROUNDS):
         room = most / np.maximum(uses.T @ weights, 1e-9)
-        if room.min() >= 1.0 / 1.01:
+        if room.min() >= 1.0 / 1.01 and weights.sum() >= 0.99 * total:
             return weights
         limits = np.ones(len(weights))
         limits[passes] = np.minimum.reduceat(
             np.minimum(room, 1.0)[uses.indices], uses.indptr[passes]
         )
         weights = weights * limits
-        weights *= total / weights.sum()
+        weights = np.minimum(weights * (total / weights.sum()), OFTEN * even)
     return None
 
 
@@ -168,30 +174,29 @@ def peak_share(day: str) -> float:
 def ways_in(sumo_map: SumoMap) -> dict[str, float]:
     """Vehicles per hour that each way into a junction carries, by its place.
 
-    A lane lets off :data:`SATURATION` vehicles per hour of green. The ways into a junction share
-    the time that is not lost: by the stages of its light, or, without one, by their number.
+    A lane lets off :data:`SATURATION` vehicles per hour of green, and the stages of a light share
+    the time that is not lost. Where three ways or more meet without a light they share
+    :data:`MEETING`; two simply take turns.
     """
     graph = sumo_map.graph
     ids, kinds = graph.segments.ids, graph.segments.kinds
     junctions = {str(name) for name, kind in zip(ids, kinds, strict=True) if kind == "junction"}
-    stages = {
-        f"j{name}": len(light.green)
-        for light in scenario_lights(sumo_map.lights)
-        for name in light.names
-    }
+    lights = scenario_lights(sumo_map.lights)
+    stages = {f"j{name}": len(light.green) for light in lights for name in light.names}
     before: dict[str, list[str]] = {name: [] for name in junctions}
     for one, others in transitions(graph).items():
         for other in others & junctions:
             before[other].append(one)
     lanes = _lanes_between(sumo_map)
-    return {
-        f"{one}>{junction}": lanes[one, junction]
-        * SATURATION
-        * (1.0 - LOST)
-        / max(stages.get(junction, len(ones)), 1)
-        for junction, ones in before.items()
-        for one in ones
-    }
+    carried: dict[str, float] = {}
+    for junction, ones in before.items():
+        shared = SATURATION * (1.0 - LOST) / max(stages.get(junction, len(ones)), 1)
+        for one in ones:
+            own = lanes[one, junction] * shared
+            if junction not in stages and len(ones) > 2:
+                own = lanes[one, junction] * MEETING / len(ones)
+            carried[f"{one}>{junction}"] = own
+    return carried
 
 
 def _lanes_between(sumo_map: SumoMap) -> Counter[tuple[str, str]]:
