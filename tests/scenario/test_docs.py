@@ -1,7 +1,9 @@
+import json
 import re
 from pathlib import Path
 
 from odscen.scenario.config import SamplingConfig, loads_config
+from odscen.scenario.document import Demand
 from odscen.scenario.files import loads
 
 ROOT = Path(__file__).parents[2]
@@ -38,3 +40,9 @@ def test_every_code_of_the_checks_is_listed_in_the_guide() -> None:
     guide = (DOCS / "scenario-format.md").read_text(encoding="utf-8")
     assert len(used) > 20
     assert sorted(name for name in used if f"`{name}`" not in guide) == []
+
+
+def test_the_example_of_demand_is_one() -> None:
+    example = json.loads("{" + block("demand.md", "json") + "}")["demand"]
+    demand = Demand.model_validate_json(json.dumps(example), strict=True)
+    assert [part.id for _, part in demand.parts] == ["commuters", "survey", "others"]
