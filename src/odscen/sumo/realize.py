@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -213,7 +213,9 @@ class _Writer:
         if user.person:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
-        return self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        # A trip ends in a segment, not on a lane of it: nobody has to stop for a lane change.
+        return replace(route, arrival_lane=None) if user.trip else route
 
     def _write(self, user: RoadUser, body: Body, manner: Driver, way: _Way) -> PlannedActor:
         if way.route is None:

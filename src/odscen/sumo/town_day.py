@@ -36,7 +36,7 @@ SATURATION = 1800.0
 """Vehicles per hour that a lane lets off while it has green, the textbook's value."""
 LOST = 0.2
 """Share of the time in which nobody has green, or nobody makes use of a gap."""
-MEETING = 800.0
+MEETING = 600.0
 """Vehicles per hour that a junction without a light carries in all if its ways have one lane each:
 above that, ways of which none has priority lock each other up in SUMO."""
 SPARE = 0.7
