@@ -86,6 +86,22 @@ def read_scenario(path: Path) -> Scenario:
     return read_any(content, file=str(path))
 
 
+def write_scenario(scenario: Scenario, path: Path) -> Path:
+    """Write a scenario, as JSON document.
+
+    Raises
+    ------
+    InputError
+        If the file is of the graph form, which has its own way of writing.
+    WorkspaceError
+        If it cannot be written.
+    """
+    if path.suffix == ".graphml":
+        msg = "the graph form is written by: odscen export --to graphml; name a .json file"
+        raise InputError(msg, file=str(path))
+    return write_text(path, dumps(scenario))
+
+
 def scenario_files(paths: Iterable[Path]) -> list[Path]:
     """Scenario files named, and all ``*.scenario.json`` in the folders named, sorted."""
     found: list[Path] = []

@@ -148,3 +148,31 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
         assert router.has_goals(spawn) == bool(candidates)
         reached = set(np.flatnonzero(router.reachable(spawn)).tolist()) - {spawn}
         assert {goal for goal in reached if router.is_candidate(spawn, goal)} == candidates
+
+
+def test_ways_to_a_node_are_as_long_as_those_from_each_source() -> None:
+    graph = fork()
+    router = Router(graph)
+    nodes = np.arange(len(graph.lanes.x))
+    goal = int(nodes[-1])
+    ways = router.ways_to(goal)
+    for source, path, metres in zip(
+        nodes.tolist(), ways.paths(nodes), ways.distance(nodes).tolist(), strict=True
+    ):
+        assert metres == pytest.approx(float(router.distances(source)[goal]))
+        assert len(path) == len(router.path(source, goal))
+        marks, first = ways.stretches(np.array([source]), graph.lanes.segment)
+        if len(path):
+            segments = graph.lanes.segment[path]
+            changes = np.flatnonzero(np.diff(segments, prepend=-1))
+            assert marks[0].tolist() == segments[changes].tolist()
+            assert first[0].tolist() == path[changes].tolist()
+
+
+def test_what_can_be_reached_from_many_is_what_each_reaches() -> None:
+    graph = fork()
+    router = Router(graph)
+    nodes = np.arange(0, len(graph.lanes.x), 3)
+    row, table = router.reach(nodes, nodes)
+    each = np.array([router.reachable(node)[nodes] for node in nodes.tolist()])
+    assert (table[row] == each).all()

@@ -5,12 +5,18 @@ from hypothesis import strategies as st
 from odscen.categories import Category
 from odscen.scenario.document import (
     Actor,
+    Background,
+    Counts,
+    Demand,
     Environment,
     Flow,
     JunctionTiming,
     MapReference,
+    Matrix,
+    Profile,
     Scenario,
     Signals,
+    Zone,
 )
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -61,6 +67,58 @@ timings = st.builds(
     green=st.lists(st.floats(0, 3600), max_size=3).map(tuple),
 )
 signals = st.builds(Signals, control=controls, junctions=st.lists(timings, max_size=3).map(tuple))
+identifiers = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True)
+mixes = st.dictionaries(
+    st.sampled_from(Category), st.floats(0, 1e3, exclude_min=True), min_size=1, max_size=3
+)
+numbers = st.floats(0, 1e6)
+windows = {
+    "id": identifiers,
+    "begin": st.floats(0, 1e6),
+    "end": st.none() | st.floats(0, 1e6),
+    "profile": st.none() | identifiers,
+    "mix": mixes,
+}
+demands = st.builds(
+    Demand,
+    clock=st.floats(0, 86_399),
+    zones=st.lists(
+        st.builds(
+            Zone, id=identifiers, segments=st.lists(labels, min_size=1, max_size=3).map(tuple)
+        ),
+        max_size=2,
+    ).map(tuple),
+    profiles=st.lists(
+        st.builds(
+            Profile,
+            id=identifiers,
+            shares=st.lists(st.floats(0.5, 10), min_size=1, max_size=4).map(tuple),
+        ),
+        max_size=2,
+    ).map(tuple),
+    matrices=st.lists(
+        st.builds(
+            Matrix,
+            **windows,
+            trips=st.lists(st.tuples(labels, labels, numbers), min_size=1, max_size=3).map(tuple),
+        ),
+        max_size=2,
+    ).map(tuple),
+    counts=st.lists(
+        st.builds(
+            Counts,
+            id=identifiers,
+            mix=mixes,
+            rows=st.lists(st.tuples(labels, numbers, numbers, numbers), min_size=1, max_size=3).map(
+                tuple
+            ),
+        ),
+        max_size=2,
+    ).map(tuple),
+    background=st.lists(
+        st.builds(Background, **windows, per_km=st.floats(0.5, 100)), max_size=2
+    ).map(tuple),
+)
 scenarios = st.builds(
     Scenario,
     name=labels,
@@ -72,4 +130,5 @@ scenarios = st.builds(
     actors=st.lists(actors, max_size=4).map(tuple),
     flows=st.lists(flows, max_size=3).map(tuple),
     signals=signals,
+    demand=demands,
 )

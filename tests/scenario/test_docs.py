@@ -1,7 +1,9 @@
+import json
 import re
 from pathlib import Path
 
 from odscen.scenario.config import SamplingConfig, loads_config
+from odscen.scenario.document import Demand
 from odscen.scenario.files import loads
 
 ROOT = Path(__file__).parents[2]
@@ -31,10 +33,16 @@ def test_the_example_configuration_can_be_read_and_states_the_defaults() -> None
 def test_every_code_of_the_checks_is_listed_in_the_guide() -> None:
     sources = [
         ROOT / "src/odscen/scenario" / name
-        for name in ("checks.py", "actor_checks.py", "signals.py")
+        for name in ("checks.py", "actor_checks.py", "demand_checks.py", "signals.py")
     ]
     code = re.compile(r"(?:error|warning)\(\s*\"([a-z_]+)\"")
     used = {name for path in sources for name in code.findall(path.read_text(encoding="utf-8"))}
     guide = (DOCS / "scenario-format.md").read_text(encoding="utf-8")
     assert len(used) > 20
     assert sorted(name for name in used if f"`{name}`" not in guide) == []
+
+
+def test_the_example_of_demand_is_one() -> None:
+    example = json.loads("{" + block("demand.md", "json") + "}")["demand"]
+    demand = Demand.model_validate_json(json.dumps(example), strict=True)
+    assert [part.id for _, part in demand.parts] == ["commuters", "survey", "others"]

@@ -13,6 +13,7 @@ import typer
 from odscen import __version__
 from odscen.cli.assets import app as assets
 from odscen.cli.cosim import cosim
+from odscen.cli.demand import app as demand
 from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
@@ -34,6 +35,7 @@ app = typer.Typer(
 maps.command()(pull)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
+app.add_typer(demand, name="demand")
 app.command()(generate)
 app.command()(check)
 app.command()(export)

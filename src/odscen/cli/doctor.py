@@ -66,7 +66,7 @@ def _package(name: str, *, needed: bool, advice: str) -> dict[str, Any]:
 def _sumo() -> dict[str, Any]:
     advice = "pip install 'eclipse-sumo>=1.28,<1.29'"
     try:
-        import sumo  # type: ignore[import-untyped]
+        import sumo
     except ImportError:
         return _check("sumo", shutil.which("sumo"), needed=True, advice=advice)
     return _check("sumo", str(Path(sumo.SUMO_HOME) / "bin" / "sumo"), needed=True, advice=advice)

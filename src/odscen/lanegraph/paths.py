@@ -18,6 +18,8 @@ from odscen.errors import InputError
 from odscen.lanegraph.query import node_id, walk_node_id
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from odscen.lanegraph.model import BoolArray, FloatArray, IntArray, MapGraph
 
 MIN_EDGE_LENGTH = 1e-6
@@ -79,6 +81,20 @@ class _PathFinder:
             steps.append(before)
         return self.nodes[steps[::-1]].astype(np.int32)
 
+    def ways_to(self, target: int) -> WaysTo:
+        """Shortest ways from everywhere to one node, for many sources with the same target."""
+        distances, nexts = csgraph.dijkstra(
+            self._reversed,
+            directed=self._directed,
+            indices=np.asarray(self._local[target]),
+            return_predecessors=True,
+        )
+        return WaysTo(self.nodes, self._local, distances, nexts)
+
+    @cached_property
+    def _reversed(self) -> sparse.csr_matrix[np.float64]:
+        return self._matrix.T.tocsr()
+
     def leads(self, sources: IntArray, targets: IntArray) -> BoolArray:
         """Whether a way leads from each source to the target in the same place; shape ``(K,)``.
 
@@ -87,15 +103,43 @@ class _PathFinder:
         starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
         if not self._directed:
             return np.asarray(starts == ends, dtype=np.bool_)
-        columns = {part: k for k, part in enumerate(np.unique(ends).tolist())}
-        reached: dict[int, int] = {}  # a bit per column
+        reached, columns = self._reached(ends)
+        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+
+    def reach(self, sources: IntArray, targets: IntArray) -> tuple[IntArray, BoolArray]:
+        """Which of the targets each source can get to.
+
+        Returns
+        -------
+        For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
+        the same can be reached share one. Nobody needs a way from a node to itself: it counts.
+        """
+        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
+        parts, rows = np.unique(starts, return_inverse=True)
+        row = rows.astype(np.int32)
+        if not self._directed:
+            return row, np.equal.outer(parts, ends)
+        reached, columns = self._reached(ends)
+        table = np.zeros((len(parts), len(columns)), dtype=np.bool_)
+        for index, part in enumerate(parts.tolist()):
+            bits = reached[part]
+            while bits:
+                low = bits & -bits
+                table[index, low.bit_length() - 1] = True
+                bits ^= low
+        return row, table[:, [columns[part] for part in ends.tolist()]]
+
+    def _reached(self, parts: IntArray) -> tuple[dict[int, int], dict[int, int]]:
+        """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
+        columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
+        reached: dict[int, int] = {}
         for part in graphlib.TopologicalSorter(self._part_successors).static_order():
             bits = 1 << columns[part] if part in columns else 0
             for after in self._part_successors[part]:
                 bits |= reached[after]
             reached[part] = bits
-        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
-        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+        return reached, columns
 
     def has_goals(self, spawn: int) -> bool:
         """Whether there is any goal candidate: whether anything can be reached."""
@@ -191,6 +235,77 @@ class _PathFinder:
         hits = np.flatnonzero((away == np.repeat(farthest, sizes)) & (away >= 0))
         _, first = np.unique(self._lane[hits], return_index=True)
         return np.sort(self.nodes[hits[first]]).astype(np.int32)
+
+
+class WaysTo:
+    """Shortest ways to one node, found at once; nodes are numbered as the whole map's.
+
+    Attributes
+    ----------
+    distances
+        Metres from each node of ``nodes``; inf where no way leads.
+    """
+
+    def __init__(
+        self,
+        nodes: NDArray[np.integer],
+        local: NDArray[np.integer],
+        distances: FloatArray,
+        nexts: IntArray,
+    ) -> None:
+        self.nodes = nodes
+        self.distances = distances
+        self._local = local
+        self._next = nexts
+
+    def distance(self, sources: IntArray) -> FloatArray:
+        """Metres from each source, which lies in the region."""
+        return np.asarray(self.distances[self._local[sources]], dtype=np.float64)
+
+    def paths(self, sources: IntArray) -> list[IntArray]:
+        """Nodes of the way from each source, both ends included; empty where there is none."""
+        current = self._local[sources]
+        steps = [current]
+        counts = np.ones(len(sources), dtype=np.intp)
+        while (going := self._next[current] != _NO_PREDECESSOR).any():
+            current = np.where(going, self._next[current], current)
+            counts += going
+            steps.append(current)
+        counts[~np.isfinite(self.distances[steps[0]])] = 0
+        table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
+        return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
+
+    def stretches(
+        self, sources: NDArray[np.integer], marks: IntArray
+    ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+        """Follow the marks of the nodes along each way, each run of equal ones once.
+
+        Parameters
+        ----------
+        marks
+            A number from 0 on for each node of the map, such as the row of its segment.
+
+        Returns
+        -------
+        Marks in the order in which they are met, and the first node with each: two arrays of shape
+        ``(len(sources), most)``, with -1 behind the end of a way.
+        """
+        after = self._after(marks)
+        steps = [self._local[sources]]
+        while (steps[-1] >= 0).any():
+            steps.append(np.where(steps[-1] >= 0, after[steps[-1]], -1))
+        table = np.stack(steps[:-1], axis=1)
+        nodes = np.where(table >= 0, self.nodes[table], -1)
+        return np.where(table >= 0, marks[nodes], -1), nodes
+
+    def _after(self, marks: IntArray) -> NDArray[np.integer]:
+        """First node on the way from each node of the region that has another mark, or -1."""
+        mark = marks[self.nodes]
+        jump = np.where(self._next == _NO_PREDECESSOR, np.arange(len(mark)), self._next)
+        # Pointers are doubled: as many rounds as the logarithm of the longest stretch.
+        while (going := (mark[jump] == mark) & (jump[jump] != jump)).any():
+            jump = np.where(going, jump[jump], jump)
+        return np.where(mark[jump] != mark, jump, -1)
 
 
 class Router(_PathFinder):

@@ -13,6 +13,7 @@ from odscen.scenario.actor_checks import (
     flow_problems,
 )
 from odscen.scenario.bodies import Crowd, box_at
+from odscen.scenario.demand_checks import demand_problems
 from odscen.scenario.problems import Problem, error, warning
 from odscen.scenario.region import Region
 from odscen.scenario.signals import signal_problems
@@ -66,6 +67,7 @@ def check(
         found += actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):
         found += flow_problems(scenario, region, index)
+    found += demand_problems(scenario, region)
     if lights is not None:
         found += signal_problems(scenario.signals, lights)
     found += shared_nodes(scenario)
@@ -112,16 +114,20 @@ def shared_nodes(scenario: Scenario) -> Iterator[Problem]:
 
 
 def duplicate_ids(scenario: Scenario) -> Iterator[Problem]:
-    """Yield ids that more than one actor or flow has."""
+    """Yield ids that more than one actor, flow or part of the demand has."""
     seen: dict[str, str] = {}
-    for kind in ("actors", "flows"):
-        for index, one in enumerate(getattr(scenario, kind)):
-            where = f"{kind}[{index}].id"
-            if one.id in seen:
-                message = f"id {one.id!r} is taken by {seen[one.id]}; give one of them another"
-                yield error("duplicate_id", where, message)
-            else:
-                seen[one.id] = where
+    placed = [
+        (f"{kind}[{index}]", one)
+        for kind in ("actors", "flows")
+        for index, one in enumerate(getattr(scenario, kind))
+    ]
+    for place, one in (*placed, *scenario.demand.parts):
+        where = f"{place}.id"
+        if one.id in seen:
+            message = f"id {one.id!r} is taken by {seen[one.id]}; give one of them another"
+            yield error("duplicate_id", where, message)
+        else:
+            seen[one.id] = where
 
 
 def _document_problems(scenario: Scenario) -> Iterator[Problem]:
@@ -130,7 +136,7 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
     if len(egos) > 1:
         message = f"{', '.join(map(repr, egos))} are all the ego; keep one"
         yield error("several_egos", "actors", message)
-    if not scenario.actors and not scenario.flows:
+    if not scenario.actors and not scenario.flows and not scenario.demand.parts:
         yield warning(
             "no_actors", "actors", "there are neither actors nor flows; nothing will move"
         )

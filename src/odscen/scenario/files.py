@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
+OPTIONAL = ("demand", "signals")
+"""Fields of a scenario that are left out where they have their default value."""
+
 _SHOWN = 60
 """Longest piece of a wrong value that is quoted in a message."""
 
@@ -47,22 +50,24 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
 
 
 def dumps(scenario: Scenario) -> str:
-    """Write a scenario document as JSON: fields in fixed order, one actor or flow per line.
+    """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
 
-    Fields of actors and flows that have their default value are left out, and so are signals that
-    are all the map's. The same scenario gives the same text, and :func:`loads` gives the same
-    scenario back.
+    Fields of actors, flows and demand that have their default value are left out, and so are
+    signals that are all the map's. The same scenario gives the same text, and :func:`loads` gives
+    the same scenario back.
     """
-    data = scenario.model_dump(mode="json")
-    for key in ("actors", "flows"):
-        parts = getattr(scenario, key)
-        data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
-    signals = scenario.signals.model_dump(mode="json", exclude_defaults=True)
-    if signals:
-        data["signals"] = signals
-    else:
-        del data["signals"]
-    fields = [f"  {json.dumps(key)}: {_layout(key, value)}" for key, value in data.items()]
+    data = scenario.model_dump(mode="json", exclude={"actors", "flows", "demand"})
+    for key in type(scenario).model_fields:
+        if key in ("actors", "flows"):
+            parts = getattr(scenario, key)
+            data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
+        elif key in OPTIONAL:
+            data[key] = getattr(scenario, key).model_dump(mode="json", exclude_defaults=True)
+    fields = [
+        f"  {json.dumps(key)}: {_layout(key, data[key])}"
+        for key in type(scenario).model_fields
+        if key not in OPTIONAL or data[key]
+    ]
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
 
@@ -109,12 +114,31 @@ def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
 
 
 def _layout(key: str, value: object) -> str:
+    if key == "demand" and isinstance(value, dict):
+        fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
+        return "{\n" + ",\n".join(fields) + "\n  }"
     if isinstance(value, list) and value:
         lines = [json.dumps(part, ensure_ascii=False) for part in value]
         if key == "roi":
             return "[" + ", ".join(lines) + "]"
         return "[\n    " + ",\n    ".join(lines) + "\n  ]"
     return json.dumps(value, ensure_ascii=False)
+
+
+def _parts(value: object) -> str:
+    """Lay out parts of the demand: each on a line, and each row of a table on one of its own."""
+    if not isinstance(value, list) or not value:
+        return json.dumps(value, ensure_ascii=False)
+    lines = []
+    for part in value:
+        line = json.dumps(part, ensure_ascii=False)
+        rows = part.get("rows") or part.get("trips")
+        if isinstance(rows, list):
+            whole = json.dumps(rows, ensure_ascii=False)
+            split = ",\n        ".join(json.dumps(row, ensure_ascii=False) for row in rows)
+            line = line.replace(whole, f"[\n        {split}\n      ]")
+        lines.append(line)
+    return "[\n      " + ",\n      ".join(lines) + "\n    ]"
 
 
 def _problem(details: ErrorDetails) -> str:

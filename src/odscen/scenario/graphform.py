@@ -21,7 +21,7 @@ from odscen.errors import ScenarioError
 from odscen.lanegraph.files import to_networkx
 from odscen.scenario.checks import duplicate_ids, map_problems, roi_problems, shared_nodes
 from odscen.scenario.document import FORMAT, VERSION, Actor, Flow, MapReference, Scenario
-from odscen.scenario.files import validated
+from odscen.scenario.files import OPTIONAL, validated
 from odscen.scenario.graphml import read_graphml, write_graphml
 from odscen.scenario.problems import refuse_errors
 from odscen.scenario.region import Region
@@ -38,7 +38,7 @@ _One = TypeVar("_One", bound=Actor | Flow)
 GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
-_JSON = ("roi", "environment", "signals", "simulation")
+_JSON = ("roi", "environment", "demand", "signals", "simulation")
 """Graph attributes that hold JSON."""
 
 
@@ -111,8 +111,9 @@ def from_graphml(text: str, *, file: str | None = None) -> Scenario:
 
 def _about(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
-    data["signals"] = scenario.signals.model_dump(mode="json", exclude_defaults=True)
-    held = [name for name in _JSON if name != "signals" or data[name]]
+    for name in OPTIONAL:
+        data[name] = getattr(scenario, name).model_dump(mode="json", exclude_defaults=True)
+    held = [name for name in _JSON if name not in OPTIONAL or data[name]]
     return {
         "format": FORMAT,
         "version": VERSION,

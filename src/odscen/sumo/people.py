@@ -1,7 +1,8 @@
-"""Who is on the road: the scenario's actors, and those of its flows one by one.
+"""Who is on the road: the scenario's actors, and those of its flows and demand one by one.
 
-Flows are drawn here rather than left to SUMO, so that each of their vehicles has its own category,
-goal and speed factor, written down and the same for the same seed.
+They are drawn here rather than left to SUMO and its tools (flows, od2trips), so that each vehicle
+has its own category, start, goal and speed factor, written down, the same for the same seed and
+independent of what else is in the scenario.
 """
 
 from __future__ import annotations
@@ -9,16 +10,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.categories import Category
+from odscen.scenario.counting import observations
 from odscen.scenario.goals import flow_goals, resolve_goals, stream
+from odscen.scenario.profiles import curve
 from odscen.scenario.region import place_of
+from odscen.scenario.trips import background_trips, matrix_trips
+from odscen.scenario.zones import Ground
+from odscen.sumo.counts import counted_trips
+from odscen.sumo.passages import planned_passages
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Iterable, Sequence
 
     from odscen.lanegraph.model import IntArray, MapGraph
     from odscen.scenario.document import DrivingStyle, Flow, Scenario
+    from odscen.scenario.profiles import Curve
     from odscen.scenario.region import Region
+    from odscen.scenario.supply import Usable
+    from odscen.scenario.trips import Trips
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +38,8 @@ class RoadUser:
     """One vehicle or person with everything decided; ``spawn`` and ``goal`` are node indices.
 
     They count on the pedestrian graph for pedestrians and on the lane graph for everybody else.
+    ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
+    of the demand: many share a goal, so their ways are found from there.
     """
 
     id: str
@@ -40,6 +54,7 @@ class RoadUser:
     flow: str | None = None
     ego: bool = False
     ignores_red: bool = False
+    trip: bool = False
 
     @property
     def person(self) -> bool:
@@ -79,30 +94,39 @@ def road_users(
         for flow in scenario.flows:
             spawn = _node(graph, flow.spawn)
             users += flow_users(
-                flow, seed=scenario.seed, spawn=spawn, goals=candidates[flow.id], until=until
+                flow,
+                seed=scenario.seed,
+                spawn=spawn,
+                goals=candidates[flow.id],
+                until=until,
+                day=None if flow.profile is None else curve(scenario.demand, flow.profile),
             )
     return tuple(sorted(users, key=lambda user: (user.depart, user.id)))
 
 
 def flow_users(
-    flow: Flow, *, seed: int, spawn: int, goals: IntArray, until: float
+    flow: Flow, *, seed: int, spawn: int, goals: IntArray, until: float, day: Curve | None = None
 ) -> list[RoadUser]:
     """Members of a flow: a Poisson stream, that is, headways are exponentially distributed.
 
     The count in the flow's window is then random too, ``per_hour`` on average. Member ``k`` is
     named ``<flow>.<k>``; those after ``until`` are left out, and change nothing about those before.
+    With a day profile, the stream is even in the integral of its factor instead of in time.
     """
     random = stream(seed, "flow", flow.id)
     categories = sorted(flow.mix)
     shares = [flow.mix[category] for category in categories]
     users: list[RoadUser] = []
-    depart = flow.begin
+    passed, last = flow.begin, min(flow.end, until)
+    if day is not None:
+        passed, last = day.amount(passed), day.amount(last)
     while True:
-        depart += float(random.exponential(3600.0 / flow.per_hour))
+        passed += float(random.exponential(3600.0 / flow.per_hour))
         category = _pick(random, categories, shares)
         goal = int(goals[int(random.integers(len(goals)))])
-        if depart >= min(flow.end, until):
+        if passed >= last:
             return users
+        depart = passed if day is None else float(day.times(np.array([passed]))[0])
         users.append(
             RoadUser(
                 id=f"{flow.id}.{len(users)}",
@@ -114,6 +138,67 @@ def flow_users(
                 flow=flow.id,
             )
         )
+
+
+def demand_users(
+    scenario: Scenario,
+    region: Region,
+    usable: Usable,
+    placed: Sequence[RoadUser],
+    *,
+    until: float,
+) -> tuple[list[RoadUser], list[str]]:
+    """Members of the scenario's demand who depart before ``until``, and what of it is not met.
+
+    Counts come last: they are made up for what everybody else, ``placed`` and the rest of the
+    demand, leaves of them.
+    """
+    taken = [place for actor in scenario.actors if (place := region.place(actor.spawn))]
+    ground = Ground(region, usable, taken=taken)
+    users: list[RoadUser] = []
+    unmet: list[str] = []
+
+    def add(part: Iterable[Trips]) -> None:
+        for trips in part:
+            users.extend(trip_users(trips, until=until))
+            if trips.unmet:
+                unmet.append(f"{trips.name}: {trips.unmet} trips left out: {trips.why}")
+
+    for matrix in scenario.demand.matrices:
+        add(matrix_trips(scenario, ground, matrix))
+    for background in scenario.demand.background:
+        add(background_trips(scenario, ground, background, usable))
+    if scenario.demand.counts:
+        others = [*placed, *users]
+        seen = observations(scenario.demand)
+        passages = planned_passages(others, region, ground.router, seen)
+        for counts in scenario.demand.counts:
+            add(counted_trips(scenario, ground, counts, passages))
+    return users, unmet
+
+
+def trip_users(trips: Trips, *, until: float) -> list[RoadUser]:
+    """Members of some trips who depart before ``until``."""
+    rows = zip(
+        trips.categories,
+        trips.starts.tolist(),
+        trips.goals.tolist(),
+        trips.departs.tolist(),
+        strict=True,
+    )
+    return [
+        RoadUser(
+            id=f"{trips.name}.{number}",
+            category=category,
+            spawn=start,
+            goal=goal,
+            depart=depart,
+            flow=trips.part,
+            trip=True,
+        )
+        for number, (category, start, goal, depart) in enumerate(rows)
+        if depart < until
+    ]
 
 
 def _pick(random: np.random.Generator, categories: list[Category], shares: list[float]) -> Category:

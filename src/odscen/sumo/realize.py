@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,15 +26,17 @@ from odscen.sumo.config import RunSettings, sumo_config
 from odscen.sumo.demand import Demand
 from odscen.sumo.driving import KINDS, draw_factor, driver
 from odscen.sumo.layout import CONFIG_FILE, REGION_FILE, ROUTES_FILE, SIGNALS_FILE
-from odscen.sumo.people import RoadUser, road_users
+from odscen.sumo.paths import each_path
+from odscen.sumo.people import RoadUser, demand_users, road_users
 from odscen.sumo.recording import Recording, region_xml
-from odscen.sumo.routes import NoRouteError, RoutePlanner
+from odscen.sumo.routes import NoRouteError, Route, RoutePlanner
 from odscen.sumo.signals import scenario_lights, signals_xml
-from odscen.sumo.walks import WalkPlanner
+from odscen.sumo.usable import usable_places
+from odscen.sumo.walks import Walk, WalkPlanner
 from odscen.sumo.weather import NO_EFFECT, weather_effect
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.lanegraph.model import IntArray
     from odscen.scenario.document import Environment, Scenario
@@ -61,7 +63,7 @@ class Realization:
     """SUMO files by name, the plan, and what could not be done as designed.
 
     ``problems`` name actors that are in the plan but not in the files, because the SUMO network has
-    no way for them; ``notes`` name routes that had to be repaired.
+    no way for them; ``notes`` name routes that had to be repaired, and demand that was not met.
     """
 
     files: dict[str, str]
@@ -111,11 +113,11 @@ def realize(
     until = scenario.simulation.duration if until is None else until
     step_length = scenario.simulation.step_length if step_length is None else step_length
     region = Region.of(sumo_map.graph, scenario.roi)
-    users = road_users(scenario, sumo_map.graph, region, until=until)
+    users, unmet = everybody(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if weather else NO_EFFECT
     writer = _Writer(sumo_map, region, assets, scenario.seed, effect)
-    planned = tuple(writer.add(user) for user in users)
+    planned = writer.add(users)
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -141,11 +143,38 @@ def realize(
         files[SIGNALS_FILE] = signals
     if recording.region is not None:
         files[REGION_FILE] = region_xml(recording.region, sumo_map.net_offset)
-    return Realization(files, plan, tuple(writer.problems), tuple(writer.notes))
+    return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+
+
+def everybody(
+    scenario: Scenario, sumo_map: SumoMap, region: Region, *, until: float
+) -> tuple[tuple[RoadUser, ...], list[str]]:
+    """Road users of a scenario by departure, then id, and what of its demand is not met.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    users = road_users(scenario, sumo_map.graph, region, until=until)
+    if not scenario.demand.parts:
+        return users, []
+    usable = usable_places(sumo_map)
+    more, unmet = demand_users(scenario, region, usable, users, until=until)
+    return tuple(sorted((*users, *more), key=lambda user: (user.depart, user.id))), unmet
+
+
+class _Way(NamedTuple):
+    """How somebody gets to the goal; metres and seconds. Without a route, the problem says why."""
+
+    route: Route | Walk | None
+    problem: str | None
+    length: float
+    free_flow_time: float | None
 
 
 class _Writer:
-    """Adds road users to the demand one by one; collects what could not be done."""
+    """Adds road users to the demand; collects what could not be done."""
 
     def __init__(
         self,
@@ -168,42 +197,49 @@ class _Writer:
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
         self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
 
-    def add(self, user: RoadUser) -> PlannedActor:
-        """Write one road user and return the plan for it."""
-        body = self._body(user)
-        manner = self._driver(user, body)
-        path = self._path(user)
-        problem = None
-        try:
-            repairs = self._write(user, body, manner, path)
-        except NoRouteError as error:
-            problem = str(error)
-            self.problems.append(f"{user.id}: {error}")
-        else:
-            self.notes += [f"{user.id}: {repair}" for repair in repairs]
-        return self._planned(user, body, manner, path, problem)
+    def add(self, users: Sequence[RoadUser]) -> tuple[PlannedActor, ...]:
+        """Write road users in their order and return the plan for them.
 
-    def _path(self, user: RoadUser) -> IntArray:
-        """Return the shortest way inside the region; over lanes that SUMO has, if there is one."""
-        if user.person:
-            return self._region.walk_router.path(user.spawn, user.goal)
-        if self._drivable.mask[user.spawn]:
-            path = self._drivable.path(user.spawn, user.goal)
-            if len(path):
-                return path
-        return self._region.router.path(user.spawn, user.goal)
-
-    def _write(self, user: RoadUser, body: Body, manner: Driver, path: IntArray) -> tuple[str, ...]:
-        if user.person:
-            walk = self._walks.plan(path, length=body.length, lateral_offset=user.lateral_offset)
-            self.demand.add_walk(user, manner, walk)
-            return walk.repairs
-        vclass = KINDS[user.category].vclass
-        route = self._routes.plan(
-            path, length=body.length, vclass=vclass, lateral_offset=user.lateral_offset
+        Ways are found in another order, those from one spawn or to one goal together.
+        """
+        bodies = [self._body(user) for user in users]
+        manners = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
+        ways: dict[int, _Way] = {}
+        for index, path in each_path(users, self._region, self._drivable):
+            ways[index] = self._way(users[index], bodies[index], manners[index], path)
+        return tuple(
+            self._write(user, body, manner, ways[index])
+            for index, (user, body, manner) in enumerate(zip(users, bodies, manners, strict=True))
         )
-        self.demand.add_vehicle(user, manner, route)
-        return route.repairs
+
+    def _way(self, user: RoadUser, body: Body, manner: Driver, path: IntArray) -> _Way:
+        steps = self._steps(user, path)
+        length = float(np.sum(steps))
+        duration = self._free_flow_time(user, manner, path, steps)
+        try:
+            return _Way(self._route(user, body, path), None, length, duration)
+        except NoRouteError as error:
+            return _Way(None, str(error), length, duration)
+
+    def _route(self, user: RoadUser, body: Body, path: IntArray) -> Route | Walk:
+        offset = user.lateral_offset
+        if user.person:
+            return self._walks.plan(path, length=body.length, lateral_offset=offset)
+        vclass = KINDS[user.category].vclass
+        route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        # A trip ends in a segment, not on a lane of it: nobody has to stop for a lane change.
+        return replace(route, arrival_lane=None) if user.trip else route
+
+    def _write(self, user: RoadUser, body: Body, manner: Driver, way: _Way) -> PlannedActor:
+        if way.route is None:
+            self.problems.append(f"{user.id}: {way.problem}")
+        else:
+            if isinstance(way.route, Walk):
+                self.demand.add_walk(user, manner, way.route)
+            else:
+                self.demand.add_vehicle(user, manner, way.route)
+            self.notes += [f"{user.id}: {repair}" for repair in way.route.repairs]
+        return self._planned(user, body, manner, way)
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
@@ -224,14 +260,11 @@ class _Writer:
             known = self._assets.dimensions(user.model)
         return DEFAULT_BODY[user.category] if known is None else known
 
-    def _planned(
-        self, user: RoadUser, body: Body, manner: Driver, path: IntArray, problem: str | None
-    ) -> PlannedActor:
+    def _planned(self, user: RoadUser, body: Body, manner: Driver, way: _Way) -> PlannedActor:
         graph = self._graph.walks if user.person else self._graph.lanes
         name = walk_node_id if user.person else node_id
         spawn = user.spawn
         hdg = float(graph.hdg[spawn])
-        length = float(np.sum(self._steps(user, path)))
         return PlannedActor(
             id=user.id,
             category=user.category.value,
@@ -246,12 +279,12 @@ class _Writer:
             hdg=hdg,
             speed=user.speed,
             speed_factor=manner.speed_factor,
-            route_length=length,
-            free_flow_time=self._free_flow_time(user, manner, path),
+            route_length=way.length,
+            free_flow_time=way.free_flow_time,
             model=user.model,
             flow=user.flow,
             ego=user.ego,
-            problem=problem,
+            problem=way.problem,
         )
 
     def _steps(self, user: RoadUser, path: IntArray) -> np.ndarray:
@@ -259,14 +292,15 @@ class _Writer:
         graph = self._graph.walks if user.person else self._graph.lanes
         return np.hypot(np.diff(graph.x[path]), np.diff(graph.y[path]))
 
-    def _free_flow_time(self, user: RoadUser, manner: Driver, path: IntArray) -> float | None:
+    def _free_flow_time(
+        self, user: RoadUser, manner: Driver, path: IntArray, steps: np.ndarray
+    ) -> float | None:
         """Seconds along the path at the speed the actor wants, from standing.
 
         ``sum(ds / v) + v0 / (2 a)``: the second term is what getting up to the first speed costs.
         """
         if len(path) < 2:
             return None
-        steps = self._steps(user, path)
         if user.person:
             return float(np.sum(steps)) / manner.max_speed
         limit = self._graph.lanes.speed_limit[path[:-1]]

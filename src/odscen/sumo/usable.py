@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ REACH = 6.0
 """Metres before and behind a spawn where that holds too: half a bus."""
 
 
+@lru_cache(maxsize=4)
 def usable_places(sumo_map: SumoMap) -> Usable:
     """Nodes that sampling may use for a run in SUMO.
 

@@ -1,4 +1,4 @@
-"""Edits by name: every function of :mod:`odscen.scenario.edits` as a message.
+"""Edits by name: every function of :mod:`odscen.scenario.edits` and its kin as a message.
 
 The messages are made from the functions' signatures, so that there is no second list to keep: kind
 is the function's name, the other fields are its arguments. What the server knows itself (the
@@ -16,12 +16,16 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from odscen.categories import Category
 from odscen.lanegraph.model import MapGraph
-from odscen.scenario import edits
+from odscen.scenario import demand_edits, edits
 from odscen.scenario.document import (
     Actor,
+    Background,
     Control,
+    Counts,
     Flow,
+    Identifier,
     JunctionTiming,
+    Matrix,
     Part,
     Scenario,
     Simulation,
@@ -42,6 +46,9 @@ _FIELDS_OF: Mapping[str, type[Part]] = {
     "change_flow": Flow,
     "set_timing": JunctionTiming,
     "set_simulation": Simulation,
+    "set_matrix": Matrix,
+    "set_counts": Counts,
+    "set_background": Background,
 }
 """Whose fields an edit with ``**fields`` takes."""
 _WORDS: Mapping[str, str] = {
@@ -55,15 +62,22 @@ _WORDS: Mapping[str, str] = {
     "grow_roi": "Add segment {segment}",
     "move_actor": "Move {actor}",
     "remove_actors": "Remove road users",
+    "remove_demand": "Remove {part}",
     "remove_flow": "Remove {flow}",
     "rename": "Rename to {name}",
+    "set_background": "Background traffic {background}",
+    "set_clock": "Change the time of day at the start",
+    "set_counts": "Counts {counts}",
     "set_ego": "Choose the vehicle under test",
     "set_environment": "Change weather and time",
     "set_goal": "Goal of {actor}",
+    "set_matrix": "Trips {matrix}",
+    "set_profile": "Day profile {profile}",
     "set_seed": "Change the seed",
     "set_signal_control": "Traffic lights {control}",
     "set_simulation": "Change the run's settings",
     "set_timing": "Timing of light {junction}",
+    "set_zone": "Zone {zone}",
     "shrink_roi": "Remove segment {segment}",
 }
 """What undo and redo call an edit; in braces what the edit always has."""
@@ -107,8 +121,13 @@ def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenari
 
 def _functions() -> dict[str, Callable[..., Scenario]]:
     found: dict[str, Callable[..., Scenario]] = {}
-    for name, function in inspect.getmembers(edits, inspect.isfunction):
-        if name.startswith("_") or function.__module__ != edits.__name__:
+    members = (
+        (module, *member)
+        for module in (edits, demand_edits)
+        for member in inspect.getmembers(module, inspect.isfunction)
+    )
+    for module, name, function in members:
+        if name.startswith("_") or function.__module__ != module.__name__:
             continue
         signature = inspect.signature(function)
         if next(iter(signature.parameters)) == "scenario" and (
@@ -129,6 +148,7 @@ def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
             "Usable": Usable,
             "Category": Category,
             "Control": Control,
+            "Identifier": Identifier,
         },
     )
     fields: dict[str, Any] = {"kind": (Literal[name], ...)}

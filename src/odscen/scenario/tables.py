@@ -1,0 +1,170 @@
+"""Demand from CSV files: zones, matrices, counts and day profiles, read once, at import.
+
+The first line names the columns; further columns are an error, so that a misspelt one does not pass
+unnoticed. Times are seconds after the start of the run, or times of day such as ``7:15``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from typing import TYPE_CHECKING
+
+from odscen.errors import InputError
+from odscen.scenario.profiles import DAY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+_TIME_OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
+
+Trip = tuple[str, str, float]
+"""Origin, destination, number."""
+Slice = tuple[float, float]
+"""Begin and end, seconds."""
+CountRow = tuple[str, float, float, float]
+"""Place, begin, end, number."""
+
+
+def read_matrix(text: str, *, clock: float = 0.0) -> dict[Slice | None, tuple[Trip, ...]]:
+    """Read an origin-destination matrix: columns ``from``, ``to``, ``trips``.
+
+    Columns ``begin`` and ``end`` may say when; the trips are then those of each slice.
+
+    Returns
+    -------
+    Rows by their slice; ``None`` where the table has no times.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    found: dict[Slice | None, list[Trip]] = {}
+    for line in _lines(text, ("from", "to", "trips"), ("begin", "end")):
+        slice_ = line.slice(clock) if line.has("begin") else None
+        found.setdefault(slice_, []).append((line["from"], line["to"], line.number("trips")))
+    return {slice_: tuple(rows) for slice_, rows in found.items()}
+
+
+def read_counts(text: str, *, clock: float = 0.0) -> tuple[CountRow, ...]:
+    """Read counts: columns ``place``, ``begin``, ``end``, ``count``.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    return tuple(
+        (line["place"].replace(" ", ""), *line.slice(clock), line.number("count"))
+        for line in _lines(text, ("place", "begin", "end", "count"))
+    )
+
+
+def read_profile(text: str) -> tuple[float, ...]:
+    """Read a day profile: column ``share``, one line for each of equal slices of the day.
+
+    A column ``time`` may name the slices; it must then begin at midnight and be evenly spaced.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    lines = list(_lines(text, ("share",), ("time",)))
+    for index, line in enumerate(lines):
+        due = index * DAY / len(lines)
+        if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
+            msg = (
+                f"time {line['time']!r} is not that of slice {index + 1} of {len(lines)} equal "
+                "slices of a day"
+            )
+            raise InputError(msg, element=line.where)
+    return tuple(line.number("share") for line in lines)
+
+
+def read_zones(text: str) -> dict[str, tuple[str, ...]]:
+    """Read zones: columns ``zone`` and ``segment``, one line for each segment of a zone.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    found: dict[str, list[str]] = {}
+    for line in _lines(text, ("zone", "segment")):
+        found.setdefault(line["zone"], []).append(line["segment"])
+    return {zone: tuple(segments) for zone, segments in found.items()}
+
+
+class _Line:
+    def __init__(self, number: int, cells: dict[str, str]) -> None:
+        self.where = f"line {number}"
+        self._cells = cells
+
+    def has(self, column: str) -> bool:
+        return column in self._cells
+
+    def __getitem__(self, column: str) -> str:
+        value = self._cells[column]
+        if not value:
+            msg = f"column {column!r} is empty"
+            raise InputError(msg, element=self.where)
+        return value
+
+    def number(self, column: str) -> float:
+        try:
+            value = float(self[column])
+        except ValueError:
+            value = -1.0
+        if not 0.0 <= value <= 1e7:
+            msg = f"{column} must be a number from 0 on, not {self[column]!r}"
+            raise InputError(msg, element=self.where)
+        return value
+
+    def time(self, column: str, clock: float) -> float:
+        match = _TIME_OF_DAY.fullmatch(self[column])
+        if not match:
+            return self.number(column)
+        hours, minutes, seconds = (int(part or 0) for part in match.groups())
+        return hours * 3600.0 + minutes * 60.0 + seconds - clock
+
+    def slice(self, clock: float) -> Slice:
+        begin, end = self.time("begin", clock), self.time("end", clock)
+        if begin < 0 or end <= begin:
+            msg = (
+                f"the slice from {self['begin']} to {self['end']} is not after the start of the "
+                "run, or ends before it begins"
+            )
+            raise InputError(msg, element=self.where)
+        return begin, end
+
+
+def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_Line]:
+    """Yield the lines of a CSV file; comma, semicolon or tab, which its first line tells."""
+    text = text.removeprefix("\ufeff")
+    head = text.split("\n", 1)[0]
+    delimiter = max(",;\t", key=head.count)
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    columns = [name.strip().lower() for name in next(reader, [])]
+    missing = [name for name in needed if name not in columns]
+    unknown = [name for name in columns if name not in (*needed, *optional)]
+    given = [name for name in optional if name in columns]
+    if missing or unknown or (given and len(given) != len(optional)):
+        listed = ", ".join(needed) + "".join(f" [, {name}]" for name in optional)
+        msg = f"the columns are {', '.join(columns) or 'missing'}; needed are {listed}"
+        raise InputError(msg, element="line 1")
+    found = False
+    for cells in reader:
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(columns):
+            msg = f"{len(cells)} values for {len(columns)} columns"
+            raise InputError(msg, element=f"line {reader.line_num}")
+        found = True
+        values = (cell.strip() for cell in cells)
+        yield _Line(reader.line_num, dict(zip(columns, values, strict=True)))
+    if not found:
+        msg = "there are no lines below the first"
+        raise InputError(msg)

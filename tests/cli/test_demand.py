@@ -1,0 +1,94 @@
+"""``odscen demand`` as a user calls it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import odscen
+
+
+@pytest.fixture
+def scenario(workspace, tmp_path):
+    """A few actors on the whole of a small map."""
+    done = odscen(
+        *("generate", "--map", "signal_crossing", "--fill", "0.02", "--roi-segments", "30"),
+        *("--out", tmp_path, "--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    return done.json["scenarios"][0]["file"]
+
+
+def roads(scenario):
+    document = json.loads(Path(scenario).read_text(encoding="utf-8"))
+    return sorted(name for name in document["roi"] if name.startswith("r"))
+
+
+def test_tables_are_read_into_the_scenario_and_the_fit_is_printed(workspace, scenario, tmp_path):
+    one, other = roads(scenario)[:2]
+    junction = "j10001"
+    zones, trips, counts = (tmp_path / f"{name}.csv" for name in ("zones", "trips", "counts"))
+    zones.write_text(f"zone,segment\nhere,{one}\n")
+    trips.write_text(f"from,to,trips\nhere,{other},20\n")
+    counts.write_text(
+        f"place,begin,end,count\n{one}>{junction}>{other},0,600,40\n{one}>{junction},0,600,90\n"
+    )
+    done = odscen(
+        *("demand", "import", scenario, "--zones", zones, "--od", trips, "--counts", counts),
+        *("--mix", "car=4,van=1", "--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert {k: done.json[k] for k in ("zones", "trips", "counts")} == {
+        "zones": 1, "trips": 20, "counts": 2,
+    }  # fmt: skip
+    for table in (zones, trips, counts):
+        table.unlink()
+    assert odscen("check", scenario, "--workspace", workspace).code == 0
+    fit = odscen("demand", "fit", scenario, "--json", "--workspace", workspace)
+    assert fit.code == 0, fit.err
+    assert [row["met"] for row in fit.json["rows"]] == [True, True]
+    assert fit.json["observations"] == 130
+    assert fit.json["share_met"] == 1.0
+    shown = odscen("demand", "fit", scenario, "--all", "--workspace", workspace)
+    assert f"{one}>{junction}>{other}" in shown.out
+    assert "2 of 2 counts within GEH 5" in shown.err
+
+
+def test_a_wrong_table_is_refused_with_file_and_line_and_changes_nothing(
+    workspace, scenario, tmp_path
+):
+    before = Path(scenario).read_bytes()
+    table = tmp_path / "trips.csv"
+    table.write_text("from,to,trips\nr1,r2,few\n")
+    done = odscen("demand", "import", scenario, "--od", table, "--workspace", workspace)
+    assert done.code == 2
+    assert "trips.csv: line 2: trips must be a number from 0 on, not 'few'" in done.err
+    table.write_text("from,to,trips\nr1,nowhere,3\n")
+    done = odscen("demand", "import", scenario, "--od", table, "--workspace", workspace)
+    assert done.code == 2
+    assert "'nowhere' is neither a zone nor a segment" in done.err
+    assert Path(scenario).read_bytes() == before
+
+
+def test_background_traffic_is_added_and_a_scenario_without_counts_has_no_fit(workspace, scenario):
+    done = odscen(
+        *("demand", "add", scenario, "--per-km", "5", "--day", "weekend"),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert done.json["background"] == 1
+    fit = odscen("demand", "fit", scenario, "--workspace", workspace)
+    assert fit.code == 2
+    assert "has no counts" in fit.err
+
+
+def test_a_day_of_a_whole_map_says_what_its_junctions_carry(workspace, tmp_path):
+    out = tmp_path / "day.scenario.json"
+    done = odscen(
+        *("demand", "weekday", "--map", "signal_crossing", "--trips", "2000", "-o", out),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert 0 < done.json["trips"] <= 2000
+    assert done.json["volume"] <= 0.71 * done.json["capacity"]
+    assert odscen("check", out, "--workspace", workspace).code == 0
