@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from odscen.errors import InputError
 from odscen.lanegraph.files import to_networkx
+from odscen.lanegraph.model import MapGraph
 from odscen.lanegraph.paths import (
     Router,
     WalkRouter,
@@ -126,3 +127,24 @@ def test_goals_are_reachable_and_terminal_in_any_region(
 def test_a_walk_router_knows_distances() -> None:
     distances = WalkRouter(FORK).distances(0)
     assert distances[49] == pytest.approx(98.0)
+
+
+@pytest.mark.parametrize("kind", [Router, WalkRouter])
+@pytest.mark.parametrize("graph", [FORK, ring(), two_lane_road(), line_of_segments(4)])
+def test_many_ways_at_once_are_those_found_one_by_one(kind: type, graph: MapGraph) -> None:
+    router = kind(graph)
+    count = len(router.mask)
+    sources, targets = np.divmod(np.arange(0, count * count, 7), count)
+    one_by_one = [router.reachable(int(s))[t] for s, t in zip(sources, targets, strict=True)]
+    assert router.leads(sources, targets).tolist() == one_by_one
+
+
+@pytest.mark.parametrize("kind", [Router, WalkRouter])
+@pytest.mark.parametrize("graph", [FORK, ring(), two_lane_road(), line_of_segments(4)])
+def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: MapGraph) -> None:
+    router = kind(graph)
+    for spawn in range(0, len(router.mask), 13):
+        candidates = set(router.goal_candidates(spawn).tolist())
+        assert router.has_goals(spawn) == bool(candidates)
+        reached = set(np.flatnonzero(router.reachable(spawn)).tolist()) - {spawn}
+        assert {goal for goal in reached if router.is_candidate(spawn, goal)} == candidates

@@ -14,6 +14,7 @@ from odscen.lanegraph.query import (
     node_id,
     node_ids,
     node_index,
+    removable,
     walk_node_id,
     walk_node_ids,
     walk_node_index,
@@ -97,6 +98,18 @@ def test_adding_a_neighbour_keeps_a_region_connected(numbers: set[int]) -> None:
         assert name not in ids
         if is_connected(LINE.segments, ids):
             assert is_connected(LINE.segments, [*ids, name])
+
+
+@given(st.sets(st.integers(1, 8), min_size=1))
+def test_a_member_is_removable_if_the_others_stay_connected(numbers: set[int]) -> None:
+    for graph in (LINE, FORK):
+        ids = [name for k, name in enumerate(graph.segments.ids, 1) if k in numbers]
+        wanted = set()
+        for name in ids:
+            rest = [other for other in ids if other != name]
+            if not rest or is_connected(graph.segments, rest):
+                wanted.add(name)
+        assert set(removable(graph.segments, ids)) == wanted
 
 
 def test_all_neighbours_of_all_members_are_eligible() -> None:

@@ -178,9 +178,9 @@ def test_all_problems_come_at_once() -> None:
 
 
 def test_a_setting_that_no_run_acts_on_is_a_warning() -> None:
-    found = problems(actor(ignores_red=True))
+    found = problems(actor(crosses_anywhere=True, ignores_red=True))
     assert [(p.severity, p.code, p.where) for p in found] == [
-        ("warning", "not_acted_on", "actors[0].ignores_red")
+        ("warning", "not_acted_on", "actors[0].crosses_anywhere")
     ]
 
 

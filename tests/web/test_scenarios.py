@@ -91,7 +91,7 @@ def _filled(value, places):
 
 
 def post_edit(client: TestClient, name: str, version: int, kind: str, /, **arguments: object):
-    body = {"version": version, "edit": {"kind": kind, **arguments}}
+    body = {"version": version, "edits": [{"kind": kind, **arguments}]}
     return client.post(f"/api/scenarios/{name}/edits", json=body)
 
 
@@ -101,7 +101,7 @@ def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
         for name, function in inspect.getmembers(edits, inspect.isfunction)
         if not name.startswith("_") and function.__module__ == edits.__name__
     }
-    assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments"}
+    assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments", "removable_segments"}
     assert {kind for kind, _ in ALL} == set(FUNCTIONS)
 
 
@@ -169,6 +169,40 @@ def test_a_stale_version_is_refused_and_told_the_newest(client: TestClient, new:
     assert client.get(f"/api/scenarios/{new}").json()["document"]["seed"] == 3
 
 
+def test_edits_in_one_request_are_all_made_or_none_and_one_step(
+    client: TestClient, new: str
+) -> None:
+    grow = [{"kind": "grow_roi", "segment": segment} for segment in ("r1", "j10001")]
+    far = {"kind": "grow_roi", "segment": "r99"}
+    address = f"/api/scenarios/{new}/edits"
+    refused = client.post(address, json={"version": 1, "edits": [*grow, far]})
+    assert refused.status_code == 404
+    assert client.get(f"/api/scenarios/{new}").json()["document"]["roi"] == []
+    assert client.post(address, json={"version": 1, "edits": []}).status_code == 422
+    state = client.post(address, json={"version": 1, "edits": grow}).json()
+    assert (state["version"], state["undo"]) == (2, "Add segment r1 and 1 more")
+    assert state["document"]["roi"] == ["r1", "j10001"]
+    state = client.post(f"/api/scenarios/{new}/undo", json={"version": 2}).json()
+    assert (state["document"]["roi"], state["undo"]) == ([], None)
+    named = client.post(address, json={"version": 3, "edits": grow, "label": "Add all"}).json()
+    assert named["undo"] == "Add all"
+
+
+def test_a_copy_is_a_scenario_of_its_own(client: TestClient, new: str) -> None:
+    grown = post_edit(client, new, 1, "grow_roi", segment="r1").json()
+    copy = client.post(f"/api/scenarios/{new}/copy", json={})
+    assert copy.status_code == 201
+    assert copy.json()["name"] != new
+    assert copy.json()["document"] == grown["document"]
+    assert copy.json()["undo"] is None
+    post_edit(client, copy.json()["name"], 1, "grow_roi", segment="j10001")
+    assert client.get(f"/api/scenarios/{new}").json()["document"]["roi"] == ["r1"]
+    taken = client.post(f"/api/scenarios/{new}/copy", json={"name": new})
+    assert taken.status_code == 409
+    assert client.post(f"/api/scenarios/{new}/copy", json={"name": "../x"}).status_code == 422
+    assert client.post("/api/scenarios/nobody/copy", json={}).status_code == 404
+
+
 def test_of_two_tabs_that_edit_at_once_exactly_one_wins(client: TestClient, new: str) -> None:
     codes: list[int] = []
 
@@ -190,10 +224,10 @@ def test_undo_and_redo_are_named_and_survive_a_restart(
     assert (state["undo"], state["redo"]) == (None, None)
     for segment in ("r1", "j10001"):
         state = post_edit(client, new, state["version"], "grow_roi", segment=segment).json()
-    assert state["undo"] == "Grow region j10001"
+    assert state["undo"] == "Add segment j10001"
     state = client.post(f"/api/scenarios/{new}/undo", json={"version": state["version"]}).json()
     assert state["document"]["roi"] == ["r1"]
-    assert (state["undo"], state["redo"]) == ("Grow region r1", "Grow region j10001")
+    assert (state["undo"], state["redo"]) == ("Add segment r1", "Add segment j10001")
     with TestClient(create_app(workspace), base_url="http://localhost") as again:
         reopened = again.get(f"/api/scenarios/{new}").json()
         assert reopened == state

@@ -6,6 +6,8 @@ functions below make one for a single query.
 
 from __future__ import annotations
 
+import graphlib
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,9 +29,11 @@ _NO_PREDECESSOR = -9999
 class _PathFinder:
     """Shortest paths inside ``mask``; node numbers outside are the whole map's.
 
-    The last source's tree is kept: a caller asks for goals first and for the path to one of them
-    next.
+    An *end* is a node that is left by at most ``end_degree`` edges. The last source's tree is kept:
+    a caller asks for goals first and for the path to one of them next.
     """
+
+    end_degree = 0
 
     def __init__(
         self,
@@ -37,6 +41,7 @@ class _PathFinder:
         source: IntArray,
         target: IntArray,
         length: FloatArray,
+        lane: IntArray,
         mask: BoolArray | None,
         *,
         directed: bool,
@@ -47,6 +52,7 @@ class _PathFinder:
         inside = self.mask[source] & self.mask[target]
         rows, columns = self._local[source[inside]], self._local[target[inside]]
         self._directed = directed
+        self._lane = lane[self.nodes]
         self._matrix = _shortest_edges(len(self.nodes), rows, columns, length[inside])
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
@@ -73,6 +79,91 @@ class _PathFinder:
             steps.append(before)
         return self.nodes[steps[::-1]].astype(np.int32)
 
+    def leads(self, sources: IntArray, targets: IntArray) -> BoolArray:
+        """Whether a way leads from each source to the target in the same place; shape ``(K,)``.
+
+        One pass for all, whatever their number. Sources and targets lie in the region.
+        """
+        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
+        if not self._directed:
+            return np.asarray(starts == ends, dtype=np.bool_)
+        columns = {part: k for k, part in enumerate(np.unique(ends).tolist())}
+        reached: dict[int, int] = {}  # a bit per column
+        for part in graphlib.TopologicalSorter(self._part_successors).static_order():
+            bits = 1 << columns[part] if part in columns else 0
+            for after in self._part_successors[part]:
+                bits |= reached[after]
+            reached[part] = bits
+        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+
+    def has_goals(self, spawn: int) -> bool:
+        """Whether there is any goal candidate: whether anything can be reached."""
+        return bool(self.out_degree[self._local[spawn]] > 0)
+
+    def goal_candidates(self, spawn: int) -> IntArray:
+        """Nodes that may be the goal of an actor that starts at ``spawn``, ascending (R38).
+
+        Ends that can be reached. Where there is none (a ring, a closed town), the farthest
+        reachable node of each lane. Empty if nothing can be reached.
+
+        Raises
+        ------
+        InputError
+            If ``spawn`` is outside the region.
+        """
+        distances = self._from(spawn)[0]
+        if not self.has_goals(spawn):
+            return np.empty(0, dtype=np.int32)
+        if not self._reaches_end(spawn):
+            return self._farthest_per_lane(spawn, distances)
+        ends = np.isfinite(distances) & self._is_end
+        ends[self._local[spawn]] = False
+        return self.nodes[ends].astype(np.int32)
+
+    def is_candidate(self, spawn: int, goal: int) -> bool:
+        """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
+        if self._reaches_end(spawn):
+            return bool(self._is_end[self._local[goal]])
+        return goal in self.goal_candidates(spawn)
+
+    @cached_property
+    def _is_end(self) -> BoolArray:
+        return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
+
+    @cached_property
+    def _parts(self) -> IntArray:
+        """Number of the strongly connected part that each node of the region is in."""
+        labels: IntArray = csgraph.connected_components(
+            self._matrix, directed=self._directed, connection="strong"
+        )[1]
+        return labels
+
+    @cached_property
+    def _part_successors(self) -> dict[int, set[int]]:
+        after: dict[int, set[int]] = {part: set() for part in np.unique(self._parts).tolist()}
+        edges = self._matrix.tocoo()
+        parts = np.stack([self._parts[edges.row], self._parts[edges.col]], axis=1)
+        for one, other in np.unique(parts[parts[:, 0] != parts[:, 1]], axis=0).tolist():
+            after[one].add(other)
+        return after
+
+    @cached_property
+    def _ends_ahead(self) -> IntArray:
+        """At least how many ends, itself included, can be reached from each node of the region."""
+        ends = np.flatnonzero(self._is_end)
+        if not self._directed:
+            per_part = np.bincount(self._parts[ends], minlength=len(self.nodes))
+            return per_part[self._parts].astype(np.int32)
+        if not len(ends):
+            return np.zeros(len(self.nodes), dtype=np.int32)
+        back = csgraph.dijkstra(self._matrix.T.tocsr(), indices=ends, min_only=True)
+        return np.isfinite(back).astype(np.int32)
+
+    def _reaches_end(self, spawn: int) -> bool:
+        row = self._local[spawn]
+        return bool(self._ends_ahead[row] > int(self._is_end[row]))
+
     def _from(self, source: int) -> tuple[FloatArray, IntArray]:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
@@ -90,25 +181,20 @@ class _PathFinder:
     def _name(self, node: int) -> str:
         return f"node {node}"
 
-    def _farthest_per_lane(self, spawn: int, lane: IntArray) -> IntArray:
-        """Return the farthest reachable node of each lane; ``lane`` has shape ``(N,)``."""
-        distances = self._from(spawn)[0]
-        reached = np.flatnonzero(np.isfinite(distances) & (self.nodes != spawn))
-        order = np.lexsort((self.nodes[reached], -distances[reached], lane[self.nodes[reached]]))
-        ranked = self.nodes[reached][order]
-        first = np.ones(len(ranked), dtype=np.bool_)
-        first[1:] = lane[ranked][1:] != lane[ranked][:-1]
-        return np.sort(ranked[first]).astype(np.int32)
-
-    def _reached_with_degree(self, spawn: int, degree: int) -> IntArray:
-        finite = np.isfinite(self._from(spawn)[0])
-        found = self.nodes[finite & (self.out_degree <= degree)]
-        others: IntArray = found[found != spawn].astype(np.int32)
-        return others
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+        """Return the farthest reachable node of each lane, the first where several are."""
+        away = np.where(np.isfinite(distances), distances, -1.0)
+        away[self._local[spawn]] = -1.0
+        lane_starts = np.flatnonzero(np.r_[True, self._lane[1:] != self._lane[:-1]])
+        farthest = np.maximum.reduceat(away, lane_starts)
+        sizes = np.diff(np.r_[lane_starts, len(away)])
+        hits = np.flatnonzero((away == np.repeat(farthest, sizes)) & (away >= 0))
+        _, first = np.unique(self._lane[hits], return_index=True)
+        return np.sort(self.nodes[hits[first]]).astype(np.int32)
 
 
 class Router(_PathFinder):
-    """Paths and goals of vehicles inside a region.
+    """Paths and goals of vehicles inside a region; ends are nodes that no edge leaves.
 
     Parameters
     ----------
@@ -121,7 +207,7 @@ class Router(_PathFinder):
     def __init__(self, graph: MapGraph, mask: BoolArray | None = None) -> None:
         lanes = graph.lanes
         super().__init__(
-            len(lanes.x), lanes.source, lanes.target, lanes.length, mask, directed=True
+            len(lanes.x), lanes.source, lanes.target, lanes.length, lanes.lane, mask, directed=True
         )
         self._graph = graph
         inside_junction = np.array([name is not None for name in lanes.lanes.junctions], np.bool_)
@@ -129,24 +215,11 @@ class Router(_PathFinder):
 
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""
-        return bool(self.out_degree[self._local[node]] == 0)
+        return bool(self._is_end[self._local[node]])
 
-    def goal_candidates(self, spawn: int) -> IntArray:
-        """Goal candidates of a vehicle that starts at node ``spawn`` (requirement R38), ascending.
-
-        Reachable terminal nodes. Where none is reachable (a ring, a closed town), the farthest
-        reachable node of each lane, lanes inside junctions left out if others remain. Empty if
-        ``spawn`` is terminal itself.
-
-        Raises
-        ------
-        InputError
-            If ``spawn`` is outside the region.
-        """
-        terminal = self._reached_with_degree(spawn, 0)
-        if len(terminal) or self.is_terminal(spawn):
-            return terminal
-        farthest = self._farthest_per_lane(spawn, self._graph.lanes.lane)
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+        """Leave lanes inside junctions out if others remain."""
+        farthest = super()._farthest_per_lane(spawn, distances)
         on_roads = farthest[~self._in_junction[farthest]]
         return on_roads if len(on_roads) else farthest
 
@@ -156,7 +229,7 @@ class Router(_PathFinder):
 
 
 class WalkRouter(_PathFinder):
-    """Paths and goals of pedestrians inside a region.
+    """Paths and goals of pedestrians inside a region; ends are dead ends.
 
     Parameters
     ----------
@@ -166,28 +239,14 @@ class WalkRouter(_PathFinder):
         Pedestrian nodes of the region, shape ``(P,)``; ``None`` for the whole map.
     """
 
+    end_degree = 1
+
     def __init__(self, graph: MapGraph, mask: BoolArray | None = None) -> None:
         walks = graph.walks
         super().__init__(
-            len(walks.x), walks.source, walks.target, walks.length, mask, directed=False
+            len(walks.x), walks.source, walks.target, walks.length, walks.lane, mask, directed=False
         )
         self._graph = graph
-
-    def goal_candidates(self, spawn: int) -> IntArray:
-        """Goal candidates of a walker that starts at pedestrian node ``spawn``, ascending.
-
-        Reachable dead ends (at most one edge inside the region). Where there is none, the farthest
-        reachable node of each walk. Empty if nothing else can be reached.
-
-        Raises
-        ------
-        InputError
-            If ``spawn`` is outside the region.
-        """
-        dead_ends = self._reached_with_degree(spawn, 1)
-        if len(dead_ends):
-            return dead_ends
-        return self._farthest_per_lane(spawn, self._graph.walks.lane)
 
     def _name(self, node: int) -> str:
         inside_map = 0 <= node < len(self.mask)

@@ -19,6 +19,8 @@ from odscen.ids import LaneKey, NodeId, RoadId, SegmentId
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    import networkx as nx
+
     from odscen.lanegraph.model import BoolArray, IntArray, MapGraph, Segments
 
 WALK_PREFIX = "ped."
@@ -171,21 +173,42 @@ def is_connected(segments: Segments, ids: Iterable[str]) -> bool:
     NotFoundError
         If the map has no such segment.
     """
-    members = set(segment_rows(segments, ids).tolist())
-    if not members:
-        return False
-    beside: dict[int, list[int]] = {row: [] for row in members}
-    for one, other in segments.adjacency.tolist():
-        if one in members and other in members:
-            beside[one].append(other)
-            beside[other].append(one)
-    found = {min(members)}
-    todo = list(found)
-    while todo:
-        fresh = [row for row in beside[todo.pop()] if row not in found]
-        found.update(fresh)
-        todo.extend(fresh)
-    return found == members
+    import networkx as nx
+
+    graph = _induced_adjacency(segments, ids)
+    return len(graph) > 0 and nx.is_connected(graph)
+
+
+def removable(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:
+    """Members without which the others are connected, or none are left (R29).
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    import networkx as nx
+
+    graph = _induced_adjacency(segments, ids)
+    pieces = nx.number_connected_components(graph)
+    if pieces <= 1:
+        kept = set(nx.articulation_points(graph))
+        found = [row for row in graph if row not in kept]
+    else:  # a single segment apart from one piece is what makes it two
+        found = [row for row in graph if pieces == 2 and graph.degree(row) == 0]
+    return tuple(segments.ids[row] for row in sorted(found))
+
+
+def _induced_adjacency(segments: Segments, ids: Iterable[str]) -> nx.Graph[int]:
+    """Segments ``ids`` as rows, and which of them lie beside each other."""
+    import networkx as nx
+
+    inside = np.zeros(len(segments.ids), dtype=np.bool_)
+    inside[segment_rows(segments, ids)] = True
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(np.flatnonzero(inside).tolist())
+    graph.add_edges_from(segments.adjacency[inside[segments.adjacency].all(axis=1)].tolist())
+    return graph
 
 
 def _all_ids(keys: tuple[LaneKey, ...], first_node: IntArray, prefix: str) -> list[NodeId]:

@@ -83,10 +83,6 @@ class Subject:
         return repr(self.one.id)
 
 
-NOT_ACTED_ON = ("crosses_anywhere", "ignores_red")
-"""Settings of the document that no run acts on so far (requirement R45)."""
-
-
 def actor_problems(
     scenario: Scenario, region: Region, index: int, assets: Assets | None = None
 ) -> Iterator[Problem]:
@@ -108,13 +104,12 @@ def actor_problems(
             f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
             f"{scenario.simulation.duration:g} s; depart earlier or run longer",
         )
-    for setting in NOT_ACTED_ON:
-        if getattr(actor, setting):
-            yield warning(
-                "not_acted_on",
-                f"{subject.where}.{setting}",
-                f"{setting} has no effect yet: {subject.name} keeps to crossings and lights",
-            )
+    if actor.crosses_anywhere:  # R45; no run acts on it so far
+        yield warning(
+            "not_acted_on",
+            f"{subject.where}.crosses_anywhere",
+            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks",
+        )
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:
@@ -183,8 +178,7 @@ def spawn_problems(subject: Subject) -> tuple[Place | None, tuple[Problem, ...]]
 def goal_problems(subject: Subject, spawn: Place) -> Iterator[Problem]:
     """Check the goal of an actor or flow whose spawn is right (R38)."""
     one, region, where = subject.one, subject.region, f"{subject.where}.goal"
-    candidates = region.candidates(spawn)
-    if not len(candidates):
+    if not region.router_of(spawn).has_goals(spawn.node):
         yield error(
             "no_goal",
             f"{subject.where}.spawn",
@@ -210,13 +204,13 @@ def goal_problems(subject: Subject, spawn: Place) -> Iterator[Problem]:
     elif not region.leads(spawn, goal):
         message = (
             f"{subject.name} cannot get from {one.spawn!r} to {one.goal!r} inside the region of "
-            f"interest; pick one of its {len(candidates)} goals"
+            f"interest; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield error("goal_unreachable", where, message, nodes=nodes)
-    elif goal.node not in candidates:
+    elif not region.is_candidate(spawn, goal):
         message = (
             f"{subject.name} goes to {one.goal!r}, which is not where a way through the region "
-            f"ends, and vanishes there; better pick one of its {len(candidates)} goals"
+            f"ends, and vanishes there; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield warning("goal_not_candidate", where, message, nodes=nodes)
 

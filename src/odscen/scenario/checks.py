@@ -33,6 +33,8 @@ def check(
     graph: MapGraph,
     assets: Assets | None = None,
     lights: Sequence[Light] | None = None,
+    *,
+    region: Region | None = None,
 ) -> tuple[Problem, ...]:
     """Find everything that is wrong with a scenario on its map.
 
@@ -45,6 +47,8 @@ def check(
         Catalogue for the rules on models and for their sizes; without one those are left out.
     lights
         Traffic lights of the map for the rules on their timing; without them those are left out.
+    region
+        The scenario's region on ``graph``, if the caller has it: ways found once are remembered.
 
     Returns
     -------
@@ -53,10 +57,11 @@ def check(
     found = list(map_problems(scenario, graph))
     if found:
         return (*found, *_document_problems(scenario))
-    region = Region.of(graph, scenario.roi)
+    region = Region.of(graph, scenario.roi) if region is None else region
     found += roi_problems(scenario, graph)
     found += _document_problems(scenario)
     found += _environment_problems(scenario, assets)
+    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
     for index in range(len(scenario.actors)):
         found += actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from odscen.errors import NotFoundError, ScenarioError
 from odscen.ids import SegmentId
-from odscen.lanegraph.query import is_connected, neighbours
+from odscen.lanegraph.query import neighbours, removable
 from odscen.scenario.actor_checks import Subject, goal_problems, spawn_problems
 from odscen.scenario.checks import duplicate_ids, roi_problems, shared_nodes
 from odscen.scenario.config import SamplingConfig, overridden
@@ -169,6 +169,11 @@ def eligible_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, .
     return tuple(neighbours(graph.segments, [SegmentId(name) for name in scenario.roi]))
 
 
+def removable_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, ...]:
+    """Segments without which the region stays in one piece: no other can be taken out."""
+    return removable(graph.segments, scenario.roi)
+
+
 def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     """Add a segment to the region of interest (R29).
 
@@ -210,8 +215,7 @@ def shrink_roi(
     if segment not in scenario.roi:
         msg = f"segment {segment!r} is not in the region of interest"
         raise ScenarioError(msg)
-    rest = tuple(SegmentId(name) for name in scenario.roi if name != segment)
-    if len(rest) > 1 and not is_connected(graph.segments, rest):
+    if segment not in removable_segments(scenario, graph):
         msg = f"without segment {segment!r} the region of interest would be in several pieces"
         raise ScenarioError(msg)
     region = Region.of(graph, [segment])
@@ -222,7 +226,7 @@ def shrink_roi(
         raise ScenarioError(msg)
     return _with(
         scenario,
-        roi=rest,
+        roi=tuple(name for name in scenario.roi if name != segment),
         actors=_clear(region, scenario.actors),
         flows=_clear(region, scenario.flows),
     )

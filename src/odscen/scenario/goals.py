@@ -42,6 +42,7 @@ def resolve_goals(
         With every actor whose spawn or goal is not usable.
     """
     region = Region.of(graph, scenario.roi) if region is None else region
+    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
     goals: dict[str, int] = {}
     problems: list[Problem] = []
     for index, actor in enumerate(scenario.actors):

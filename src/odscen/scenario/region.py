@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from odscen.categories import Category
 from odscen.errors import NotFoundError
 from odscen.ids import NodeId, SegmentId
@@ -81,18 +83,53 @@ class Region:
         """Return the graph that a place is on."""
         return self.graph.walks if place.walk else self.graph.lanes
 
+    def router_of(self, place: Place) -> Router | WalkRouter:
+        """Return the ways on the graph that a place is on."""
+        return self.walk_router if place.walk else self.router
+
     def candidates(self, spawn: Place) -> IntArray:
         """Goal candidates of a spawn (R38), as indices of nodes of the same graph."""
-        if spawn.walk:
-            return self.walk_router.goal_candidates(spawn.node)
-        return self.router.goal_candidates(spawn.node)
+        return self.router_of(spawn).goal_candidates(spawn.node)
+
+    def is_candidate(self, spawn: Place, goal: Place) -> bool:
+        """Whether a goal that a way leads to is among the candidates of a spawn."""
+        known = self._candidates.get((spawn, goal))
+        if known is None:
+            known = self.router_of(spawn).is_candidate(spawn.node, goal.node)
+            self._candidates[spawn, goal] = known
+        return known
 
     def leads(self, spawn: Place, goal: Place) -> bool:
         """Whether a way inside the region leads from ``spawn`` on to ``goal``."""
         if spawn.walk != goal.walk or spawn == goal or not self.holds(goal):
             return False
-        router = self.walk_router if spawn.walk else self.router
-        return bool(router.reachable(spawn.node)[goal.node])
+        known = self._leads.get((spawn, goal))
+        if known is None:
+            known = bool(self.router_of(spawn).reachable(spawn.node)[goal.node])
+        return known
+
+    def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
+        """Find the ways between many spawns and goals at once, for :meth:`leads` to remember."""
+        places = {(self.place(spawn), self.place(goal)) for spawn, goal in pairs if goal}
+        for router, walk in ((self.router, False), (self.walk_router, True)):
+            asked = [
+                (spawn, goal)
+                for spawn, goal in places - self._leads.keys()
+                if spawn and goal and spawn.walk == goal.walk == walk
+                if self.holds(spawn) and self.holds(goal)
+            ]
+            if asked:
+                nodes = np.array([(spawn.node, goal.node) for spawn, goal in asked])
+                found = router.leads(nodes[:, 0], nodes[:, 1]).tolist()
+                self._leads.update(zip(asked, found, strict=True))
+
+    @cached_property
+    def _leads(self) -> dict[tuple[Place, Place], bool]:
+        return {}
+
+    @cached_property
+    def _candidates(self) -> dict[tuple[Place, Place], bool]:
+        return {}
 
     def segment_of(self, place: Place) -> SegmentId:
         """Return the segment that a place lies in."""

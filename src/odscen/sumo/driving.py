@@ -63,6 +63,8 @@ STYLES: dict[DrivingStyle, Style] = {
 }
 WALKING_DEVIATION = 0.1
 """Of the speed factor of pedestrians for whom no speed is given."""
+ALWAYS = 1_000_000
+"""Seconds after the beginning of red in which it is not heeded; more than any red lasts."""
 TWO_WHEELER_MIN_GAP = 0.5
 """Share of a driver's gap that motorcycles and bicycles keep."""
 
@@ -106,6 +108,7 @@ def driver(
     speed: float | None,
     limit: float | None,
     weather: WeatherEffect,
+    ignores_red: bool = False,
 ) -> Driver:
     """Attributes of somebody who drives, or walks, like this.
 
@@ -119,9 +122,12 @@ def driver(
         exceeded in the same proportion.
     limit
         Speed limit at the spawn, m/s; ``None`` if unknown.
+    ignores_red
+        Of a pedestrian: crosses at red as at green (R45).
     """
     if category is Category.PEDESTRIAN:
-        return _walker(body, speed=KINDS[category].max_speed * factor if speed is None else speed)
+        speed = KINDS[category].max_speed * factor if speed is None else speed
+        return _walker(body, speed=speed, ignores_red=ignores_red)
     kind, manner = KINDS[category], STYLES[style]
     max_speed = kind.max_speed
     if speed is not None:
@@ -149,7 +155,7 @@ def driver(
     return Driver(attributes, max_speed, round(factor, 4), accel)
 
 
-def _walker(body: Body, *, speed: float) -> Driver:
+def _walker(body: Body, *, speed: float, ignores_red: bool) -> Driver:
     attributes = (
         ("vClass", "pedestrian"),
         ("guiShape", "pedestrian"),
@@ -159,6 +165,8 @@ def _walker(body: Body, *, speed: float) -> Driver:
         ("speedFactor", "1"),
         ("speedDev", "0"),
     )
+    if ignores_red:
+        attributes += (("jmDriveAfterRedTime", number(ALWAYS, digits=0)),)
     return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
 
 

@@ -39,6 +39,7 @@ class RoadUser:
     style: DrivingStyle = "normal"
     flow: str | None = None
     ego: bool = False
+    ignores_red: bool = False
 
     @property
     def person(self) -> bool:
@@ -69,6 +70,7 @@ def road_users(
             lateral_offset=actor.lateral_offset,
             style=actor.style,
             ego=actor.ego,
+            ignores_red=actor.ignores_red,
         )
         for actor in scenario.actors
     ]

@@ -202,6 +202,7 @@ class _Writer:
             speed=user.speed,
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
+            ignores_red=user.ignores_red,
         )
 
     def _body(self, user: RoadUser) -> Body:

@@ -44,8 +44,33 @@ _FIELDS_OF: Mapping[str, type[Part]] = {
     "set_simulation": Simulation,
 }
 """Whose fields an edit with ``**fields`` takes."""
-_SUBJECTS = ("actor", "flow", "segment", "junction", "id", "category", "preset", "name")
-"""Arguments that tell one edit from another of its kind, for its label."""
+_WORDS: Mapping[str, str] = {
+    "add_actor": "Add {category}",
+    "add_flow": "Add a stream",
+    "change_actor": "Change {actor}",
+    "change_flow": "Change {flow}",
+    "clear_timing": "Timing of light {junction} as in the map",
+    "copy_actors": "Copy road users",
+    "fill_roi": "Fill the region at random",
+    "grow_roi": "Add segment {segment}",
+    "move_actor": "Move {actor}",
+    "remove_actors": "Remove road users",
+    "remove_flow": "Remove {flow}",
+    "rename": "Rename to {name}",
+    "set_ego": "Choose the vehicle under test",
+    "set_environment": "Change weather and time",
+    "set_goal": "Goal of {actor}",
+    "set_seed": "Change the seed",
+    "set_signal_control": "Traffic lights {control}",
+    "set_simulation": "Change the run's settings",
+    "set_timing": "Timing of light {junction}",
+    "shrink_roi": "Remove segment {segment}",
+}
+"""What undo and redo call an edit; in braces what the edit always has."""
+
+
+MOST_EDITS = 5000
+"""Edits in one request."""
 
 
 class EditBase(BaseModel):
@@ -63,10 +88,7 @@ class EditBase(BaseModel):
     @property
     def label(self) -> str:
         """The edit in words, for undo and redo."""
-        words = self.kind.replace("_", " ").capitalize().replace("roi", "region")
-        given = self.arguments
-        subject = next((given[key] for key in _SUBJECTS if isinstance(given.get(key), str)), None)
-        return words if subject is None else f"{words} {subject}"
+        return _WORDS[self.kind].format(**self.arguments)
 
 
 def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenario:
@@ -137,9 +159,22 @@ else:
 
 
 class EditRequest(BaseModel):
-    """One edit of one version."""
+    """Edits of one version: all of them or none, and one step for undo.
+
+    ``label`` says in words what they do together; needed only where there are several.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     version: Annotated[int, Field(ge=0, lt=2**53)]
-    edit: AnyEdit
+    edits: Annotated[list[AnyEdit], Field(min_length=1, max_length=MOST_EDITS)]
+    label: Annotated[str, Field(min_length=1, max_length=80)] | None = None
+
+    @property
+    def words(self) -> str:
+        """What undo and redo call this."""
+        if self.label is not None:
+            return self.label
+        first = self.edits[0].label
+        more = len(self.edits) - 1
+        return f"{first} and {more} more" if more else first

@@ -198,6 +198,12 @@ class NewName(Body):
     name: Name
 
 
+class CopyName(Body):
+    """Name of a copy; made from the original's if not given."""
+
+    name: Name | None = None
+
+
 class Goals(Answer):
     """Goal candidates of a spawn."""
 
@@ -213,10 +219,11 @@ class Path(Answer):
 
 
 class RoiInfo(Answer):
-    """Segments of the region, and those that may be added now."""
+    """Segments of the region, and those that may be added or taken out now."""
 
     inside: list[str]
     candidates: list[str]
+    removable: list[str]
 
 
 class NewRun(Body):

@@ -13,7 +13,7 @@ from odscen.catalog.store import check_name, name_from_file
 from odscen.errors import InputError, NotFoundError
 from odscen.scenario.checks import check
 from odscen.scenario.document import Scenario
-from odscen.scenario.edits import eligible_segments, new_scenario
+from odscen.scenario.edits import eligible_segments, new_scenario, removable_segments
 from odscen.scenario.files import dumps, read_any
 from odscen.scenario.graphform import to_graphml
 from odscen.scenario.problems import Problem
@@ -21,6 +21,7 @@ from odscen.scenario.region import Place as GraphPlace
 from odscen.scenario.region import name_of, place_of
 from odscen.web.edits import EditRequest, apply_edit
 from odscen.web.messages import (
+    CopyName,
     Goals,
     NewName,
     NewScenario,
@@ -94,13 +95,15 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
 
 @router.post("/{name}/edits")
 def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
-    """Make one edit; each kind is a function of ``odscen.scenario.edits``."""
-    one = request.edit
+    """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
 
     def change(scenario: Scenario) -> Scenario:
-        return apply_edit(one, scenario, shared.map_of(scenario))
+        loaded = shared.map_of(scenario)
+        for one in request.edits:
+            scenario = apply_edit(one, scenario, loaded)
+        return scenario
 
-    return _state(shared, shared.drafts.change(name, request.version, one.label, change))
+    return _state(shared, shared.drafts.change(name, request.version, request.words, change))
 
 
 @router.post("/{name}/undo")
@@ -113,6 +116,14 @@ def undo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
 def redo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
     """Make the edit again that was taken back last."""
     return _state(shared, shared.drafts.redo(name, request.version))
+
+
+@router.post("/{name}/copy", status_code=201)
+def copy(name: str, wish: CopyName, shared: Shared) -> ScenarioState:
+    """Save a scenario under another name too; a free one is made if none is given."""
+    scenario = shared.drafts.get(name).scenario
+    draft = shared.drafts.create(scenario, wish.name, stem=name, label=f"Copy of {name}")
+    return _state(shared, draft)
 
 
 @router.get("/{name}/goals")
@@ -149,11 +160,14 @@ def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
 
 @router.get("/{name}/roi")
 def roi(name: str, shared: Shared) -> RoiInfo:
-    """Segments of the region of interest, and those that may be added now."""
+    """Segments of the region of interest, and those that may be added or taken out now."""
     scenario = shared.drafts.get(name).scenario
     graph = shared.map_of(scenario).sumo.graph
-    candidates = eligible_segments(scenario, graph)
-    return RoiInfo(inside=list(scenario.roi), candidates=list(candidates))
+    return RoiInfo(
+        inside=list(scenario.roi),
+        candidates=list(eligible_segments(scenario, graph)),
+        removable=list(removable_segments(scenario, graph)),
+    )
 
 
 @router.get("/{name}/download", response_class=Response)
@@ -187,7 +201,9 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
         loaded = shared.map_of(scenario)
     except InputError as error:  # a scenario whose map was removed can still be looked at
         return (Problem("error", "map_missing", "map", str(error)),)
-    return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights)
+    with shared.search:
+        region = region_of(loaded, scenario.roi)
+        return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights, region=region)
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:
