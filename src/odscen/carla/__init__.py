@@ -1,1 +1,1 @@
-"""Co-simulation with a CARLA server."""
+"""The same scenario in CARLA: SUMO drives, a CARLA server shows it, actor for actor."""

@@ -12,6 +12,7 @@ import typer
 
 from odscen import __version__
 from odscen.cli.assets import app as assets
+from odscen.cli.cosim import cosim
 from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
@@ -34,6 +35,7 @@ app.command()(generate)
 app.command()(check)
 app.command()(export)
 app.command()(run)
+app.command()(cosim)
 app.command()(serve)
 app.command()(doctor)
 app.command()(demo)

@@ -8,19 +8,48 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from odscen.sumo.layout import LOG_FILE, PLAN_FILE
-from odscen.sumo.progress import Command, Done, Failed, Frame, Progress, decode, encode
+from odscen.sumo.progress import (
+    Command,
+    Done,
+    Failed,
+    Frame,
+    Place,
+    Progress,
+    State,
+    decode,
+    encode,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from odscen.sumo.live import Live
-    from odscen.sumo.progress import Message, OnProgress
+    from odscen.sumo.progress import Lockstep, Message, OnProgress, Pace
 
 WORKER = "odscen.sumo.worker"
+
+
+class Companion(Protocol):
+    """Who goes with a run while it lasts: a watcher, or another simulator in step with it.
+
+    Methods are called in the thread that follows the worker.
+    """
+
+    @property
+    def start(self) -> Pace | Lockstep:
+        """How the worker is to go."""
+
+    def attach(self, process: subprocess.Popen[bytes]) -> None:
+        """Connect with a worker that has just been started with a pipe as its stdin."""
+
+    def take(self, message: Message, payload: bytes) -> None:
+        """Take in what the worker says."""
+
+    def detach(self) -> None:
+        """Learn that the worker has ended, however it did."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +76,7 @@ def run_worker(
     *,
     progress: OnProgress | None = None,
     time_limit: float | None = None,
-    live: Live | None = None,
+    live: Companion | None = None,
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -63,7 +92,7 @@ def run_worker(
     time_limit
         Wall seconds after which the process is killed.
     live
-        Makes it a run that can be watched and steered.
+        Makes it a run that can be watched and steered, or that goes in step with another.
     """
     start = time.perf_counter()
     command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
@@ -105,7 +134,7 @@ def run_worker(
 
 
 def _follow(
-    process: subprocess.Popen[bytes], progress: OnProgress | None, live: Live | None
+    process: subprocess.Popen[bytes], progress: OnProgress | None, live: Companion | None
 ) -> Done | Failed | None:
     """Pass on what the worker says; return the last thing it said of its end."""
     last: Done | Failed | None = None
@@ -127,9 +156,10 @@ def _messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes
         return
     for line in process.stdout:
         message = decode(line)
-        if message is None or isinstance(message, Command):
+        if message is None or isinstance(message, Command | Place):
             continue
-        yield message, process.stdout.read(message.size) if isinstance(message, Frame) else b""
+        size = message.size if isinstance(message, Frame | State) else 0
+        yield message, process.stdout.read(size)
 
 
 def sumo_words(folder: Path, *, lines: int = 12) -> str:

@@ -1,7 +1,8 @@
 """Messages between the runner and the worker: JSON, one object per line, either way.
 
 A run that can be watched (see :mod:`odscen.sumo.live`) also sends frames: a line :class:`Frame` and
-then so many bytes. A run that nobody can watch sends :class:`Progress` and its end only.
+then so many bytes. A run in lockstep (see :mod:`odscen.sumo.lockstep`) sends a :class:`State` and
+its bytes after each step. A run that nobody can watch sends :class:`Progress` and its end only.
 """
 
 from __future__ import annotations
@@ -91,10 +92,56 @@ class Command:
     speed: float | None = None
 
 
-Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace
+@dataclass(frozen=True, slots=True)
+class Lockstep:
+    """As an argument of the worker: make a step only when told to, and tell all after each.
+
+    ``placed`` is the row in the plan of a vehicle that somebody else drives, -1 for none.
+    """
+
+    placed: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """All after one step; ``size`` bytes follow the line, see ``sumo.lockstep``.
+
+    Attributes
+    ----------
+    time
+        Simulated seconds at which the step began, as in the recorded trajectories.
+    lights
+        State of each traffic light that has changed, by SUMO id.
+    lanes
+        Ids of SUMO lanes seen for the first time; rows count all of them in this order.
+    departed, arrived
+        Road users so far.
+    incidents
+        As in ``events.json``, new ones.
+    """
+
+    size: int
+    time: float
+    lights: dict[str, str] = field(default_factory=dict)
+    lanes: list[str] = field(default_factory=list)
+    departed: int = 0
+    arrived: int = 0
+    incidents: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """To the worker: where the vehicle that somebody else drives is, front, SUMO frame."""
+
+    x: float
+    y: float
+    angle_deg: float
+
+
+Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace | Lockstep | State
 OnProgress = Callable[[Progress], None]
 
-_KINDS: dict[str, type[Message | Command]] = {
+_KINDS: dict[str, type[Message | Command | Place]] = {
     "progress": Progress,
     "done": Done,
     "failed": Failed,
@@ -102,17 +149,20 @@ _KINDS: dict[str, type[Message | Command]] = {
     "lights": Lights,
     "incidents": Incidents,
     "pace": Pace,
+    "lockstep": Lockstep,
+    "state": State,
+    "place": Place,
     "command": Command,
 }
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 
-def encode(message: Message | Command) -> str:
+def encode(message: Message | Command | Place) -> str:
     """One line, newline included."""
     return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
 
 
-def decode(line: str | bytes) -> Message | Command | None:
+def decode(line: str | bytes) -> Message | Command | Place | None:
     """Inverse of :func:`encode`; ``None`` for a line that is no message."""
     try:
         data = json.loads(line)

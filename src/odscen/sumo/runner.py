@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
     from odscen.results.expectations import Expectation
     from odscen.results.records import Plan
-    from odscen.sumo.live import Live
-    from odscen.sumo.process import Ended
+    from odscen.sumo.process import Companion, Ended
     from odscen.sumo.progress import OnProgress, Progress
 
 RunStatus = Literal["completed", "failed"]
@@ -109,7 +108,7 @@ def run_prepared(
     progress: OnProgress | None = None,
     time_limit: float | None = None,
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
-    live: Live | None = None,
+    live: Companion | None = None,
 ) -> RunResult:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -123,7 +122,7 @@ def run_prepared(
         Called with the folder and the summary when a run has completed, before the folder appears:
         the place to add a report.
     live
-        Makes it a run that can be watched and steered while it goes.
+        Makes it a run that can be watched and steered, or that goes in step with another.
 
     Raises
     ------

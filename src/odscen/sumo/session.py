@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+_EDGES_AHEAD = 3
+"""Edges that the route of a vehicle driven from outside has at least, its own included."""
+
+
 class Front(NamedTuple):
     """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
 
@@ -150,6 +154,59 @@ class Session:
     def person_poses(self) -> Poses:
         """Poses of all persons."""
         return self._poses(self._sumo.person, None)
+
+    def vehicle_places(self, ids: Sequence[str]) -> list[tuple[str, float]]:
+        """Lane of each vehicle (empty: none) and metres along it."""
+        lane, pos = self._sumo.vehicle.getLaneID, self._sumo.vehicle.getLanePosition
+        return [(lane(name), pos(name)) for name in ids]
+
+    def person_places(self, ids: Sequence[str]) -> list[tuple[str, float]]:
+        """Lane of each person (empty: none) and metres along it."""
+        lane, pos = self._sumo.person.getLaneID, self._sumo.person.getLanePosition
+        return [(lane(name), pos(name)) for name in ids]
+
+    def place(self, vehicle: str, x: float, y: float, angle_deg: float) -> bool:
+        """Put a vehicle where somebody else has driven it; false if SUMO cannot.
+
+        The place (centre of the front, SUMO frame) is taken exactly, on or off the road, and the
+        speed follows from the way since the last step. ``keepRoute=2`` lets the vehicle leave its
+        route; its new one would end with the edge that it is on, so it is led on a little: others
+        must know where it may be going.
+        """
+        vehicles = self._sumo.vehicle
+        try:
+            vehicles.moveToXY(vehicle, "", -1, x, y, angle_deg, 2)
+            route, index = vehicles.getRoute(vehicle), vehicles.getRouteIndex(vehicle)
+            if index >= 0 and len(route) - index < _EDGES_AHEAD:
+                self._lead_on(vehicle, route[index:])
+        except self._errors:
+            return False
+        return True
+
+    def _lead_on(self, vehicle: str, route: Sequence[str]) -> None:
+        edges = list(route)
+        if edges[0].startswith(":"):  # a route cannot be changed inside a junction
+            return
+        links, lane_edge = self._sumo.lane.getLinks, self._sumo.lane.getEdgeID
+        count = self._sumo.edge.getLaneNumber
+        kind = self._sumo.vehicle.getVehicleClass(vehicle)
+        while len(edges) < _EDGES_AHEAD:
+            lanes = [f"{edges[-1]}_{index}" for index in range(count(edges[-1]))]
+            onward = [
+                lane_edge(link[0])
+                for lane in lanes
+                for link in links(lane)
+                if self._admits(link[0], kind)
+            ]
+            if not onward:
+                break
+            edges.append(onward[0])
+        if len(edges) > len(route):
+            self._sumo.vehicle.setRoute(vehicle, edges)
+
+    def _admits(self, lane: str, kind: str) -> bool:
+        allowed = self._sumo.lane.getAllowed(lane)
+        return not allowed or kind in allowed
 
     def light_states(self) -> dict[str, str]:
         """State of each traffic light, a letter per link."""

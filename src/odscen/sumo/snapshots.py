@@ -31,8 +31,16 @@ COLUMNS = 6
 
 _NEAR = 10_000.0
 """Metres from zero at which float32 still tells millimetres apart."""
-_RIGHT, _LEFT, _HAZARD, _BRAKE = 1, 2, 4, 8
-"""Bits of SUMO: https://sumo.dlr.de/docs/TraCI/Vehicle_Signalling.html"""
+
+
+class Signal(IntFlag):
+    """SUMO's bits: https://sumo.dlr.de/docs/TraCI/Vehicle_Signalling.html."""
+
+    BLINKER_RIGHT = 1
+    BLINKER_LEFT = 2
+    BLINKER_EMERGENCY = 4
+    BRAKE = 8
+    EMERGENCY_BLUE = 2048
 
 
 class Flag(IntFlag):
@@ -92,8 +100,8 @@ class Snapshots:
 
 
 def _flags(signals: np.ndarray) -> np.ndarray:
-    left = (signals & (_LEFT | _HAZARD)) > 0
-    right = (signals & (_RIGHT | _HAZARD)) > 0
-    brake = (signals & _BRAKE) > 0
+    left = (signals & (Signal.BLINKER_LEFT | Signal.BLINKER_EMERGENCY)) > 0
+    right = (signals & (Signal.BLINKER_RIGHT | Signal.BLINKER_EMERGENCY)) > 0
+    brake = (signals & Signal.BRAKE) > 0
     flags: np.ndarray = left * Flag.LEFT + right * Flag.RIGHT + brake * Flag.BRAKE
     return flags

@@ -55,6 +55,11 @@ class Watch:
         self._mark = time.monotonic(), 0
         self._factor = 0.0
 
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody has ended the run before its time."""
+        return self.steering.stopped
+
     def next_step(self, session: Session, recorder: Recorder) -> bool:
         """Show what is wanted, then wait for the next step; false if the run is to stop."""
 

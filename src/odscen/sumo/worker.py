@@ -5,7 +5,8 @@ run has a process of its own, and only the runner starts it. It reads the plan a
 beside it, steps until nobody is left or the end is reached, writes ``events.json`` and
 ``actors.json``, and sends :mod:`odscen.sumo.progress` messages to its stdout. Whatever SUMO says
 goes to ``sumo.log``. With a :class:`~odscen.sumo.progress.Pace` as second argument the run can be
-watched and takes commands on its stdin.
+watched and takes commands on its stdin; with a :class:`~odscen.sumo.progress.Lockstep` it makes
+each step when it is told to.
 """
 
 from __future__ import annotations
@@ -26,7 +27,17 @@ from odscen.sumo.layout import (
     SUMO_FOLDER,
     TRAJECTORIES_FILE,
 )
-from odscen.sumo.progress import Done, Failed, Message, Pace, Progress, decode, encode
+from odscen.sumo.lockstep import LockstepWatch
+from odscen.sumo.progress import (
+    Done,
+    Failed,
+    Lockstep,
+    Message,
+    Pace,
+    Progress,
+    decode,
+    encode,
+)
 from odscen.sumo.recorder import Recorder
 from odscen.sumo.session import captured_output, open_session
 from odscen.sumo.steering import Steering
@@ -60,7 +71,10 @@ def main() -> int:
 
 
 def simulate(
-    plan: Plan, folder: Path, send: Callable[[Message], None], watch: Watch | None = None
+    plan: Plan,
+    folder: Path,
+    send: Callable[[Message], None],
+    watch: Watch | LockstepWatch | None = None,
 ) -> Done:
     """Run the simulation in ``folder`` and write its events and actors.
 
@@ -77,12 +91,14 @@ def simulate(
     outcomes = actor_outcomes(plan, events)
     (folder / EVENTS_FILE).write_text(events_to_json(events), encoding="utf-8")
     (folder / ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
-    stopped = watch is not None and watch.steering.stopped
+    stopped = watch is not None and watch.stopped
     return Done(sim_seconds, steps, wall_seconds, stopped)
 
 
-def _watch(plan: Plan, pace: str, send: Callable[[Message, bytes], None]) -> Watch:
-    start = decode(pace)
+def _watch(plan: Plan, how: str, send: Callable[[Message, bytes], None]) -> Watch | LockstepWatch:
+    start = decode(how)
+    if isinstance(start, Lockstep):
+        return LockstepWatch(plan, start, sys.stdin.fileno(), send)
     steering = Steering(
         sys.stdin.fileno(),
         start if isinstance(start, Pace) else Pace(),
@@ -96,7 +112,7 @@ def _steps(
     folder: Path,
     recorder: Recorder,
     send: Callable[[Message], None],
-    watch: Watch | None,
+    watch: Watch | LockstepWatch | None,
 ) -> tuple[float, int]:
     arguments = [
         "--configuration-file",

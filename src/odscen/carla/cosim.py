@@ -1,0 +1,338 @@
+"""A scenario in SUMO and CARLA at once: SUMO drives, the server shows every step of it."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen import workflow
+from odscen.carla.blueprints import choose_blueprints, size_differences
+from odscen.carla.client import Address
+from odscen.carla.ego import ExternalEgo
+from odscen.carla.environment import vehicle_lights, weather_parameters
+from odscen.carla.maps import ensure_map
+from odscen.carla.mirror import Mirror
+from odscen.carla.nearby import Nearby
+from odscen.carla.server import Server
+from odscen.carla.signals import Heads
+from odscen.catalog.assets import shipped_assets
+from odscen.errors import CarlaError, InputError, in_file
+from odscen.scenario.problems import refuse_errors
+from odscen.sumo.ground import Ground
+from odscen.sumo.in_step import InStep
+from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.runner import run_prepared
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
+
+    from odscen.catalog.store import Workspace
+    from odscen.sumo.in_step import Driven, Step
+    from odscen.sumo.progress import OnProgress
+    from odscen.sumo.runner import PreparedRun, RunResult
+
+TICK = 0.05
+"""Simulated seconds of a tick of CARLA's, at most, unless asked for otherwise."""
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+@dataclass(frozen=True, slots=True)
+class CosimOptions:
+    """How a scenario is mirrored.
+
+    Attributes
+    ----------
+    address
+        Of the server.
+    tick
+        Simulated seconds of a tick of CARLA's; a step of SUMO's is a whole number of them. The
+        largest part of a step that is at most :data:`TICK` if not given.
+    nearby
+        Who is shown.
+    external_ego
+        Whether the ego is driven in CARLA, by whoever owns the actor with the role ``hero``.
+    load_map
+        Whether the server may be told to load the scenario's map.
+    """
+
+    address: Address = field(default_factory=Address)
+    tick: float | None = None
+    nearby: Nearby = field(default_factory=Nearby)
+    external_ego: bool = False
+    load_map: bool = True
+
+    def ticks(self, step_length: float) -> int:
+        """How many ticks a step of SUMO's is.
+
+        Raises
+        ------
+        InputError
+            If it is not a whole number of them.
+        """
+        if self.tick is None:
+            return max(1, int(np.ceil(step_length / TICK - 1e-9)))
+        count = round(step_length / self.tick)
+        if count < 1 or abs(count * self.tick - step_length) > 1e-9:
+            msg = f"a step of {step_length:g} s is no whole number of ticks of {self.tick:g} s"
+            raise InputError(msg)
+        return count
+
+
+@dataclass(slots=True)
+class CosimReport:
+    """What came of the mirror.
+
+    Attributes
+    ----------
+    map
+        ``there``, ``loaded`` or ``generated``.
+    ticks, spawned
+        How many ticks were made, and how many actors.
+    refused
+        Road users whom the server never took: id, tries, its words.
+    signals, signals_missing
+        How many signals of the map are joined to a light of the server, and ids of those that the
+        server has no light for.
+    sizes
+        Metres by which the length of a blueprint differs from the road user it stands for.
+    interruptions
+        How often the stream of the server's states was cut and came back.
+    own_ms
+        Median and 95th percentile of our own share of a tick, milliseconds.
+    error, interrupted
+        Why it has ended early.
+    left_behind
+        What could not be given back, in words.
+    """
+
+    address: str
+    map: str = ""
+    ticks: int = 0
+    spawned: int = 0
+    refused: list[dict[str, Any]] = field(default_factory=list)
+    signals: int = 0
+    signals_missing: list[str] = field(default_factory=list)
+    sizes: dict[str, float] = field(default_factory=dict)
+    interruptions: int = 0
+    own_ms: tuple[float, float] | None = None
+    error: str | None = None
+    interrupted: bool = False
+    left_behind: list[str] = field(default_factory=list)
+
+
+def cosim(
+    workspace: Workspace,
+    path: Path,
+    options: CosimOptions,
+    *,
+    out: Path | None = None,
+    seed: int | None = None,
+    until: float | None = None,
+    step_length: float | None = None,
+    weather: bool = True,
+    progress: OnProgress | None = None,
+) -> tuple[RunResult, CosimReport]:
+    """Run a scenario in SUMO and show it on a CARLA server.
+
+    The run folder is that of :func:`odscen.workflow.run`, whatever happens to the server: if that
+    fails, SUMO stops and what it did so far is kept.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario has errors.
+    CarlaError
+        If the server is not there or does not fit; nothing has run then.
+    """
+    scenario = workflow.read_scenario(path)
+    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    with in_file(str(path)):
+        refuse_errors(workflow.check_scenario(workspace, scenario))
+    loaded, assets = workflow.load_map(entry), shipped_assets()
+    prepared = prepare(
+        scenario,
+        loaded.sumo,
+        entry.path("net"),
+        assets,
+        seed=seed,
+        until=until,
+        step_length=step_length,
+        weather=weather,
+    )
+    ticks = options.ticks(prepared.plan.step_length)
+    sky = weather_parameters(scenario.environment, assets)
+    report = CosimReport(str(options.address))
+    with (
+        _interrupts() as interrupted,
+        Server(options.address) as server,
+    ):
+        xodr = entry.path("xodr").read_text(encoding="utf-8")
+        report.map = ensure_map(server, entry.name, xodr, load=options.load_map)
+        server.synchronize(prepared.plan.step_length / ticks)
+        server.set_weather(sky)
+        blueprints = choose_blueprints(prepared.plan.actors, assets, server.library())
+        shapes = server.shapes(blueprints)
+        report.sizes = size_differences(prepared.plan.actors, blueprints, shapes)
+        ego = _external_ego(prepared, server, options, blueprints)
+        mirror = Mirror(
+            prepared.plan,
+            blueprints,
+            shapes,
+            nearby=options.nearby,
+            lights=vehicle_lights(sky),
+            left_out=ego.row if ego else None,
+        )
+        show = _Show(server, mirror, Heads(loaded.sumo.lights), ego, ticks, report, interrupted)
+        in_step = InStep(
+            prepared.plan,
+            Ground(loaded.sumo.graph, entry.lane_table()),
+            show.on_step,
+            placed=ego.row if ego else None,
+        )
+        show.stop = in_step.stop
+
+        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+            write_report(folder, summary, drawing=loaded.drawing)
+
+        result = run_prepared(
+            prepared,
+            (out or workspace.runs) / workflow.folder_name(path),
+            progress=progress,
+            finish=finish,
+            live=in_step,
+        )
+        show.conclude()
+    report.left_behind = server.left_behind
+    return result, report
+
+
+def _external_ego(
+    prepared: PreparedRun, server: Server, options: CosimOptions, blueprints: tuple[str, ...]
+) -> ExternalEgo | None:
+    if not options.external_ego:
+        return None
+    row = next((row for row, actor in enumerate(prepared.plan.actors) if actor.ego), None)
+    if row is None:
+        msg = "the scenario has no ego that could be driven in CARLA; mark one of its road users"
+        raise InputError(msg)
+    return ExternalEgo.take(server, prepared.plan, row, blueprints[row])
+
+
+class _Show:
+    """What is done after each step of SUMO's."""
+
+    def __init__(
+        self,
+        server: Server,
+        mirror: Mirror,
+        heads: Heads,
+        ego: ExternalEgo | None,
+        ticks: int,
+        report: CosimReport,
+        interrupted: threading.Event,
+    ) -> None:
+        self.stop: Callable[[], None] = lambda: None
+        self._server = server
+        self._mirror = mirror
+        self._heads = heads
+        self._ego = ego
+        self._ticks = ticks
+        self._report = report
+        self._interrupted = interrupted
+        self._joined = server.take_lights()
+        self._states: dict[str, str] = {}
+        self._own: list[float] = []
+        known = heads.signals
+        report.signals = len(known & self._joined.keys())
+        report.signals_missing = sorted(known - self._joined.keys())
+
+    def on_step(self, step: Step) -> Driven | None:
+        """Show a step; an error ends the run, whose results are kept."""
+        if self._interrupted.is_set():
+            self._report.interrupted = True
+            self.stop()
+            return None
+        try:
+            self._show(step)
+            return self._ego.driven(step) if self._ego else None
+        except CarlaError as error:
+            self._report.error = str(error)
+            self.stop()
+            return None
+
+    def conclude(self) -> None:
+        """Fill in the rest of the report."""
+        report = self._report
+        report.spawned = self._mirror.spawned
+        report.refused = [
+            {"actor": refusal.actor, "tries": refusal.tries, "reason": refusal.reason}
+            for refusal in self._mirror.refusals.values()
+        ]
+        report.interruptions = self._server.interruptions
+        if self._own:
+            median, worst = np.percentile(np.array(self._own) * 1e3, [50, 95])
+            report.own_ms = round(float(median), 3), round(float(worst), 3)
+
+    def _show(self, step: Step) -> None:
+        for number, batch in enumerate(self._timed(step), start=1):
+            if number == self._ticks:
+                batch.signals.update(self._changed_lights(step))
+            waited = self._server.waited
+            start = time.perf_counter()
+            self._mirror.answered(self._server.apply(batch))
+            took = time.perf_counter() - start
+            self._own[-1] += took - (self._server.waited - waited)
+            self._report.ticks += 1
+
+    def _timed(self, step: Step) -> Iterator[Any]:
+        """Batches of a step; what planning each one takes is counted as ours."""
+        batches = self._mirror.batches(step, self._ticks)
+        while True:
+            start = time.perf_counter()
+            batch = next(batches, None)
+            if batch is None:
+                return
+            self._own.append(time.perf_counter() - start)
+            yield batch
+
+    def _changed_lights(self, step: Step) -> dict[int, str]:
+        states = self._heads.states(step.lights)
+        changed = {
+            self._joined[signal]: state
+            for signal, state in states.items()
+            if signal in self._joined and self._states.get(signal) != state
+        }
+        self._states = states
+        return changed
+
+
+@contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Let Ctrl-C and SIGTERM end a run between two steps; a second Ctrl-C ends it at once.
+
+    Everything is still given back then. Outside the main thread nothing can be caught.
+    """
+    told = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield told
+        return
+
+    def tell(number: int, _frame: object) -> None:
+        if told.is_set() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        told.set()
+
+    kept = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield told
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)

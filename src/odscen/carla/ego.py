@@ -1,0 +1,68 @@
+"""The ego that somebody else drives in CARLA: SUMO's ego is put where that one is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+from odscen.carla.batch import Place
+from odscen.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla, xodr_to_sumo
+from odscen.sumo.in_step import Driven
+
+if TYPE_CHECKING:
+    from odscen.carla.server import Server
+    from odscen.results.records import Plan
+    from odscen.sumo.in_step import Step
+
+HERO = "hero"
+"""``role_name`` by which external programs find, or mark, the vehicle they drive."""
+LIFT = 0.3
+"""Metres above the road at which a hero of ours is made; it has physics and comes down."""
+
+
+class ExternalEgo:
+    """The hero on the server.
+
+    Attributes
+    ----------
+    row
+        Row of the plan of SUMO's ego.
+    """
+
+    def __init__(self, server: Server, plan: Plan, row: int, hero: int, ahead: float) -> None:
+        self.row = row
+        self._server = server
+        self._offset = plan.net_offset
+        self._length = plan.actors[row].length
+        self._hero = hero
+        self._ahead = ahead
+
+    @classmethod
+    def take(cls, server: Server, plan: Plan, row: int, blueprint: str) -> Self:
+        """Take the hero that is there; make one at the ego's spawn if there is none.
+
+        One that we make has physics and nobody at the wheel: whoever is to drive it finds it by
+        its role. It is taken away at the end; one that was there stays.
+        """
+        hero = server.find_role(HERO)
+        if hero is None:
+            actor = plan.actors[row]
+            pose = xodr_to_carla(XodrPose(actor.x, actor.y, actor.z, actor.hdg))
+            at = Place(float(pose.x), float(pose.y), float(pose.z) + LIFT, 0.0, float(pose.yaw_deg))
+            hero = server.spawn_free(blueprint, HERO, at)
+        return cls(server, plan, row, hero, server.shape(hero).centre[0])
+
+    def driven(self, step: Step) -> Driven | None:
+        """Where the hero is now, SUMO's way; ``None`` while SUMO's ego is not on the road."""
+        if self.row not in step.index:
+            return None
+        at = self._server.place(self._hero)
+        origin = carla_to_xodr(CarlaPose(at.x, at.y, at.z, at.yaw, at.pitch))
+        # The middle of the box, not the origin, is the body centre: as far ahead of the origin as
+        # a front is of a centre, in a body twice as long.
+        centre = xodr_to_sumo(origin, length=2.0 * self._ahead)
+        front = xodr_to_sumo(
+            XodrPose(centre.x, centre.y, centre.z, origin.hdg, origin.pitch),
+            length=self._length,
+            net_offset=self._offset,
+        )
+        return Driven(float(front.x), float(front.y), float(front.angle_deg))
