@@ -20,10 +20,10 @@ from odscen.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla
 from odscen.results.records import Event, EventKind
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from odscen.carla.client import Server
     from odscen.carla.native import NativeActor
+    from odscen.carla.server import Server
 
 ARRIVED = 2.5
 """Metres from the goal at which somebody has arrived."""
@@ -37,6 +37,8 @@ _SEARCH = 30
 """Points of its way that somebody may pass in one tick, at most."""
 _TURN_AHEAD = 2
 """Points before a change of lane at which it is commanded."""
+
+CONTROLLER = "controller.ai.walker"
 
 COLUMNS = 7
 """Of :meth:`Traffic.rows`: row of the plan, x, y, z, hdg, pitch, speed."""
@@ -98,7 +100,7 @@ class Traffic:
         self,
         server: Server,
         actors: Sequence[NativeActor],
-        blueprints: Mapping[int, str],
+        blueprints: Sequence[str],
         *,
         seed: int,
         physics: bool = True,
@@ -244,11 +246,14 @@ class Traffic:
 
     def _start_controller(self, one: _Underway) -> None:
         """Let CARLA's walker AI find the way; on its own mesh, which is not the scenario's."""
-        (controller,) = self._server.spawn([self._server.controller_command(one.number)])
-        if not isinstance(controller, int):
+        world, carla = self._server.world, self._server.package
+        blueprint = world.get_blueprint_library().find(CONTROLLER)
+        command = carla.command.SpawnActor(blueprint, carla.Transform(), one.number)
+        (controller,) = self._server.spawn([command])
+        if not isinstance(controller, int):  # then it is led, as without a mesh
             return
         self._server.tick()
-        one.controller = self._server.world.get_actor(controller)
+        one.controller = world.get_actor(controller)
         one.controller.start()
         one.controller.go_to_location(self._location(one.plan.way[-1]))
         one.controller.set_max_speed(float(one.plan.speed[0]))
@@ -313,7 +318,7 @@ class Traffic:
     def _lead_walkers(self) -> None:
         """Without a navigation mesh: everybody on foot walks to the next point of its way."""
         commands = []
-        snapshot = self._server.world.get_snapshot()
+        carla, snapshot = self._server.package, self._server.world.get_snapshot()
         for one in self._underway.values():
             if not one.plan.person or one.controller is not None:
                 continue
@@ -325,7 +330,8 @@ class Traffic:
             dx, dy = float(target[0] - pose.x), float(target[1] - pose.y)
             norm = math.hypot(dx, dy) or 1.0
             speed = float(one.plan.speed[one.at])
-            commands.append(self._server.walk_command(one.number, (dx / norm, -dy / norm), speed))
+            control = carla.WalkerControl(carla.Vector3D(dx / norm, -dy / norm, 0.0), speed, False)
+            commands.append(carla.command.ApplyWalkerControl(one.number, control))
         self._server.send(commands)
 
     # ------------------------------------------------------------------------------- leaving

@@ -109,6 +109,7 @@ def run_prepared(
     time_limit: float | None = None,
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
     live: Companion | None = None,
+    simulate: Callable[[Path], Ended] | None = None,
 ) -> RunResult:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -123,6 +124,8 @@ def run_prepared(
         the place to add a report.
     live
         Makes it a run that can be watched and steered, or that goes in step with another.
+    simulate
+        Runs what is in a folder and writes the results there, instead of SUMO's worker.
 
     Raises
     ------
@@ -132,7 +135,10 @@ def run_prepared(
     try:
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
-            ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+            if simulate is None:
+                ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+            else:
+                ended = simulate(folder)
             if ended.done is None:
                 _drop_torn_trajectories(folder)
             summary = _summary(prepared, folder, ended, expectations)
