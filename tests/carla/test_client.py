@@ -7,16 +7,24 @@ from pathlib import Path
 
 import pytest
 
-from odscen.carla.client import ActorRequest, Address, connect
-from odscen.errors import CarlaError
-from odscen.frames import CarlaPose
+from odscen.carla.batch import Batch, Place, Spawn, Velocity
+from odscen.carla.client import Address, connect
+from odscen.carla.maps import ensure_map, same_map
+from odscen.carla.server import Server
+from odscen.errors import CarlaError, InputError
 from tests.carla_standin.process import StandIn
 
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
 
 MAPS = Path(__file__).parents[2] / "maps"
 CROSSING = MAPS / "signal_crossing.xodr"
-CAR = ActorRequest("vehicle.tesla.model3", CarlaPose(0.0, 0.0, 0.0, 90.0))
+ROUNDABOUT = MAPS / "roundabout.xodr"
+STILL = Velocity(0.0, 0.0, 0.0)
+
+
+def car(x: float = 0.0) -> Spawn:
+    at = Place(x, 0.0, 0.0, 0.0, 90.0)
+    return Spawn("vehicle.tesla.model3", "odscen.a", at, STILL, 0.0, False, 0.0, 0)
 
 
 def address_of(server: StandIn, *, timeout: float = 5.0) -> Address:
@@ -44,76 +52,80 @@ def vehicles(server: StandIn) -> list[str]:
 
 
 def test_the_world_is_ours_inside_and_as_it_was_outside() -> None:
-    with StandIn(CROSSING) as server:
-        assert is_free_running(server)
-        with connect(address_of(server), delta=0.05) as session:
-            assert session.map_name == "signal_crossing"
-            assert not is_free_running(server)
-            answer, refused = session.spawn([CAR, CAR])
-            assert answer.actor is not None
-            assert refused.actor is None
-            assert "collision" in refused.problem
-            first = session.tick()
-            assert session.tick() == first + 1
-            at = session.world.get_snapshot().find(answer.actor).get_transform()
-            assert at.rotation.yaw == 90.0
-        assert vehicles(server) == []
-        assert is_free_running(server)
+    with StandIn(CROSSING) as stand_in:
+        assert is_free_running(stand_in)
+        with Server(address_of(stand_in)) as server:
+            server.synchronize(0.05)
+            assert not is_free_running(stand_in)
+            taken, refused = server.apply(Batch(spawn=(car(), car())))
+            assert isinstance(taken, int)
+            assert "collision" in str(refused)
+            assert server.place(taken) == pytest.approx((0.0, 0.0, 0.0, 0.0, 90.0))
+        assert vehicles(stand_in) == []
+        assert is_free_running(stand_in)
+        assert server.left_behind == []
 
 
 def test_a_time_step_that_was_never_set_is_not_restored_as_a_number() -> None:
-    with StandIn(CROSSING) as server:
-        client = carla.Client(server.host, server.port)
+    with StandIn(CROSSING) as stand_in:
+        client = carla.Client(stand_in.host, stand_in.port)
         settings = carla.WorldSettings()
         # The client has been seen to read this from its own memory where there is no step.
         settings.fixed_delta_seconds = 4.7e-310
         client.get_world().apply_settings(settings)
-        assert not is_free_running(server)
-        with connect(address_of(server), delta=0.05):
-            pass
-        assert is_free_running(server)
+        with Server(address_of(stand_in)) as server:
+            server.synchronize(0.05)
+        assert is_free_running(stand_in)
 
 
 def test_what_others_spawned_is_left_alone() -> None:
-    with StandIn(CROSSING) as server:
-        client = carla.Client(server.host, server.port)
-        world = client.get_world()
+    with StandIn(CROSSING) as stand_in:
+        world = carla.Client(stand_in.host, stand_in.port).get_world()
         blueprint = world.get_blueprint_library().find("vehicle.audi.tt")
         world.spawn_actor(blueprint, carla.Transform(carla.Location(50.0, 0.0)))
-        with connect(address_of(server), delta=0.05) as session:
-            session.spawn([CAR])
-        assert vehicles(server) == ["vehicle.audi.tt"]
-
-
-def test_actors_that_were_destroyed_early_do_not_matter_at_the_end() -> None:
-    with StandIn(CROSSING) as server, connect(address_of(server), delta=0.05) as session:
-        (answer,) = session.spawn([CAR])
-        assert answer.actor is not None
-        session.destroy([answer.actor])
-        assert vehicles(server) == []
+        with Server(address_of(stand_in)) as server:
+            server.synchronize(0.05)
+            server.apply(Batch(spawn=(car(),)))
+        assert vehicles(stand_in) == ["vehicle.audi.tt"]
 
 
 def spawn_and_fail(address: Address) -> None:
-    with connect(address, delta=0.05) as session:
-        session.spawn([CAR])
+    with Server(address) as server:
+        server.synchronize(0.05)
+        server.apply(Batch(spawn=(car(),)))
         raise ZeroDivisionError
 
 
 def test_the_world_is_restored_after_an_error_too() -> None:
-    with StandIn(CROSSING) as server:
+    with StandIn(CROSSING) as stand_in:
         with pytest.raises(ZeroDivisionError):
-            spawn_and_fail(address_of(server))
-        assert vehicles(server) == []
-        assert is_free_running(server)
+            spawn_and_fail(address_of(stand_in))
+        assert vehicles(stand_in) == []
+        assert is_free_running(stand_in)
+
+
+def test_weather_and_traffic_lights_are_given_back() -> None:
+    with StandIn(CROSSING) as stand_in:
+        world = carla.Client(stand_in.host, stand_in.port).get_world()
+        before = world.get_weather()
+        with Server(address_of(stand_in)) as server:
+            server.synchronize(0.05)
+            server.set_weather({"fog_density": 77.0, "sun_altitude_angle": -30.0})
+            assert world.get_weather().fog_density == 77.0
+            lights = server.take_lights()
+            server.apply(Batch(signals=dict.fromkeys(lights.values(), "Off")))
+            state = world.get_snapshot
+            assert state().frame
+        assert world.get_weather() == before
+        world.wait_for_tick(2.0)
+        light = world.get_actors().filter("traffic.traffic_light*")[0]
+        assert not light.is_frozen()
 
 
 def test_an_absent_server_is_named_with_what_to_do() -> None:
     port = free_port()
-    with (
-        pytest.raises(CarlaError, match=f"no CARLA server at 127.0.0.1:{port} .*start CARLA"),
-        connect(Address("127.0.0.1", port, 0.5), delta=0.05),
-    ):
-        pass
+    with pytest.raises(CarlaError, match=f"no CARLA server at 127.0.0.1:{port} .*start CARLA"):
+        connect(Address("127.0.0.1", port, 0.5))
 
 
 def test_a_server_that_is_only_starting_is_waited_for() -> None:
@@ -128,93 +140,92 @@ def test_a_server_that_is_only_starting_is_waited_for() -> None:
     late = threading.Thread(target=listen_late)
     late.start()
     # Nothing but the port comes up, so it gets further than "no server" and then no answer.
-    with (
-        pytest.raises(CarlaError, match="has not answered for 2 s"),
-        connect(Address("127.0.0.1", port, 2.0), delta=0.05),
-    ):
-        pass
+    with pytest.raises(CarlaError, match="has not answered for 2 s"):
+        connect(Address("127.0.0.1", port, 2.0))
     late.join()
     listener.close()
 
 
 def test_an_unknown_host_is_named() -> None:
-    with (
-        pytest.raises(CarlaError, match=r"no machine named 'nowhere\.invalid'"),
-        connect(Address("nowhere.invalid", 2000, 0.5), delta=0.05),
-    ):
-        pass
+    with pytest.raises(CarlaError, match=r"no machine named 'nowhere\.invalid'"):
+        connect(Address("nowhere.invalid", 2000, 0.5))
+
+
+@pytest.mark.parametrize("text", ["localhost:port", "localhost:", "host:0", "host:70000"])
+def test_what_is_no_address_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="HOST:PORT"):
+        Address.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [(":2010", "127.0.0.1", 2010), ("box", "box", 2000), ("box:2010", "box", 2010)],
+)
+def test_half_an_address_is_completed(text: str, host: str, port: int) -> None:
+    assert Address.parse(text, timeout=3.0) == Address(host, port, 3.0)
 
 
 def test_another_release_is_refused_before_anything_is_touched() -> None:
-    with StandIn(CROSSING, version="0.9.15") as server:
-        with (
-            pytest.raises(CarlaError, match=r"release 0\.9\.15, the package carla is 0\.9\.16"),
-            connect(address_of(server), delta=0.05),
-        ):
-            pass
-        assert set(server.calls()) == {"version"}
+    with StandIn(CROSSING, version="0.9.15") as stand_in:
+        with pytest.raises(CarlaError, match=r"release 0\.9\.15, the package carla is 0\.9\.16"):
+            Server(address_of(stand_in))
+        assert set(stand_in.calls()) == {"version"}
 
 
-def test_another_map_is_refused_by_name() -> None:
-    text = (MAPS / "roundabout.xodr").read_text(encoding="utf-8")
-    with StandIn(CROSSING) as server:
-        with (
-            pytest.raises(CarlaError, match="another map, Carla/Maps/signal_crossing: load"),
-            connect(address_of(server), delta=0.05, opendrive=text),
-        ):
-            pass
-        assert is_free_running(server)
+def test_another_map_is_refused_by_name_if_none_may_be_loaded() -> None:
+    text = ROUNDABOUT.read_text(encoding="utf-8")
+    with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
+        with pytest.raises(CarlaError, match="shows signal_crossing, and the scenario is on round"):
+            ensure_map(server, "roundabout", text, load=False)
 
 
-def test_the_same_map_with_other_line_ends_is_the_same() -> None:
-    text = CROSSING.read_text(encoding="utf-8").replace("\n", "\r\n")
-    with (
-        StandIn(CROSSING) as server,
-        connect(address_of(server), delta=0.05, opendrive=text) as session,
-    ):
-        assert session.map_name == "signal_crossing"
+def test_the_server_loads_the_map_if_it_has_it() -> None:
+    text = ROUNDABOUT.read_text(encoding="utf-8")
+    maps = {"roundabout": ROUNDABOUT}
+    with StandIn(CROSSING, other_maps=maps) as stand_in, Server(address_of(stand_in)) as server:
+        assert ensure_map(server, "roundabout", text) == "loaded"
+        assert server.map_name == "roundabout"
+        assert ensure_map(server, "roundabout", text) == "there"
 
 
-def test_the_server_makes_a_world_of_our_map_if_it_may() -> None:
-    text = (MAPS / "roundabout.xodr").read_text(encoding="utf-8")
-    with (
-        StandIn(CROSSING) as server,
-        connect(address_of(server), delta=0.05, opendrive=text, generate=True) as session,
-    ):
-        assert session.world.get_map().to_opendrive() == text
-        session.tick()
+def test_the_server_makes_a_world_of_our_map_if_it_does_not_have_it() -> None:
+    text = ROUNDABOUT.read_text(encoding="utf-8")
+    # A map of that name that is another one does not do.
+    maps = {"roundabout": MAPS / "rural_hills.xodr"}
+    with StandIn(CROSSING, other_maps=maps) as stand_in, Server(address_of(stand_in)) as server:
+        assert ensure_map(server, "roundabout", text) == "generated"
+        assert server.opendrive() == text
 
 
-def tick_until_death(server: StandIn) -> None:
-    with connect(address_of(server, timeout=0.5), delta=0.05) as session:
-        session.spawn([CAR])
-        server.set(die_at_tick=2)
-        session.tick()
-        session.tick()
+def test_maps_are_the_same_whatever_their_header_and_line_ends() -> None:
+    text = CROSSING.read_text(encoding="utf-8")
+    assert same_map(text, text.replace("\n", "\r\n"))
+    assert same_map(text, text.replace('name="signal_crossing"', 'name="other"', 1))
+    assert not same_map(text, ROUNDABOUT.read_text(encoding="utf-8"))
+
+
+def tick_until_death(stand_in: StandIn) -> None:
+    with Server(address_of(stand_in, timeout=0.5)) as server:
+        server.synchronize(0.05)
+        server.apply(Batch(spawn=(car(),)))
+        stand_in.set(die_at_tick=2)
+        server.apply(Batch())
+        server.apply(Batch())
 
 
 def test_a_server_that_dies_is_told() -> None:
-    with StandIn(CROSSING) as server:
-        with pytest.raises(CarlaError, match=r"has not answered for 0\.5 s"):
-            tick_until_death(server)
-        assert server.has_died()
+    with StandIn(CROSSING) as stand_in:
+        with pytest.raises(CarlaError, match="is gone: nobody listens"):
+            tick_until_death(stand_in)
+        assert stand_in.has_died()
 
 
-def kill_and_fail(server: StandIn) -> None:
-    with connect(address_of(server, timeout=0.5), delta=0.05) as session:
-        session.spawn([CAR])
-        server.kill()
+def kill_and_fail(stand_in: StandIn) -> None:
+    with Server(address_of(stand_in, timeout=0.5)):
+        stand_in.kill()
         raise ZeroDivisionError
 
 
 def test_the_first_error_is_not_hidden_by_one_of_restoring() -> None:
-    with StandIn(CROSSING) as server, pytest.raises(ZeroDivisionError):
-        kill_and_fail(server)
-
-
-def test_an_unknown_blueprint_or_attribute_is_named() -> None:
-    with StandIn(CROSSING) as server, connect(address_of(server), delta=0.05) as session:
-        with pytest.raises(CarlaError, match=r"cannot make a vehicle\.flying\.carpet"):
-            session.spawn([ActorRequest("vehicle.flying.carpet", CAR.pose)])
-        with pytest.raises(CarlaError, match="wings"):
-            session.spawn([ActorRequest(CAR.blueprint, CAR.pose, {"wings": "2"})])
+    with StandIn(CROSSING) as stand_in, pytest.raises(ZeroDivisionError):
+        kill_and_fail(stand_in)

@@ -1,0 +1,60 @@
+"""Maps, scenarios on them, and what SUMO alone says of a run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from odscen import workflow
+from odscen.catalog.store import Workspace
+
+MAPS = Path(__file__).parents[2] / "maps"
+Sample = Callable[..., Path]
+
+_LIGHTS = """
+import json, sys
+import libsumo
+libsumo.start(["sumo", "--configuration-file", sys.argv[1], "--fcd-output", "/dev/null"])
+told = []
+for _ in range(int(sys.argv[2])):
+    libsumo.simulationStep()
+    light = libsumo.trafficlight
+    told.append({name: light.getRedYellowGreenState(name) for name in light.getIDList()})
+libsumo.close()
+print("\\n" + json.dumps(told))
+"""
+
+
+def lights_of_sumo_alone(folder: Path, steps: int) -> list[dict[str, str]]:
+    """State of each traffic light after each step, from SUMO without anything of ours."""
+    done = subprocess.run(
+        [sys.executable, "-c", _LIGHTS, str(folder / "sumo" / "scenario.sumocfg"), str(steps)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return list(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.fixture(scope="session")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    return Workspace.open(tmp_path_factory.mktemp("cosim"))
+
+
+@pytest.fixture(scope="session")
+def sample(workspace: Workspace) -> Sample:
+    """Return a function that samples a scenario on a map, shipped or named by its file."""
+
+    def sampled(xodr: Path, *, seed: int = 1, fill: float = 0.2, segments: int = 12) -> Path:
+        workspace.add_map(xodr)
+        [path] = workflow.generate(
+            workspace, map_name=xodr.stem, seed=seed, fill=fill, roi_segments=segments
+        )
+        return path
+
+    return sampled

@@ -1,0 +1,180 @@
+"""What the server shows, against SUMO's own recording turned into CARLA's frame by a few lines."""
+
+from __future__ import annotations
+
+import json
+import math
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from odscen.carla.client import Address
+from odscen.carla.cosim import CosimOptions, cosim
+from odscen.catalog.store import Workspace
+from tests.carla.conftest import MAPS, Sample, lights_of_sumo_alone
+from tests.carla.observer import Frame, Observer
+from tests.carla_standin.process import StandIn
+
+carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
+
+STEP = 0.2
+TICKS = 2
+SECONDS = 20.0
+LETTERS = {"G": "Green", "g": "Green", "y": "Yellow", "r": "Red", "s": "Red", "u": "Yellow"}
+
+
+class Oracle:
+    """Heights from the client's own map: 1 m apart, on the roads that SUMO's lane belongs to."""
+
+    def __init__(self, workspace: Workspace, name: str) -> None:
+        entry = workspace.map(name)
+        self.map = carla.Map(name, entry.path("xodr").read_text(encoding="utf-8"))
+        points = [(w.transform.location, w.road_id) for w in self.map.generate_waypoints(1.0)]
+        self.xyz = np.array([(p.x, p.y, p.z) for p, _ in points])
+        self.road = np.array([str(road) for _, road in points])
+        table = entry.lane_table()
+        self.roads: dict[str, set[str]] = {}
+        for piece in table.pieces:
+            lane = table.lane_list[piece.sumo].id
+            self.roads.setdefault(lane, set()).add(str(table.lane_keys[piece.lane].road))
+
+    def ground(self, lane: str, x: float, y: float) -> tuple[float, float, float] | None:
+        """Height, slope (degrees) and direction (degrees) of the road, if that is known."""
+        own = np.isin(self.road, sorted(self.roads.get(lane, ())))
+        if not own.any():
+            return None
+        near = self.xyz[own]
+        guess = near[np.argmin(np.hypot(near[:, 0] - x, near[:, 1] - y))]
+        place = carla.Location(x, y, float(guess[2]))
+        at = self.map.get_waypoint(place, lane_type=carla.LaneType.Any).transform
+        return at.location.z, at.rotation.pitch, at.rotation.yaw
+
+
+def differences(
+    folder: Path, observer: Observer, frames: list[Frame], oracle: Oracle
+) -> dict[str, list[float]]:
+    plan = json.loads((folder / "plan.json").read_text())
+    actors = {actor["id"]: actor for actor in plan["actors"]}
+    dx, dy = plan["net_offset"]
+    rows = pl.read_parquet(folder / "trajectories.parquet").rename(
+        lambda name: name.removeprefix("vehicle_").removeprefix("person_").replace("timestep_", "")
+    )
+    off: dict[str, list[float]] = {"place": [], "height": [], "heading": [], "pitch": []}
+    for k, frame in enumerate(frames):
+        now = rows.filter((pl.col("time") - k * STEP).abs() < 1e-6)
+        assert set(frame.users) == set(now["id"]), f"step {k}"
+        for row in now.iter_rows(named=True):
+            actor = actors[row["id"]]
+            x, y, z, pitch, yaw, *_ = frame.users[row["id"]]
+            ahead, _, _, half_height = observer.boxes[row["id"]]
+            walks = actor["category"] == "pedestrian"
+            # SUMO: front bumper, degrees clockwise from north. CARLA: middle, clockwise from east.
+            east = math.radians(row["angle"] - 90.0)
+            fx, fy = row["x"] - dx, -(row["y"] - dy)
+            half = actor["length"] / 2
+            ground = oracle.ground(row["lane"], fx - half * math.cos(east), fy - half * math.sin(east))
+            slope = 0.0
+            if ground is not None and not walks:
+                turn = east - math.radians(ground[2])
+                slope = math.atan(math.tan(math.radians(ground[1])) * math.cos(turn))
+                off["pitch"].append(abs(pitch - math.degrees(slope)))
+            level = half * math.cos(slope)
+            back = ahead * math.cos(math.radians(pitch))
+            mx = x + back * math.cos(math.radians(yaw))
+            my = y + back * math.sin(math.radians(yaw))
+            off["place"].append(
+                math.hypot(mx - fx + level * math.cos(east), my - fy + level * math.sin(east))
+            )
+            off["heading"].append(abs((yaw - math.degrees(east) + 180.0) % 360.0 - 180.0))
+            if ground is not None and not walks:
+                off["height"].append(abs(z + ahead * math.sin(math.radians(pitch)) - ground[0]))
+            elif walks:
+                assert ground is None or z - half_height == pytest.approx(ground[0], abs=0.35)
+    return off
+
+
+def shown_lights(net: Path, states: dict[str, str]) -> dict[str, set[str]]:
+    """What each signal may show, from the network file's own notes of its links."""
+    found: dict[str, set[str]] = {}
+    for logic in ET.parse(net).getroot().iter("tlLogic"):
+        for note in logic.iter("param"):
+            key = note.get("key", "")
+            if key.startswith("linkSignalID:"):
+                letter = states[logic.get("id", "")][int(key.removeprefix("linkSignalID:"))]
+                for signal in note.get("value", "").split():
+                    found.setdefault(signal, set()).add(LETTERS[letter])
+    # A signal over several lanes shows green if any of them may go.
+    order = ("Green", "Yellow", "Red")
+    return {s: {next(o for o in order if o in states)} for s, states in found.items()}
+
+
+def mirrored(
+    workspace: Workspace, path: Path, xodr: Path, tmp_path: Path, box_offset: float
+) -> tuple[Path, Observer, list[Frame]]:
+    with StandIn(xodr, map_name=xodr.stem, box_offset=box_offset) as server:
+        before = server.actors()
+        observer = Observer(server, tmp_path / "seen.json")
+        with observer:
+            result, report = cosim(
+                workspace,
+                path,
+                CosimOptions(Address(server.host, server.port), tick=STEP / TICKS),
+                out=tmp_path,
+                until=SECONDS,
+                step_length=STEP,
+            )
+        assert result.status == "completed"
+        assert (report.error, report.refused, report.left_behind) == (None, [], [])
+        assert report.signals_missing == []
+        assert [a["id"] for a in server.actors()] == [a["id"] for a in before]
+    first = next(number for number, frame in enumerate(observer.frames) if frame.users)
+    return result.folder, observer, observer.frames[first : first + report.ticks : TICKS]
+
+
+def check(
+    workspace: Workspace, path: Path, xodr: Path, tmp_path: Path, box_offset: float = 0.0
+) -> dict[str, list[float]]:
+    folder, observer, frames = mirrored(workspace, path, xodr, tmp_path, box_offset)
+    assert len(frames) == round(SECONDS / STEP)
+    off = differences(folder, observer, frames, Oracle(workspace, xodr.stem))
+    assert max(off["place"]) <= 0.05
+    assert max(off["heading"]) <= 0.5
+    assert max(off["height"]) <= 0.05
+    assert max(off["pitch"]) <= 0.5
+    alone = lights_of_sumo_alone(folder, len(frames))
+    for frame, states in zip(frames, alone, strict=True):
+        for signal, shown in shown_lights(folder / "sumo" / "net.net.xml", states).items():
+            assert frame.lights[signal] in shown, f"signal {signal} in frame {frame.number}"
+    return off
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_signalised_crossing_is_shown_exactly(
+    workspace: Workspace, sample: Sample, tmp_path: Path, seed: int
+) -> None:
+    xodr = MAPS / "signal_crossing.xodr"
+    check(workspace, sample(xodr, seed=seed), xodr, tmp_path)
+
+
+def test_bodies_are_in_the_middle_of_boxes_that_are_not_around_their_origin(
+    workspace: Workspace, sample: Sample, tmp_path: Path
+) -> None:
+    xodr = MAPS / "signal_crossing.xodr"
+    check(workspace, sample(xodr, seed=4), xodr, tmp_path, box_offset=-0.4)
+
+
+def test_hills_are_shown_exactly(workspace: Workspace, sample: Sample, tmp_path: Path) -> None:
+    xodr = MAPS / "rural_hills.xodr"
+    off = check(workspace, sample(xodr, fill=0.4), xodr, tmp_path)
+    assert off["height"]
+
+
+@pytest.mark.parametrize("name", ["carla-2019/Town05", "carla-2020/Town04"])
+def test_towns_with_slopes_and_bridges_are_shown_exactly(
+    workspace: Workspace, sample: Sample, shared_maps: Path, tmp_path: Path, name: str
+) -> None:
+    xodr = shared_maps / f"{name}.xodr"
+    check(workspace, sample(xodr, seed=5, fill=0.1, segments=30), xodr, tmp_path)
