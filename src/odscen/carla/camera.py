@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.carla.mirror import ROLE
-from odscen.carla.pictures import Picture
+from odscen.carla.pictures import Picture, picture_files, still
 from odscen.errors import CarlaError, OdscenError
 
 if TYPE_CHECKING:
@@ -157,6 +157,32 @@ def open_camera(
             server.destroy([number])
     if failed:
         raise failed[0]
+
+
+@contextmanager
+def watch_from_above(
+    server: Server, view: View, wish: Wish, on_picture: Callable[[bytes], None] | None
+) -> Iterator[Camera]:
+    """Put a camera up whose pictures are written as wished, and told of as JPEG.
+
+    Raises
+    ------
+    CarlaError
+        If the server will not have it.
+    WorkspaceError
+        If a file cannot be written; the run has gone on without.
+    """
+    with picture_files(wish) as write:
+
+        def take(picture: Picture) -> None:
+            write(picture)
+            if on_picture is not None:
+                on_picture(still(picture, "jpeg"))
+
+        with open_camera(
+            server, view, take, width=wish.width, height=wish.height, rate=wish.rate
+        ) as camera:
+            yield camera
 
 
 def _put_up(server: Server, view: View, *, width: int, height: int, rate: float) -> int:

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from odscen.carla.blueprints import choose_blueprints
-from odscen.carla.camera import View, open_camera
+from odscen.carla.camera import View, watch_from_above
 from odscen.carla.maps import ensure_map
-from odscen.carla.pictures import Wish, picture_files, still
+from odscen.carla.pictures import Wish
 from odscen.carla.server import Server
 from odscen.carla.traffic import Traffic
 from odscen.catalog.assets import shipped_assets
@@ -36,12 +36,16 @@ if TYPE_CHECKING:
     from odscen.carla.camera import Camera
     from odscen.carla.client import Address
     from odscen.carla.native import NativeActor
-    from odscen.carla.pictures import Picture
     from odscen.results.records import Event, Plan
 
 NO_NAVIGATION = (
     "the world has no navigation mesh: pedestrians are led along their ways and do not look "
     "around them"
+)
+
+ROAD_ENDS = (
+    "{} vehicles were taken away by the Traffic Manager {:.0f} to {:.0f} m before their goals, "
+    "where it saw the road end; they count as arrived"
 )
 
 
@@ -138,7 +142,10 @@ def _run(job: NativeJob, tell: Callable[[Told], None], asked: Callable[[], bool]
         names = choose_blueprints(job.plan.actors, shipped_assets(), server.library())
         traffic = Traffic(server, job.actors, names, seed=job.plan.seed, physics=job.physics)
         stack.callback(traffic.close)
-        camera = _camera(job, server, tell, stack)
+        camera = None
+        if job.pictures.any or job.watched:
+            shoot = (lambda jpeg: tell(Shot(jpeg))) if job.watched else None
+            camera = stack.enter_context(watch_from_above(server, job.view, job.pictures, shoot))
         if not traffic.has_navigation and any(actor.person for actor in job.actors):
             tell(Note(NO_NAVIGATION))
         done = _steps(job, tell, asked, traffic, camera)
@@ -158,7 +165,7 @@ def _steps(
     ego = next((actor.row for actor in job.actors if actor.ego), None)
     while now < job.plan.until - job.delta / 2 and traffic.expected and not stopped:
         happened = traffic.step(now, job.delta)
-        rows = traffic.rows()
+        rows = traffic.rows(job.delta)
         events, notes = tuple(happened.events), tuple(happened.notes)
         tell(Tick(now, rows, events, notes, traffic.running))
         if camera is not None and ego is not None:
@@ -167,24 +174,9 @@ def _steps(
         steps += 1
         now = steps * job.delta
         stopped = asked()
+    if traffic.road_ends:
+        low, high = min(traffic.road_ends), max(traffic.road_ends)
+        tell(Note(ROAD_ENDS.format(len(traffic.road_ends), low, high)))
     for actor, reason in traffic.refusals().items():
         tell(Note(f"{actor}: the server would not take it: {reason}"))
     return Done(now, steps, time.perf_counter() - begin, stopped)
-
-
-def _camera(
-    job: NativeJob, server: Server, tell: Callable[[Told], None], stack: ExitStack
-) -> Camera | None:
-    wish = job.pictures
-    if not (wish.any or job.watched):
-        return None
-    write = stack.enter_context(picture_files(wish))
-
-    def take(picture: Picture) -> None:
-        write(picture)
-        if job.watched:
-            tell(Shot(still(picture, "jpeg")))
-
-    return stack.enter_context(
-        open_camera(server, job.view, take, width=wish.width, height=wish.height, rate=wish.rate)
-    )

@@ -318,6 +318,10 @@ class Server:
             self._world.freeze_all_traffic_lights(True)
             return {str(light.get_opendrive_id()): light.id for light in lights}
 
+    def light_states(self) -> dict[int, str]:
+        """State of each light taken, in the newest state of the server, by actor."""
+        return {number: str(light.get_state()) for number, light in self._lights.items()}
+
     # ------------------------------------------------------------------------------- ticks
     def apply(self, batch: Batch) -> list[int | str]:
         """Do all of a batch, in one call but for lights that change, and make the tick.

@@ -94,6 +94,9 @@ class Traffic:
     ----------
     has_navigation
         Whether the world has a navigation mesh; without one walkers are led along their ways.
+    road_ends
+        Metres to the goal of each vehicle that the Traffic Manager took away where a road ends,
+        which it does as soon as it sees the end. They count as arrived.
     """
 
     def __init__(
@@ -110,6 +113,9 @@ class Traffic:
         self._waiting = sorted(actors, key=lambda actor: (actor.depart, actor.row))
         self._tries: dict[int, _Tries] = {}
         self._underway: dict[int, _Underway] = {}
+        self._physics = physics
+        self._seen: dict[int, XodrPose] = {}
+        self.road_ends: list[float] = []
         self._port = _free_port()
         self._manager = server.client.get_trafficmanager(self._port)
         self._manager.set_synchronous_mode(True)
@@ -151,18 +157,26 @@ class Traffic:
         self._follow(snapshot, time + delta, happened)
         return happened
 
-    def rows(self) -> np.ndarray:
-        """Everybody on the road, shape ``(N, 7)``; body origins, OpenDRIVE frame.
+    def rows(self, delta: float) -> np.ndarray:
+        """Everybody on the road after a tick of ``delta`` seconds, shape ``(N, 7)``.
 
-        Columns: row of the plan, x, y, z, hdg, pitch, speed; metres, radians, m/s.
+        Columns: row of the plan, x, y, z, hdg, pitch, speed; origins of the actors in the OpenDRIVE
+        frame, metres, radians, m/s.
         """
         snapshot = self._server.world.get_snapshot()
-        rows = []
-        for one in self._underway.values():
+        rows, seen = [], {}
+        for row, one in self._underway.items():
             state = snapshot.find(one.number)
-            if state is not None:
-                pose, speed = _pose(state), _length(state.get_velocity())
-                rows.append([one.plan.row, pose.x, pose.y, pose.z, pose.hdg, pose.pitch, speed])
+            if state is None:
+                continue
+            pose = seen[row] = _pose(state)
+            speed = _length(state.get_velocity())
+            if not (self._physics or one.plan.person):
+                # The Traffic Manager then puts vehicles where they are to be, at no velocity.
+                last = self._seen.get(row, pose)
+                speed = math.hypot(pose.x - last.x, pose.y - last.y) / delta
+            rows.append([row, pose.x, pose.y, pose.z, pose.hdg, pose.pitch, speed])
+        self._seen = seen
         return np.array(rows, dtype="<f8").reshape(-1, COLUMNS)
 
     def close(self) -> None:
@@ -296,11 +310,13 @@ class Traffic:
         if time - one.since < 2 * RETRY_SECONDS and one.at == 0:
             return False
         left = _left(one)
-        where = f"{left:.0f} m before its goal"
         if left <= END_OF_ROAD:
             happened.events.append(_arrival(one, time))
-            where += ", where the road ends: counted as arrived"
-        happened.notes.append(f"{one.plan.id}: the Traffic Manager took it away {where}")
+            self.road_ends.append(left)
+            return True
+        happened.notes.append(
+            f"{one.plan.id}: the Traffic Manager took it away {left:.0f} m before its goal"
+        )
         return True
 
     def _set_speed(self, one: _Underway) -> None:

@@ -85,10 +85,11 @@ def render_report(
         actor_table(actors, travel(traces)),
         _foot(summary),
     ]
-    return _page(title, join([part for part in body if part]))
+    return html_page(f"{title} - run report", join([part for part in body if part]))
 
 
-def _page(title: str, body: Markup) -> str:
+def html_page(title: str, body: Markup) -> str:
+    """Whole page with our style and script inside; forbids itself everything else."""
     style, script = _asset("report.css"), _asset("report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
@@ -97,7 +98,7 @@ def _page(title: str, body: Markup) -> str:
         Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", name="color-scheme", content="light dark"),
-        element("title", f"{title} - run report"),
+        element("title", title),
         element("style", Markup(style)),
     ]
     script_element = element("script", Markup(script))

@@ -50,7 +50,8 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
     return element("section", element("h2", heading), *children, note, id=ident)
 
 
-def _table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
+def html_table(heads: Sequence[str], rows: list[Markup], **attributes: str) -> Markup:
+    """Table that scrolls sideways where there is no room, by keyboard too."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
     table = element("table", head, element("tbody", *rows), **attributes)
     return element("div", table, class_="scroll", tabindex="0", role="region", aria_label=heads[0])
@@ -74,7 +75,7 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
         "each line was asked for when the run was started; the value is what the run gave. Names "
         "like arrived compare the share of all planned actors."
     )
-    table = _table(("Expectation", "Value", "Verdict"), rows)
+    table = html_table(("Expectation", "Value", "Verdict"), rows)
     return report_section("Expectations", table, explained=explained, ident="expectations")
 
 
@@ -157,7 +158,7 @@ def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
         "press a heading to sort by it, once more to turn the order round. Times count from the "
         "start of the simulation; an empty field means that it never came to that."
     )
-    table = _table(_COLUMNS, rows, id="actors-table")
+    table = html_table(_COLUMNS, rows, id="actors-table")
     return report_section("Actors", control, more, table, explained=explained, ident="actors")
 
 
