@@ -26,6 +26,8 @@ GOAL_M, GOAL_DEG = 0.05, 0.5
 """What a mirror is to keep within: metres and degrees."""
 STEPS_M = (GOAL_M, 0.2, 1.0)
 """Limits between the classes of the map, metres."""
+NOTHING = 1e-4
+"""Metres below which a difference is that of the numbers themselves: CARLA's have 32 bits."""
 CELL = 3.0
 """Metres of a cell of the map."""
 ABSENT = 50
@@ -125,6 +127,8 @@ def _verdict(value: float | None, goal: float) -> str | None:
 def _length(value: float | None) -> str:
     if value is None:
         return "-"
+    if value < NOTHING:
+        return "under 0.1 mm"
     return f"{number(value * 100.0, 2)} cm" if value < 1.0 else f"{number(value, 2)} m"
 
 
@@ -173,6 +177,10 @@ def _time(states: pl.DataFrame) -> Markup | None:
     last = states["time"].max()
     if not isinstance(last, float) or states["position"].null_count() == states.height:
         return None
+    explained = "a rise that never falls again means that one world has slipped against the other."
+    if states["position"].max() < NOTHING:  # type: ignore[operator]
+        words = element("p", "At no time was anybody 0.1 mm apart.", class_="good")
+        return report_section("When", words, explained=explained, ident="time")
     time, median, most = error_curve(states, width=bin_width(max(last, 1.0)))
     lines = [
         Series("largest", "c-bus", most * 100.0),
@@ -181,7 +189,6 @@ def _time(states: pl.DataFrame) -> Markup | None:
     chart = line_chart(
         time, lines, y_label="distance, cm", description="Distance between the worlds over time"
     )
-    explained = "a rise that never falls again means that one world has slipped against the other."
     return report_section("When", chart, explained=explained, ident="time")
 
 
@@ -238,7 +245,8 @@ def _lights(lights: Mapping[str, Any]) -> Markup | None:
 
 
 def _worst(worst: Sequence[Mapping[str, Any]]) -> Markup | None:
-    if not worst:
+    worth = [row for row in worst if row["position"] >= NOTHING]
+    if not worth:
         return None
     rows = [
         element(
@@ -250,7 +258,7 @@ def _worst(worst: Sequence[Mapping[str, Any]]) -> Markup | None:
             element("td", f"{number(row['heading'], 3)}°"),
             element("td", f"{number(row['x'], 1)}, {number(row['y'], 1)}"),
         )
-        for row in worst
+        for row in worth
     ]
     heads = ("Road user", "Category", "At", "Apart", "Heading", "Place (x, y)")
     explained = "each road user is listed once, at its worst moment."

@@ -138,7 +138,14 @@ class Place:
     angle_deg: float
 
 
-Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace | Lockstep | State
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A camera's picture of a mirrored run; ``size`` bytes of JPEG follow the line."""
+
+    size: int
+
+
+Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace | Lockstep | State | Shot
 OnProgress = Callable[[Progress], None]
 
 _KINDS: dict[str, type[Message | Command | Place]] = {
@@ -151,6 +158,7 @@ _KINDS: dict[str, type[Message | Command | Place]] = {
     "pace": Pace,
     "lockstep": Lockstep,
     "state": State,
+    "shot": Shot,
     "place": Place,
     "command": Command,
 }
