@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -22,7 +23,7 @@ carla = pytest.importorskip("carla", reason="co-simulation needs the package car
 
 STEP = 0.2
 TICKS = 2
-SECONDS = 20.0
+SECONDS = 12.0
 LETTERS = {"G": "Green", "g": "Green", "y": "Yellow", "r": "Red", "s": "Red", "u": "Yellow"}
 
 
@@ -36,6 +37,7 @@ class Oracle:
         self.xyz = np.array([(p.x, p.y, p.z) for p, _ in points])
         self.road = np.array([str(road) for _, road in points])
         table = entry.lane_table()
+        self.near: dict[str, np.ndarray] = {}
         self.roads: dict[str, set[str]] = {}
         for piece in table.pieces:
             lane = table.lane_list[piece.sumo].id
@@ -43,10 +45,11 @@ class Oracle:
 
     def ground(self, lane: str, x: float, y: float) -> tuple[float, float, float] | None:
         """Height, slope (degrees) and direction (degrees) of the road, if that is known."""
-        own = np.isin(self.road, sorted(self.roads.get(lane, ())))
-        if not own.any():
+        if lane not in self.near:
+            self.near[lane] = self.xyz[np.isin(self.road, sorted(self.roads.get(lane, ())))]
+        near = self.near[lane]
+        if not len(near):
             return None
-        near = self.xyz[own]
         guess = near[np.argmin(np.hypot(near[:, 0] - x, near[:, 1] - y))]
         place = carla.Location(x, y, float(guess[2]))
         at = self.map.get_waypoint(place, lane_type=carla.LaneType.Any).transform
@@ -167,7 +170,10 @@ def test_bodies_are_in_the_middle_of_boxes_that_are_not_around_their_origin(
 
 
 def test_hills_are_shown_exactly(workspace: Workspace, sample: Sample, tmp_path: Path) -> None:
-    xodr = MAPS / "rural_hills.xodr"
+    # CARLA's maps know no superelevation, so the oracle cannot judge heights with it.
+    text = (MAPS / "rural_hills.xodr").read_text(encoding="utf-8")
+    xodr = tmp_path / "level_hills.xodr"
+    xodr.write_text(re.sub(r"<superelevation .*?/>", "", text), encoding="utf-8")
     off = check(workspace, sample(xodr, fill=0.4), xodr, tmp_path)
     assert off["height"]
 
