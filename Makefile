@@ -3,18 +3,35 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
 QC := build/qc/ready
+# The page in the browser, and what it is built from; Node comes from PyPI, into .venv.
+PAGE := src/odscen/web/static/index.html
+PAGE_SOURCES := $(shell find frontend/src frontend/public -type f) \
+	$(wildcard frontend/*.json frontend/*.ts frontend/*.cjs frontend/*.html)
+MODULES := frontend/node_modules/.package-lock.json
+NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test check format bench golden maps large-town check-maps clean
+.PHONY: demo test test-page chromium page check format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
 # Set-up plus the tests.
-test: $(READY) $(QC)
+test: test-page $(READY) $(QC) $(PAGE) chromium
 	$(BIN)/python -m pytest
 
-check: $(READY)
+# The parts of the page that need no browser.
+test-page: $(MODULES)
+	$(NPM) run test
+
+page: $(PAGE)
+
+# For the tests in a browser, which are skipped without; ODSCEN_REQUIRE_BROWSER=1 and CI forbid that.
+chromium:
+	$(PYTHON) tools/chromium.py
+
+check: $(READY) $(MODULES)
+	$(NPM) run check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -25,8 +42,16 @@ format: $(READY)
 	$(BIN)/ruff format .
 
 # Benchmarks print ratios against a named peer, measured in the same run.
-bench: $(READY)
+bench: $(READY) $(PAGE) chromium
 	$(BIN)/python -m bench
+
+# The wheel from a clone of what is committed, on a machine without Node.
+check-wheel: $(READY)
+	$(BIN)/python -m tools.check_wheel
+
+# Pictures of every view for docs/, light and dark.
+screenshots: $(READY) $(PAGE) chromium
+	$(BIN)/python -m tools.screenshots
 
 # Rewrites golden files and the published schema from what the code does now; read the diff.
 golden: $(READY)
@@ -56,5 +81,13 @@ $(READY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable '.[png]' --group dev
 	touch $@
 
+$(MODULES): frontend/package-lock.json frontend/package.json | $(READY)
+	$(NPM) ci --no-progress
+	touch $@
+
+# Setting up has built it once; the sources may be newer.
+$(PAGE): $(PAGE_SOURCES) $(MODULES) | $(READY)
+	$(NPM) run build
+
 clean:
-	rm -rf .venv demo bench/out
+	rm -rf .venv demo bench/out build/browser frontend/node_modules $(dir $(PAGE))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-ALL = ("startup", "lane_graph", "maps_add", "recording", "live_view")
+ALL = ("startup", "lane_graph", "maps_add", "recording", "live_view", "canvas", "in_browser")
 
 
 def main() -> None:

@@ -2,6 +2,7 @@ import { ActionIcon, Anchor, Tooltip, useComputedColorScheme, useMantineColorSch
 
 import { CatalogueView } from "./catalogue/CatalogueView";
 import { EditorView } from "./editor/EditorView";
+import { RunsView } from "./run/RunsView";
 import { RunView } from "./run/RunView";
 import { IconMoon, IconSun } from "./ui/icons";
 import { NoticeList } from "./ui/notices";
@@ -32,6 +33,7 @@ export function App() {
               aria-current={route.view === "editor" ? "page" : undefined}>{route.scenario}</Anchor>
           </>}
           {route.view === "run" && <><span aria-hidden="true">›</span><span aria-current="page">Run</span></>}
+          {route.view === "runs" && <><span aria-hidden="true">›</span><span aria-current="page">Runs</span></>}
         </nav>
         <div id="head-slot" className="head-slot" />
         <Tooltip label={toggle}>
@@ -44,6 +46,7 @@ export function App() {
         {route.view === "catalogue" && <CatalogueView />}
         {route.view === "editor" && <EditorView key={route.scenario} scenario={route.scenario} />}
         {route.view === "run" && <RunView key={route.run} scenario={route.scenario} run={route.run} />}
+        {route.view === "runs" && <RunsView key={route.scenario} scenario={route.scenario} />}
       </main>
       <NoticeList />
     </div>

@@ -5,12 +5,12 @@ import { MantineProvider } from "@mantine/core";
 import { createRoot } from "react-dom/client";
 
 import { App } from "./App";
-import { theme } from "./ui/theme";
+import { contrast, theme } from "./ui/theme";
 
 const root = document.getElementById("root");
 if (root) {
   createRoot(root).render(
-    <MantineProvider theme={theme} defaultColorScheme="auto">
+    <MantineProvider theme={theme} cssVariablesResolver={contrast} defaultColorScheme="auto">
       <App />
     </MantineProvider>,
   );

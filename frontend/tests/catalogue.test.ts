@@ -1,7 +1,9 @@
 import { expect, test } from "vitest";
 
 import type { MapInfo } from "../src/api/types";
-import { arranged } from "../src/catalogue/order";
+import { coverage, type Entry, grouped } from "../src/catalogue/conversion";
+import { arranged, type Wish } from "../src/catalogue/order";
+import { stepWords } from "../src/catalogue/steps";
 import { hashOf, parseRoute } from "../src/ui/route";
 import { clock, length, mapFacts, modelWord } from "../src/ui/words";
 
@@ -34,4 +36,42 @@ test("figures are said as people say them", () => {
   expect(clock(75.04)).toBe("1:15.0");
   expect(length(950)).toBe("950 m");
   expect(modelWord("vehicle.tesla.model3")).toBe("Tesla Model3");
+});
+
+test("only maps that have all that is wished for are shown", () => {
+  const [left, lit] = [map("left", 2), map("lit", 0)];
+  left.statistics.rule = "LHT";
+  lit.statistics.traffic_lights = 4;
+  const names = (...wishes: Wish[]): string[] => arranged([left, lit], "", "name", wishes).map((one) => one.name);
+  expect(names()).toEqual(["left", "lit"]);
+  expect(names("left")).toEqual(["left"]);
+  expect(names("lights", "crosswalks")).toEqual(["lit"]);
+  expect(names("lights", "junctions")).toEqual([]);
+  expect(names("small")).toEqual([]);
+});
+
+test("a conversion report says the same of many places once, what was lost first", () => {
+  const entry = (fate: string, element: string, reason: string): Entry => ({ fate, element, reason });
+  const report = {
+    counts: {}, figures: { driving_road_length: 300, driving_road_covered: 299.9, driving_junction_length: 100, driving_junction_covered: 100 },
+    entries: [
+      entry("kept", "road 1 > object 3", "crosswalk, as a crossing of its place and width"),
+      entry("lost", "road 1", "lanes of type shoulder are open to nobody and left out"),
+      entry("lost", "road 2", "lanes of type shoulder are open to nobody and left out"),
+      entry("lost", "road 9", "SUMO knows no such thing"),
+    ],
+  };
+  expect(grouped(report)).toEqual([
+    { fate: "lost", title: "Could not be used", findings: [
+      { text: "Lanes of the kind “shoulder” are not driven on and are left out", places: ["road 1", "road 2"] },
+      { text: "The simulation knows no such thing", places: ["road 9"] }] },
+    { fate: "kept", title: "Was taken over as it is", findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }] },
+  ]);
+  expect(coverage(report)).toEqual({ driving: 99, walking: null });
+});
+
+test("steps of a job are told in plain words, with the map's name if there are several", () => {
+  expect(stepWords("making the SUMO network")).toBe("Step 3 of 4: preparing the simulation");
+  expect(stepWords("town: drawing the map")).toBe("town, step 4 of 4: drawing the map");
+  expect(stepWords("waiting")).toBe("Waiting");
 });

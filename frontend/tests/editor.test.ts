@@ -1,28 +1,40 @@
 import { afterEach, expect, test, vi } from "vitest";
 
-import type { Actor, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
-import { actorOfProblem, boundsOfProblem, nearestActor, sceneActors, segmentStyles } from "../src/editor/scene";
+import type { Actor, Flow, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
+import { boundsOfProblem, inFrame, nearestOne, ofProblem, sceneActors, sceneFlows, segmentStyles, wrongOnes } from "../src/editor/scene";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
+import { laneFacts, placeWord } from "../src/editor/placeWords";
+import { Starts } from "../src/editor/placing";
+import { rowsInSight } from "../src/editor/windowed";
 import { Graph } from "../src/map/graph";
+import { Picker } from "../src/map/picking";
 
 const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   id, category: "car", model: null, spawn, goal: null, speed: null, lateral_offset: 0.5, depart: 0,
   style: "normal", ego: false, crosses_anywhere: false, ignores_red: false,
 });
-const scenario = (actors: Actor[], roi = ["a"]): ScenarioDocument => ({
+const flow = (id: string, spawn: string): Flow => ({
+  id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null,
+});
+const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
   name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
-  environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows: [],
+  environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows,
+  signals: { control: "fixed", junctions: [] },
   simulation: { duration: 60, step_length: 0.5 },
 });
 const problem = (where: string, nodes: string[] = []): Problem => ({
   severity: "error", code: "x", where, message: "m", nodes, segments: ["b"],
 });
-const empty = { lane_keys: [], first_node: [0], lane: [], x: [], y: [], hdg: [], segment: [], source: [], target: [], kind: [] };
+const walks = {
+  lane_keys: ["1.0.3"], first_node: [0, 2], lane: [0, 0], x: [0, 2], y: [9, 9], hdg: [0, 0], width: [2, 2],
+  walkable: [1, 1], segment: [0, 1], source: [], target: [], kind: [],
+};
 const columns: GraphColumns = {
-  spacing: 2, lane_keys: ["1.0.-1"], lane_types: ["driving"], first_node: [0, 3], lane: [0, 0, 0],
+  spacing: 2, lane_keys: ["1.0.-1"], lane_types: ["driving"], lane_junctions: [null], first_node: [0, 3], lane: [0, 0, 0],
   s: [0, 2, 4], x: [0, 2, 4], y: [0, 0, 0], hdg: [0, 0, 0], width: [3, 3, 3], segment: [0, 1, 2],
+  speed_limit: [13.889, null, null], spawnable: [1, 1, 0],
   segments: ["a", "b", "c"].map((id) => ({ id, kind: "road", neighbours: [] })),
-  edges: { source: [], target: [], relation: [] }, walks: empty,
+  edges: { source: [], target: [], relation: [] }, walks,
 };
 const graph = new Graph(columns);
 
@@ -35,29 +47,85 @@ test("before the first piece nothing stands out, though all may be chosen", () =
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
 });
 
-test("a new road user is selected; after a removal the others stay selected", () => {
+test("a new road user or stream is selected; after a removal the others stay selected", () => {
   const [a, b] = [actor("a"), actor("b")];
-  expect(selectionAfter(["a"], [a], [a, b])).toEqual(["b"]);
-  expect(selectionAfter(["a", "b"], [a, b], [b])).toEqual(["b"]);
+  expect(selectionAfter(["a"], scenario([a]), scenario([a, b]))).toEqual(["b"]);
+  expect(selectionAfter(["a"], scenario([a]), scenario([a], ["a"], [flow("f", "1.0.-1.1")]))).toEqual(["f"]);
+  expect(selectionAfter(["a", "b"], scenario([a, b]), scenario([b]))).toEqual(["b"]);
 });
 
 test("a road user is drawn to the left of its lane by its offset, and red when it is wrong", () => {
-  const found = sceneActors(graph, scenario([actor("a")]), null, ["a"], [problem("actors[0].goal")]);
-  expect(found[0]).toMatchObject({ x: 0, y: 0.5, selected: true, problem: true });
+  const document = scenario([actor("a")]);
+  const wrong = wrongOnes([problem("actors[0].goal")], document);
+  const found = sceneActors(graph, document, null, new Set(["a"]), wrong);
+  expect(found[0]).toMatchObject({ x: 0, y: 0.5, offset: 0.5, selected: true, problem: true });
 });
 
-test("a problem leads to its road user and to its place on the map", () => {
-  const document = scenario([actor("a"), actor("b", "1.0.-1.2")]);
-  expect(actorOfProblem(problem("actors[1].spawn"), document.actors)?.id).toBe("b");
-  expect(actorOfProblem(problem("roi"), document.actors)).toBeNull();
+test("a stream is drawn where it begins, with what it brings in an hour", () => {
+  const document = scenario([], ["a"], [flow("f", "1.0.-1.1")]);
+  const wrong = wrongOnes([problem("flows[0].spawn")], document);
+  expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([{ id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true }]);
+});
+
+test("a problem leads to its road user or stream and to its place on the map", () => {
+  const document = scenario([actor("a"), actor("b", "1.0.-1.2")], ["a"], [flow("f", "1.0.-1.1")]);
+  expect(ofProblem(problem("actors[1].spawn"), document)?.id).toBe("b");
+  expect(ofProblem(problem("flows[0].spawn"), document)?.id).toBe("f");
+  expect(ofProblem(problem("roi"), document)).toBeNull();
   expect(boundsOfProblem(problem("actors[1].spawn"), graph, document)).toEqual([-21, -25, 29, 25]);
   expect(boundsOfProblem(problem("roi"), graph, document)).toEqual([2, 0, 2, 0]);
 });
 
-test("a road user is picked within reach or on its body", () => {
-  const actors = sceneActors(graph, scenario([actor("a")]), null, [], []);
-  expect(nearestActor(actors, 1.9, 0.5, 0.1)?.id).toBe("a");
-  expect(nearestActor(actors, 3, 0.5, 0.1)).toBeNull();
+test("a road user is picked within reach or on its body, several in a rectangle", () => {
+  const actors = sceneActors(graph, scenario([actor("a"), actor("b", "1.0.-1.2")]), null, new Set(), new Set());
+  expect(nearestOne(actors, 1.9, 0.5, 0.1)?.id).toBe("a");
+  expect(nearestOne(actors, 0, 3, 0.1)).toBeNull();
+  expect(inFrame(actors, [3, -1, 5, 1])).toEqual(["b"]);
+});
+
+const startsOf = (document: ScenarioDocument, ...inside: number[]): Starts =>
+  new Starts(graph, new Picker(graph), new Set(inside), document);
+
+test("only free and usable places of the region are offered, of the right kind", () => {
+  const starts = startsOf(scenario([actor("a")]), 0, 1, 2);
+  expect(starts.near(0, 0, 1, false)?.id).toBe("1.0.-1.1"); // the nearest is taken
+  expect(starts.near(4, 0, 1, false)?.id).toBe("1.0.-1.1"); // the nearest cannot be used
+  expect(starts.near(0, 0, 1, true)?.id).toBe("ped.1.0.3.0");
+  expect(startsOf(scenario([]), 2).near(0, 0, 1, false)).toBeNull();
+});
+
+test("who cannot start somewhere is told why", () => {
+  expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain("No bicycle may start here");
+  expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
+  expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("taken");
+  expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("yellow");
+});
+
+test("a start moves along its lane past those who stand there, and not out of the region", () => {
+  const at = graph.place("1.0.-1.0");
+  if (!at) throw new Error("the test's own place");
+  expect(startsOf(scenario([actor("a")]), 0, 1).along(at, 1)?.id).toBe("1.0.-1.1");
+  expect(startsOf(scenario([actor("a")]), 0).along(at, 1)).toBeNull();
+  expect(startsOf(scenario([actor("a"), actor("b", "1.0.-1.1")]), 0, 1).along(at, 1)).toBeNull();
+});
+
+test("copies keep their distances, no two on one place", () => {
+  const ones = [actor("a"), { ...actor("p", "ped.1.0.3.0"), category: "pedestrian" as const }];
+  const to = graph.place("1.0.-1.1");
+  if (!to) throw new Error("the test's own place");
+  expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([["a", "1.0.-1.1"], ["p", "ped.1.0.3.1"]]);
+});
+
+test("a place is told in words", () => {
+  expect(placeWord(graph, "1.0.-1.2")).toBe("Road 1, right lane 1, 4 m");
+  expect(placeWord(graph, "ped.1.0.3.1")).toBe("Road 1, left walkway, 2 m");
+  expect(laneFacts(graph, "1.0.-1.0")).toBe("Driving lane, 3.0 m wide, limit 50 km/h");
+});
+
+test("of a long table only what is in sight is drawn", () => {
+  expect(rowsInSight(2000, 30, 3000, 300, 5)).toEqual([95, 115]);
+  expect(rowsInSight(4, 30, 0, 300, 5)).toEqual([0, 4]);
+  expect(rowsInSight(4, 30, 9000, 300, 5)[1]).toBe(4); // it was longer a moment ago
 });
 
 const state = (version: number, ...ids: string[]): ScenarioState => ({
@@ -90,15 +158,29 @@ test("a refusal is told and changes nothing", async () => {
   const store = createEditorStore("s");
   await store.getState().load();
   expect(await store.getState().edit({ kind: "add_actor" })).toBeNull();
-  expect(store.getState()).toMatchObject({ refusal: "the node is taken", saving: "saved" });
+  expect(store.getState()).toMatchObject({ refusal: { message: "the node is taken", again: null }, saving: "saved" });
   expect(store.getState().scenario?.version).toBe(1);
 });
 
-test("what another tab has done is loaded, not overwritten", async () => {
-  answers([200, state(1)], [409, { error: { kind: "Conflict", message: "newer" } }], [200, state(5, "x")]);
+test("what another tab has done is loaded; one's own change can be made again on top", async () => {
+  const asked = answers(
+    [200, state(1)], [409, { error: { kind: "Conflict", message: "newer", current: 5 } }], [200, state(5, "x")],
+    [200, state(6, "x", "y")]);
   const store = createEditorStore("s");
   await store.getState().load();
   await store.getState().edit({ kind: "add_actor" });
   expect(store.getState().scenario?.version).toBe(5);
-  expect(store.getState().refusal).toContain("another tab");
+  await store.getState().refusal?.again?.();
+  expect(asked[3].body).toEqual({ version: 5, edits: [{ kind: "add_actor" }] });
+  expect(store.getState()).toMatchObject({ refusal: null, selection: ["y"] });
+});
+
+test("several edits go out as one", async () => {
+  const asked = answers([200, state(1)], [200, state(2)]);
+  const store = createEditorStore("s");
+  await store.getState().load();
+  await store.getState().edit([{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }], "Add 2 segments");
+  expect(asked[1].body).toEqual({
+    version: 1, label: "Add 2 segments", edits: [{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }],
+  });
 });

@@ -9,14 +9,15 @@ import { Picker } from "../src/map/picking";
 function example(): GraphColumns {
   const x = [0, 2, 4, 6, 0, 2, 4, 6];
   return {
-    spacing: 2, lane_keys: ["1.0.-1", "1.0.-2"], lane_types: ["driving", "driving"],
+    spacing: 2, lane_keys: ["1.0.-1", "1.0.-2"], lane_types: ["driving", "driving"], lane_junctions: [null, null],
+    speed_limit: x.map(() => null), spawnable: x.map(() => 1),
     first_node: [0, 4, 8], lane: [0, 0, 0, 0, 1, 1, 1, 1], s: x, x, y: [0, 0, 0, 0, -3, -3, -3, -3],
     hdg: x.map(() => 0), width: x.map(() => 3), segment: [0, 0, 1, 1, 0, 0, 1, 1],
     segments: [{ id: "r1-0", kind: "road", neighbours: [1] }, { id: "r1-1", kind: "road", neighbours: [0] }],
     edges: { source: [0], target: [1], relation: [0] },
     walks: {
       lane_keys: ["1.0.-3"], first_node: [0, 2], lane: [0, 0], x: [0, 2], y: [-6, -6], hdg: [0, 0],
-      segment: [0, 0], source: [0], target: [1], kind: [0],
+      width: [2, 2], walkable: [1, 1], segment: [0, 0], source: [0], target: [1], kind: [0],
     },
   };
 }

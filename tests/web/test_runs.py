@@ -19,6 +19,7 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
 from odscen.catalog.store import Workspace
+from odscen.errors import SimulationError
 from odscen.frames import SumoPose, sumo_to_xodr
 from odscen.results.records import Plan
 from odscen.web import runs
@@ -208,6 +209,110 @@ def test_a_finished_run_has_figures_a_report_and_a_replay(
     assert client.get(f"/api/runs/{run}").status_code == 404
 
 
+def test_a_finished_run_is_told_over_time(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = start(client, sampled)
+    actors = finished(client, run)["summary"]["actors"]
+    curves = client.get(f"/api/runs/{run}/curves").json()
+    counts, speeds, shares = curves["counts"], curves["speeds"], curves["shares"]
+    assert counts["arrived"][-1] == actors["arrived"]
+    assert counts["running"][-1] == actors["running"]
+    assert max(counts["running"]) > 3
+    truth = recorded(workspace, run)
+    last = counts["time"][-1] - 1.0  # a bin of one second, as the run is short
+    there = {name for name, t in truth if last <= t < last + 1.0}
+    assert counts["running"][-2] == pytest.approx(len(there), abs=2)
+    assert len(speeds["mean"]) == len(speeds["time"])
+    assert all(
+        low <= mean + 1e-3 and high <= shares["edges"][-1]
+        for low, mean, high in zip(speeds["low"], speeds["mean"], speeds["high"], strict=True)
+        if low is not None and low == high
+    )
+    assert sum(shares["share"]) == pytest.approx(1, abs=1e-2)
+    assert len(shares["edges"]) == len(shares["share"]) + 1
+
+
+def test_incidents_of_a_finished_run_are_those_that_were_told_live(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = start(client, sampled)
+    seen = watch(client, run)
+    finished(client, run)
+    told = [event for text in seen.of("events") for event in text["events"]]
+    answer = client.get(f"/api/runs/{run}/events").json()
+    assert answer == {"events": told, "left_off": 0}
+    file = workspace.runs / run / "events.json"
+    crash = {"time": 1.5, "kind": "collision", "actor": "a", "partner": "b", "x": 1.0, "y": 2.0}
+    document = json.loads(file.read_text())
+    document["events"].append(crash)
+    file.write_text(json.dumps(document))
+    assert crash in client.get(f"/api/runs/{run}/events").json()["events"]
+
+
+def test_a_replay_has_no_more_rows_than_asked_for(client: TestClient, sampled: str) -> None:
+    run = start(client, sampled)
+    finished(client, run)
+    whole = client.get(f"/api/runs/{run}/trajectories").json()
+    half = client.get(f"/api/runs/{run}/trajectories?most={len(whole['x']) // 2}").json()
+    assert half["times"] == whole["times"][::2] or half["times"] == whole["times"][::3]
+    assert half["times"][0] == whole["times"][0]
+
+
+def test_runs_of_one_scenario_are_found_after_a_restart_too(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    client.post(f"/api/scenarios/{sampled}/copy", json={"name": f"{sampled}-1"})
+    first, other = start(client, sampled), start(client, f"{sampled}-1")
+    assert finished(client, first)["finished"] > 0
+    finished(client, other)
+    second = start(client, sampled)
+    finished(client, second)
+    again = runs.Runs(workspace)
+    try:
+        assert [row.run for row in again.rows(scenario=sampled)] == [first, second]
+        assert [row.run for row in again.rows(scenario=f"{sampled}-1")] == [other]
+        assert again.rows(scenario="nobody") == []
+        assert [row.state for row in again.rows(scenario=sampled)] == ["completed"] * 2
+    finally:
+        again.close()
+    listed = client.get("/api/runs", params={"scenario": sampled}).json()
+    assert [row["run"] for row in listed] == [first, second]
+
+
+def test_runs_of_a_changed_scenario_can_be_told_apart(client: TestClient, sampled: str) -> None:
+    def digest() -> str:
+        run = start(client, sampled, until=2)
+        finished(client, run)
+        return str(client.get(f"/api/runs/{run}/content").json()["digest"])
+
+    def edit(**change: object) -> None:
+        version = client.get(f"/api/scenarios/{sampled}").json()["version"]
+        wish = {"version": version, "edits": [change]}
+        answer = client.post(f"/api/scenarios/{sampled}/edits", json=wish)
+        assert answer.status_code == 200, answer.text
+
+    before = digest()
+    edit(kind="rename", name="the same by another name")
+    assert digest() == before
+    edit(kind="set_seed", seed=77)
+    assert digest() != before
+
+
+def test_a_run_whose_preparation_fails_can_be_removed(
+    client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        msg = "no way"
+        raise SimulationError(msg)
+
+    monkeypatch.setattr(runs, "prepare", refuse)
+    run = start(client, sampled)
+    assert finished(client, run)["error"] == "no way"
+    assert client.delete(f"/api/runs/{run}").status_code == 204
+    assert client.get(f"/api/runs/{run}").status_code == 404
+
+
 def test_a_scenario_with_errors_is_not_run(client: TestClient) -> None:
     client.post("/api/scenarios", json={"map": CROSSING, "name": "empty"})
     answer = client.post("/api/runs", json={"scenario": "empty"})
@@ -255,6 +360,9 @@ def test_a_worker_that_is_killed_is_a_failed_run(client: TestClient, sampled: st
                 said.append(message)
     assert said[-1]["state"] == "failed"
     assert "SIGKILL" in said[-1]["error"]
+    assert finished(client, run)["state"] == "failed"
+    for what in ("trajectories", "curves", "events", "report.html"):
+        assert client.get(f"/api/runs/{run}/{what}").status_code == 404
 
 
 def test_a_socket_for_an_unknown_run_is_refused(client: TestClient) -> None:

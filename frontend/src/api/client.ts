@@ -1,5 +1,5 @@
 import type {
-  ApiErrorBody, Assets, Edit, GraphColumns, Job, MapInfo, RunInfo, ScenarioEntry, ScenarioState,
+  ApiErrorBody, Assets, Edit, GraphColumns, Job, MapInfo, Roi, ScenarioEntry, ScenarioState,
 } from "./types";
 import type { PackedDrawing } from "../map/drawing";
 
@@ -24,7 +24,7 @@ async function refusal(response: Response): Promise<ApiError> {
   return new ApiError(response.status, { kind: "http", message });
 }
 
-async function ask<T>(path: string, init?: RequestInit): Promise<T> {
+export async function ask<T>(path: string, init?: RequestInit): Promise<T> {
   let response: Response;
   try {
     response = await fetch(BASE + path, init);
@@ -36,7 +36,7 @@ async function ask<T>(path: string, init?: RequestInit): Promise<T> {
   return (await response.json()) as T;
 }
 
-const send = <T>(method: string, path: string, body?: unknown): Promise<T> =>
+export const send = <T>(method: string, path: string, body?: unknown): Promise<T> =>
   ask<T>(path, {
     method,
     headers: body === undefined ? {} : { "Content-Type": "application/json" },
@@ -65,8 +65,11 @@ export const api = {
   removeScenario: (name: string) => send<undefined>("DELETE", `/scenarios/${enc(name)}`),
   rename: (name: string, to: string) =>
     send<ScenarioState | undefined>("PUT", `/scenarios/${enc(name)}/name`, { name: to }),
-  edit: (name: string, version: number, edit: Edit) =>
-    send<ScenarioState>("POST", `/scenarios/${enc(name)}/edits`, { version, edit }),
+  copyScenario: (name: string, to: string) =>
+    send<ScenarioState>("POST", `/scenarios/${enc(name)}/copy`, { name: to }),
+  /** All of them or none, and one step for undo. */
+  edit: (name: string, version: number, edits: readonly Edit[], label?: string) =>
+    send<ScenarioState>("POST", `/scenarios/${enc(name)}/edits`, label ? { version, edits, label } : { version, edits }),
   undo: (name: string, version: number) =>
     send<ScenarioState>("POST", `/scenarios/${enc(name)}/undo`, { version }),
   redo: (name: string, version: number) =>
@@ -77,18 +80,10 @@ export const api = {
     ask<{ nodes: string[]; points: [number, number][] }>(
       `/scenarios/${enc(name)}/path?spawn=${enc(spawn)}&goal=${enc(goal)}`),
   roi: (name: string) =>
-    ask<{ inside: string[]; candidates: string[] }>(`/scenarios/${enc(name)}/roi`),
+    ask<Roi>(`/scenarios/${enc(name)}/roi`),
   downloadUrl: (name: string, form: "json" | "graphml") =>
     `${BASE}/scenarios/${enc(name)}/download?form=${form}`,
   uploadScenario: (file: File) => upload<ScenarioState>("/scenarios/upload", file),
   /** At real speed: a person watches. */
   startRun: (scenario: string) => send<{ run: string }>("POST", "/runs", { scenario, speed: 1 }),
-  run: (id: string) => ask<RunInfo>(`/runs/${enc(id)}`),
-  control: (id: string, action: string, speed?: number | null) =>
-    send<unknown>("POST", `/runs/${enc(id)}/control`, speed === undefined ? { action } : { action, speed }),
-  reportUrl: (id: string) => `${BASE}/runs/${enc(id)}/report.html`,
-  liveUrl: (id: string) => {
-    const secure = location.protocol === "https:" ? "wss" : "ws";
-    return `${secure}://${location.host}${BASE}/runs/${enc(id)}/live`;
-  },
 };

@@ -6,6 +6,7 @@ export const CATEGORIES: readonly Category[] = [
   "car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian",
 ];
 export type Style = "cautious" | "normal" | "sporty";
+export type SignalControl = "fixed" | "actuated";
 export type Bounds = [minX: number, minY: number, maxX: number, maxY: number];
 
 export interface MapStatistics {
@@ -38,6 +39,8 @@ export interface GraphColumns {
   spacing: number;
   lane_keys: string[];
   lane_types: string[];
+  /** The junction that a lane lies in. */
+  lane_junctions: (string | null)[];
   first_node: number[];
   lane: number[];
   s: number[];
@@ -45,6 +48,10 @@ export interface GraphColumns {
   y: number[];
   hdg: number[];
   width: number[];
+  /** Metres per second; null where there is none. */
+  speed_limit: (number | null)[];
+  /** 1 where the simulator can place somebody exactly. */
+  spawnable: number[];
   segment: number[];
   segments: { id: string; kind: string; neighbours: number[] }[];
   edges: { source: number[]; target: number[]; relation: number[] };
@@ -58,6 +65,9 @@ export interface WalkColumns {
   x: number[];
   y: number[];
   hdg: number[];
+  width: number[];
+  /** 1 where the simulator can place somebody exactly. */
+  walkable: number[];
   segment: number[];
   source: number[];
   target: number[];
@@ -107,6 +117,9 @@ export interface Flow {
   per_hour: number;
   begin: number;
   end: number;
+  /** Relative shares; they need not sum to one. */
+  mix: Partial<Record<Category, number>>;
+  speed: number | null;
 }
 
 export interface ScenarioDocument {
@@ -118,6 +131,7 @@ export interface ScenarioDocument {
   environment: { preset: string; parameters: Record<string, number>; affects_driving: boolean };
   actors: Actor[];
   flows: Flow[];
+  signals: { control: SignalControl; junctions: unknown[] };
   simulation: { duration: number; step_length: number };
 }
 
@@ -156,6 +170,8 @@ export interface ScenarioEntry {
 export interface Job {
   state: "queued" | "running" | "done" | "failed";
   step?: string | null;
+  /** Name of what was made. */
+  result?: string | null;
   share?: number | null;
   error?: ApiErrorBody | string | null;
 }
@@ -164,14 +180,15 @@ export interface ApiErrorBody {
   kind: string;
   message: string;
   problems?: (Problem | string)[];
+  /** The newest version, where an older one was changed. */
+  current?: number | null;
 }
 
-export interface RunInfo {
-  state: string;
-  speed?: number | null;
-  progress?: { time: number; until: number; running: number; arrived: number; planned: number } | null;
-  summary?: Record<string, unknown> | null;
-  error?: ApiErrorBody | string | null;
+/** Which segments are inside, and which may be added or taken out now. */
+export interface Roi {
+  inside: string[];
+  candidates: string[];
+  removable: string[];
 }
 
 /** One change; `kind` is the name of a function of `odscen.scenario.edits`. */

@@ -1,75 +1,123 @@
-import { Button, FileButton, Progress, Text } from "@mantine/core";
-import { type DragEvent, useState } from "react";
+import { Alert, Button, FileButton, Progress, Text } from "@mantine/core";
+import { type DragEvent, useRef, useState } from "react";
 
 import { api } from "../api/client";
+import { addShipped, followJob } from "../api/maps";
 import type { Job } from "../api/types";
-import { tell, tellError } from "../ui/notices";
+import { tell } from "../ui/notices";
+import { stepWords } from "./steps";
 
-const PAUSE = 300;
-const pause = (): Promise<void> => new Promise((done) => setTimeout(done, PAUSE));
+interface Work {
+  what: string;
+  step: string;
+  share: number;
+  /** Files that wait for their turn. */
+  waiting: number;
+}
 
-const reason = (job: Job): string =>
-  (typeof job.error === "string" ? job.error : job.error?.message) ?? "The map could not be read.";
+interface Refusal {
+  file: string;
+  reason: string;
+}
 
-/** Takes a map file by drop or by choice, and shows how far its preparation is. */
-export function AddMap({ onAdded }: { onAdded: () => void }) {
+/** Takes map files, one after another, by drop or by choice, and shows how far their preparation is. */
+export function AddMap({ empty, onAdded, onReport }: {
+  /** Whether there is no map yet; the maps that come along are offered then. */
+  empty: boolean;
+  onAdded: () => void;
+  onReport: (map: string) => void;
+}) {
   const [over, setOver] = useState(false);
-  const [work, setWork] = useState<{ file: string; step: string; share: number } | null>(null);
+  const [work, setWork] = useState<Work | null>(null);
+  const [refusals, setRefusals] = useState<Refusal[]>([]);
+  const [added, setAdded] = useState<string[]>([]);
+  const queue = useRef<File[]>([]);
+  const busy = useRef(false);
 
-  const add = async (file: File): Promise<void> => {
-    setWork({ file: file.name, step: "Sending the file", share: 0 });
+  const attempt = async (what: string, start: () => Promise<{ job: string }>, onStep: (job: Job) => void): Promise<Job | null> => {
+    setWork({ what, step: "Sending the file", share: 0, waiting: queue.current.length });
     try {
-      const { job: id } = await api.addMap(file);
-      for (;;) {
-        const job = await api.job(id);
-        if (job.state === "done") break;
-        if (job.state === "failed") throw new Error(reason(job));
-        setWork({ file: file.name, step: job.step ?? "Preparing", share: job.share ?? 0 });
-        await pause();
-      }
-      tell(`${file.name} is ready.`);
-      onAdded();
+      return await followJob((await start()).job, (job) => {
+        setWork({ what, step: stepWords(job.step ?? "preparing"), share: job.share ?? 0, waiting: queue.current.length });
+        onStep(job);
+      });
     } catch (error) {
-      tellError(error);
-    } finally {
-      setWork(null);
+      setRefusals((old) => [...old, { file: what, reason: (error as Error).message }]);
+      return null;
     }
   };
-
+  const add = async (files: readonly File[]): Promise<void> => {
+    queue.current.push(...files);
+    if (busy.current) return;
+    busy.current = true;
+    setRefusals([]);
+    setAdded([]);
+    for (let file = queue.current.shift(); file; file = queue.current.shift()) {
+      const taken = file;
+      const job = await attempt(taken.name, () => api.addMap(taken), () => undefined);
+      const name = job?.result;
+      if (name) {
+        setAdded((old) => [...old, name]);
+        onAdded();
+      }
+    }
+    busy.current = false;
+    setWork(null);
+  };
+  const addThose = async (): Promise<void> => {
+    if (busy.current) return;
+    busy.current = true;
+    let last = "";
+    const job = await attempt("The maps that come along", addShipped, ({ step }) => {
+      const map = step?.split(":")[0] ?? "";
+      if (map !== last && last) onAdded();
+      last = map;
+    });
+    busy.current = false;
+    setWork(null);
+    if (job) tell("The maps are ready.");
+    onAdded();
+  };
   const onDrop = (event: DragEvent): void => {
     event.preventDefault();
     setOver(false);
-    void (async () => {
-      for (const file of event.dataTransfer.files) await add(file);
-    })();
+    void add([...event.dataTransfer.files]);
   };
 
   return (
-    <section
-      className="drop"
-      data-over={over}
-      aria-label="Add a map"
-      onDragOver={(event) => { event.preventDefault(); setOver(true); }}
-      onDragLeave={() => setOver(false)}
-      onDrop={onDrop}
-    >
-      {work ? (
-        <div style={{ flex: 1 }} role="status">
-          <Text fw={600}>{work.file}</Text>
-          <Text size="sm" c="dimmed">{work.step} …</Text>
-          <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="How far the map is prepared" />
-        </div>
-      ) : (
-        <>
-          <div>
-            <Text fw={600}>Add a map of your own</Text>
-            <Text size="sm" c="dimmed">Drop an OpenDRIVE file (.xodr) here, or choose one.</Text>
+    <section aria-label="Add a map">
+      <div className="drop" data-over={over} onDragOver={(event) => { event.preventDefault(); setOver(true); }}
+        onDragLeave={() => setOver(false)} onDrop={onDrop}>
+        {work ? (
+          <div style={{ flex: 1 }} role="status">
+            <Text fw={600}>{work.what}{work.waiting > 0 && `, then ${work.waiting} more`}</Text>
+            <Text size="sm" c="dimmed">{work.step} …</Text>
+            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="How far the map is prepared" />
           </div>
-          <FileButton accept=".xodr,.xml" onChange={(file) => { if (file) void add(file); }}>
-            {(props) => <Button variant="default" {...props}>Choose a file</Button>}
-          </FileButton>
-        </>
-      )}
+        ) : (
+          <>
+            <div>
+              <Text fw={600}>{empty ? "No maps yet" : "Add a map of your own"}</Text>
+              <Text size="sm" c="dimmed">{empty ? "Begin with the maps that come along, or drop an OpenDRIVE file (.xodr) of your own here." : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}</Text>
+            </div>
+            <div style={{ display: "flex", gap: 10, flexWrap: "wrap" }}>
+              {empty && <Button onClick={() => void addThose()}>Add the maps that come along</Button>}
+              <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
+                {(props) => <Button variant="default" {...props}>Choose a file</Button>}
+              </FileButton>
+            </div>
+          </>
+        )}
+      </div>
+      {added.map((name) => (
+        <Alert key={name} color="blue" mt="sm" role="status" title={`${name} is ready`}>
+          <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>How {name} was taken over</Button>
+        </Alert>
+      ))}
+      {refusals.map(({ file, reason }, n) => (
+        <Alert key={n} color="red" mt="sm" title={`${file} could not be added`} withCloseButton closeButtonLabel="Close this message"
+          onClose={() => setRefusals((old) => old.filter((_, k) => k !== n))} style={{ overflowWrap: "anywhere" }}>{reason}</Alert>
+      ))}
     </section>
   );
 }

@@ -1,25 +1,47 @@
 import type { MapInfo } from "../api/types";
 
-export type Order = "name" | "large" | "junctions" | "crosswalks" | "lights";
+export type Order = "name" | "large" | "small" | "junctions" | "crosswalks" | "lights" | "fast";
 export const ORDERS: { value: Order; label: string }[] = [
   { value: "name", label: "Name" },
-  { value: "large", label: "Most lanes" },
+  { value: "large", label: "Largest" },
+  { value: "small", label: "Smallest" },
   { value: "junctions", label: "Most junctions" },
   { value: "crosswalks", label: "Most crosswalks" },
   { value: "lights", label: "Most traffic lights" },
+  { value: "fast", label: "Highest speed limit" },
 ];
 
 const FIGURE: Record<Exclude<Order, "name">, (map: MapInfo) => number> = {
   large: (map) => map.statistics.driving_lane_length,
+  small: (map) => -map.statistics.driving_lane_length,
   junctions: (map) => map.statistics.junctions,
   crosswalks: (map) => map.statistics.crosswalks,
   lights: (map) => map.statistics.traffic_lights,
+  fast: (map) => map.statistics.speed_limit_max ?? 0,
 };
 
-/** The maps whose name has all words of `search`, in order. */
-export function arranged(maps: readonly MapInfo[], search: string, order: Order): MapInfo[] {
+/** Metres of lanes up to which a map is small, and from which it is large. */
+const SMALL = 3_000;
+const LARGE = 15_000;
+
+export type Wish = "lights" | "crosswalks" | "junctions" | "left" | "small" | "large";
+export const WISHES: { value: Wish; label: string; has: (map: MapInfo) => boolean }[] = [
+  { value: "lights", label: "Traffic lights", has: ({ statistics }) => statistics.traffic_lights > 0 },
+  { value: "crosswalks", label: "Crosswalks", has: ({ statistics }) => statistics.crosswalks > 0 },
+  { value: "junctions", label: "Junctions", has: ({ statistics }) => statistics.junctions > 0 },
+  { value: "left", label: "Left-hand traffic", has: ({ statistics }) => statistics.rule === "LHT" },
+  { value: "small", label: "Small (up to 3 km of lanes)", has: ({ statistics }) => statistics.driving_lane_length <= SMALL },
+  { value: "large", label: "Large (from 15 km of lanes)", has: ({ statistics }) => statistics.driving_lane_length >= LARGE },
+];
+
+/** The maps whose name has all words of `search` and that have all that is wished for, in order. */
+export function arranged(
+  maps: readonly MapInfo[], search: string, order: Order, wishes: readonly Wish[] = [],
+): MapInfo[] {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
-  const found = maps.filter((map) => words.every((word) => map.name.toLowerCase().includes(word)));
+  const wanted = WISHES.filter(({ value }) => wishes.includes(value));
+  const found = maps.filter((map) =>
+    words.every((word) => map.name.toLowerCase().includes(word)) && wanted.every(({ has }) => has(map)));
   const byName = (a: MapInfo, b: MapInfo): number =>
     a.name.localeCompare(b.name, "en", { numeric: true });
   if (order === "name") return found.sort(byName);

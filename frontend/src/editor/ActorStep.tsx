@@ -1,141 +1,108 @@
-import { Button, Checkbox, Group, NumberInput, Select, Stack, Text, Tooltip } from "@mantine/core";
+import { Button, Collapse, Group, Stack, Text } from "@mantine/core";
+import { useState } from "react";
 
-import type { Actor, Assets, Category, Edit, Style } from "../api/types";
-import { CATEGORIES } from "../api/types";
-import { CATEGORY_COLOR } from "../map/colors";
-import { CategoryGlyph, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD, modelWord, STYLE_WORD } from "../ui/words";
-import { bodyOf } from "./scene";
+import { type Actor, type Assets, CATEGORIES, type Edit, type Flow } from "../api/types";
+import type { Graph, Place } from "../map/graph";
+import { CategoryGlyph, IconStream, IconTrash } from "../ui/icons";
+import { CATEGORY_WORD } from "../ui/words";
+import { ActorForm, ManyForm } from "./ActorForm";
+import { FillForm } from "./FillForm";
+import { FlowForm } from "./FlowForm";
+import { isFlow, type Starts, type Tool, toolWord } from "./placing";
+import { StartAndGoal } from "./StartAndGoal";
 
 interface Props {
   assets: Assets | null;
-  actors: readonly Actor[];
-  selected: readonly Actor[];
-  armed: Category | null;
-  goals: number | null;
-  onArm: (category: Category | null) => void;
-  onEdit: (edit: Edit) => void;
+  graph: Graph;
+  starts: Starts;
+  selected: readonly (Actor | Flow)[];
+  tool: Tool | null;
+  goals: readonly Place[] | null;
+  actors: number;
+  filling: boolean;
+  onTool: (tool: Tool | null) => void;
+  /** Uses the tool without the map. */
+  onPlaceSomewhere: () => void;
+  onEdit: (edit: Edit | readonly Edit[], label?: string) => void;
+  onStart: (one: Actor | Flow, spawn: string) => void;
+  onGoal: (one: Actor | Flow, goal: string | null) => void;
+  onRemove: () => void;
   onSelect: (ids: string[]) => void;
   onShowGoals: () => void;
+  onFill: (share: number, seed: number) => void;
 }
 
 /** Choose who, place them on the map, then say where they go and how. */
-export function ActorStep({ assets, selected, armed, goals, onArm, onEdit, onSelect, onShowGoals }: Props) {
+export function ActorStep(props: Props) {
+  const { assets, graph, starts, selected, tool, goals, onTool, onEdit } = props;
+  const [filling, setFilling] = useState(false);
   const one = selected.length === 1 ? selected[0] : null;
+  const actors = selected.filter((each): each is Actor => !isFlow(each));
   return (
     <>
       <div className="palette" role="group" aria-label="Kind of road user to place">
-        {CATEGORIES.map((category) => (
-          <button type="button" key={category} aria-pressed={armed === category}
-            onClick={() => onArm(armed === category ? null : category)}>
-            <CategoryGlyph category={category} size={32} />
-            {CATEGORY_WORD[category]}
-          </button>
-        ))}
+        {CATEGORIES.map((category) => {
+          const on = tool?.does === "place" && tool.category === category;
+          return (
+            <button type="button" key={category} aria-pressed={on} onClick={() => onTool(on ? null : { does: "place", category })}>
+              <CategoryGlyph category={category} size={32} />
+              {CATEGORY_WORD[category]}
+            </button>
+          );
+        })}
       </div>
-      <Text size="sm" c="dimmed" aria-live="polite">
-        {armed
-          ? `Now click where the ${CATEGORY_WORD[armed].toLowerCase()} starts: a ${armed === "pedestrian" ? "yellow" : "blue"} point on the map. Escape stops placing.`
-          : "Choose a kind, then click on the map to place it."}
-      </Text>
-      {one && <ActorForm key={one.id} actor={one} assets={assets} goals={goals} onEdit={onEdit} onShowGoals={onShowGoals} />}
-      {selected.length > 1 && (
-        <Group justify="space-between">
-          <Text size="sm" fw={600}>{selected.length} selected</Text>
-          <Button size="compact-sm" color="red" variant="light" leftSection={<IconTrash size={15} />}
-            onClick={() => onEdit({ kind: "remove_actors", actors: selected.map((a) => a.id) })}>Remove them</Button>
-          <Button size="compact-sm" variant="subtle" onClick={() => onSelect([])}>Select none</Button>
-        </Group>
+      <div className="palette streams" role="group" aria-label="Stream to place">
+        {[false, true].map((walk) => {
+          const on = tool?.does === "stream" && tool.walk === walk;
+          return (
+            <button type="button" key={String(walk)} aria-pressed={on} onClick={() => onTool(on ? null : { does: "stream", walk })}>
+              <IconStream size={22} />{walk ? "Stream of people" : "Stream of traffic"}
+            </button>
+          );
+        })}
+      </div>
+      <ToolHint tool={tool} onPlaceSomewhere={props.onPlaceSomewhere} />
+      {selected.length > 0 && (
+        <Stack gap="sm" component="section" aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}>
+          <Group gap={8} wrap="nowrap">
+            {one && (isFlow(one) ? <IconStream size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
+            <Text fw={700}>{one ? one.id : `${selected.length} selected`}</Text>
+          </Group>
+          <Group gap={6}>
+            {actors.length > 0 && <Button size="compact-sm" variant="default" onClick={() => onTool({ does: "copy", ids: actors.map((each) => each.id) })}>Copy</Button>}
+            <Button size="compact-sm" variant="default" onClick={() => onTool({ does: "move", ids: selected.map((each) => each.id) })}>Move</Button>
+            <Button size="compact-sm" color="red" variant="light" leftSection={<IconTrash size={15} />} onClick={props.onRemove}>Remove</Button>
+            <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>Select none</Button>
+          </Group>
+          {one && <StartAndGoal one={one} graph={graph} starts={starts} goals={goals} onShowGoals={props.onShowGoals}
+            onStart={(spawn) => props.onStart(one, spawn)} onGoal={(goal) => props.onGoal(one, goal)} />}
+          {one && (isFlow(one)
+            ? <FlowForm key={one.id} flow={one} onEdit={onEdit} />
+            : <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />)}
+          {!one && actors.length > 0 && <ManyForm actors={actors} onChange={(fields, what) => onEdit(
+            actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })), `${what} of ${actors.length} road users`)} />}
+        </Stack>
       )}
+      <Button variant="subtle" size="compact-sm" justify="flex-start" aria-expanded={filling} onClick={() => setFilling(!filling)}>
+        {filling ? "Hide random fill" : "Fill the region at random"}
+      </Button>
+      <Collapse in={filling}>{filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}</Collapse>
     </>
   );
 }
 
-function ActorForm({ actor, assets, goals, onEdit, onShowGoals }: {
-  actor: Actor; assets: Assets | null; goals: number | null; onEdit: (edit: Edit) => void; onShowGoals: () => void;
-}) {
-  const change = (fields: Partial<Actor>): void => onEdit({ kind: "change_actor", actor: actor.id, ...fields });
-  const walks = actor.category === "pedestrian";
-  const models = (assets?.blueprints ?? []).filter((one) => one.category === actor.category)
-    .map((one) => ({ value: one.id, label: modelWord(one.id) }));
-  const [length, width] = bodyOf(actor, assets);
+function ToolHint({ tool, onPlaceSomewhere }: { tool: Tool | null; onPlaceSomewhere: () => void }) {
+  if (!tool) return <Text size="sm" c="dimmed" aria-live="polite">Choose a kind, then click on the map to place it.</Text>;
+  const people = (tool.does === "place" && tool.category === "pedestrian") || (tool.does === "stream" && tool.walk);
+  const who = toolWord(tool, CATEGORY_WORD);
   return (
-    <Stack gap="sm" component="section" aria-label={`Settings of ${actor.id}`}>
-      <Group justify="space-between" wrap="nowrap">
-        <Group gap={8} wrap="nowrap"><CategoryGlyph category={actor.category} size={26} /><Text fw={700}>{actor.id}</Text></Group>
-        <Tooltip label="Remove (Delete key)">
-          <Button size="compact-sm" color="red" variant="light" leftSection={<IconTrash size={15} />}
-            onClick={() => onEdit({ kind: "remove_actors", actors: [actor.id] })}>Remove</Button>
-        </Tooltip>
-      </Group>
-      <Silhouette actor={actor} length={length} width={width} />
-      <Group justify="space-between" gap={6}>
-        <Text size="sm">{actor.goal
-          ? "Goal: chosen"
-          : goals === null ? "Goal: by chance"
-          : goals === 0 ? "No goal can be reached from here; move the start or grow the region."
-          : `Goal: by chance among ${goals}; click a light-blue point to choose`}</Text>
-        {goals !== null && goals > 0 && <Button size="compact-xs" variant="default" onClick={onShowGoals}>Show goals</Button>}
-        {actor.goal && <Button size="compact-xs" variant="subtle" onClick={() => onEdit({ kind: "set_goal", actor: actor.id, goal: null })}>By chance</Button>}
-      </Group>
-      <Select label="Model" searchable clearable placeholder="Any" data={models} value={actor.model} nothingFoundMessage="No such model"
-        onChange={(model) => change({ model })} />
-      <Group grow align="flex-start">
-        <Committed label={walks ? "Walking speed" : "Desired speed"} suffix=" km/h" min={1} max={walks ? 15 : 250} digits={1}
-          placeholder={walks ? "usual" : "the limit"} value={actor.speed === null ? "" : actor.speed * 3.6}
-          onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })} />
-        <Committed label="Starts after" suffix=" s" min={0} max={86_400} digits={1} value={actor.depart}
-          onCommit={(value) => change({ depart: value ?? 0 })} />
-      </Group>
-      {!walks && (
-        <Group grow align="flex-start">
-          <Committed label="Left of lane centre" suffix=" m" min={-3} max={3} step={0.1} digits={2} value={actor.lateral_offset}
-            onCommit={(value) => change({ lateral_offset: value ?? 0 })} />
-          <Select label="Driving style" allowDeselect={false} value={actor.style}
-            data={Object.entries(STYLE_WORD).map(([value, label]) => ({ value, label }))}
-            onChange={(style) => change({ style: (style ?? "normal") as Style })} />
-        </Group>
-      )}
-      {!walks && <Checkbox label="This is my vehicle under test (ego)" checked={actor.ego}
-        onChange={(event) => onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })} />}
-      {walks && <Checkbox label="Crosses the road anywhere" checked={actor.crosses_anywhere}
-        onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })} />}
-      {walks && <Checkbox label="Ignores red lights" checked={actor.ignores_red}
-        onChange={(event) => change({ ignores_red: event.currentTarget.checked })} />}
-    </Stack>
-  );
-}
-
-/** A number that is sent when it is finished, not with every key. */
-function Committed({ label, value, digits, onCommit, ...rest }: {
-  label: string; value: number | ""; digits: number; suffix: string; min: number; max: number;
-  step?: number; placeholder?: string; onCommit: (value: number | null) => void;
-}) {
-  const shown = value === "" ? "" : Number(value.toFixed(digits));
-  const commit = (text: string): void => {
-    const found = Number.parseFloat(text);
-    const next = Number.isNaN(found) ? null : Math.min(Math.max(found, rest.min), rest.max);
-    if (next !== (shown === "" ? null : shown)) onCommit(next);
-  };
-  return (
-    <NumberInput key={String(shown)} label={label} defaultValue={shown} decimalScale={digits} {...rest}
-      onBlur={(event) => commit(event.currentTarget.value)}
-      onKeyDown={(event) => { if (event.key === "Enter") commit(event.currentTarget.value); }} />
-  );
-}
-
-/** The body from above, to scale with a lane of 3.5 m. */
-function Silhouette({ actor, length, width }: { actor: Actor; length: number; width: number }) {
-  const y = 1.75 - width / 2 - actor.lateral_offset;
-  return (
-    <figure style={{ margin: 0 }}>
-      <svg className="silhouette" viewBox="-1 -0.300 22 4.100" role="img" aria-label={`${length.toFixed(1)} m long, ${width.toFixed(1)} m wide, on a lane of 3.5 m`}>
-        <rect x={-1} y={0} width={22} height={3.5} fill="#969ea8" />
-        <path d="M-1 0h22M-1 3.500h22" stroke="#fff" strokeWidth={0.15} strokeDasharray="1.500 1" />
-        <path d={`M8 ${y}h${Math.max(length - width * 0.35, 0.1)}l${width * 0.35} ${width * 0.28}v${width * 0.44}l${-width * 0.35} ${width * 0.28}h${-Math.max(length - width * 0.35, 0.1)}z`}
-          fill={CATEGORY_COLOR[actor.category]} stroke="#fff" strokeWidth={0.08} />
-      </svg>
-      <figcaption style={{ fontSize: 12 }}>{length.toFixed(1)} m long, {width.toFixed(1)} m wide</figcaption>
-    </figure>
+    <>
+      <Text size="sm" c="dimmed" aria-live="polite">
+        {tool.does === "copy" || tool.does === "move"
+          ? `Click where the ${tool.does === "copy" ? "copy" : "first of them"} starts. Escape stops.`
+          : `Now click where the ${who} starts: a ${people ? "yellow" : "blue"} point on the map. Escape stops placing.`}
+      </Text>
+      <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>Use the next free point</Button>
+    </>
   );
 }

@@ -1,7 +1,7 @@
-import type { Actor, Assets, Bounds, Problem, ScenarioDocument } from "../api/types";
+import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
-import type { SceneActor, SegmentStyle } from "../map/scene";
+import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
 export type Step = "map" | "region" | "environment" | "actors" | "run";
 export const STEPS: readonly Step[] = ["map", "region", "environment", "actors", "run"];
@@ -32,18 +32,21 @@ export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets 
   return found ? [found.length, found.width] : [4, 1.8];
 }
 
-/** Index of the actor that a problem is about, from a place such as `actors[3].goal`. */
-export function actorOfProblem(problem: Problem, actors: readonly Actor[]): Actor | null {
-  const found = /^actors\[(\d+)\]/.exec(problem.where);
-  return found ? (actors[Number(found[1])] ?? null) : null;
+/** Whom a problem is about, from a place such as `actors[3].goal`. */
+export function ofProblem(problem: Problem, document: ScenarioDocument): Actor | Flow | null {
+  const found = /^(actors|flows)\[(\d+)\]/.exec(problem.where);
+  return found ? (document[found[1] as "actors" | "flows"][Number(found[2])] ?? null) : null;
 }
 
+/** Ids of those that cannot be run as they are. */
+export const wrongOnes = (problems: readonly Problem[], document: ScenarioDocument): Set<string> =>
+  new Set(problems.filter((one) => one.severity === "error")
+    .flatMap((one) => ofProblem(one, document)?.id ?? []));
+
 export function sceneActors(
-  graph: Graph, document: ScenarioDocument, assets: Assets | null, selection: readonly string[],
-  problems: readonly Problem[],
+  graph: Graph, document: ScenarioDocument, assets: Assets | null, selection: ReadonlySet<string>,
+  wrong: ReadonlySet<string>,
 ): SceneActor[] {
-  const wrong = new Set(problems.filter((one) => one.severity === "error")
-    .map((one) => actorOfProblem(one, document.actors)?.id));
   return document.actors.flatMap((actor) => {
     const place = graph.place(actor.spawn);
     if (!place) return [];
@@ -53,31 +56,37 @@ export function sceneActors(
       // The offset is to the left of the driving direction.
       x: place.x - actor.lateral_offset * Math.sin(place.hdg),
       y: place.y + actor.lateral_offset * Math.cos(place.hdg),
-      selected: selection.includes(actor.id), problem: wrong.has(actor.id),
+      offset: actor.lateral_offset, selected: selection.has(actor.id), problem: wrong.has(actor.id),
     }];
   });
 }
 
-export function nearestActor(
-  actors: readonly SceneActor[], x: number, y: number, reach: number,
-): SceneActor | null {
-  let best: SceneActor | null = null;
-  let least = Infinity;
-  for (const actor of actors) {
-    const away = Math.hypot(actor.x - x, actor.y - y);
-    if (away <= Math.max(reach, actor.length / 2) && away < least) [best, least] = [actor, away];
-  }
-  return best;
+export function sceneFlows(
+  graph: Graph, document: ScenarioDocument, selection: ReadonlySet<string>, wrong: ReadonlySet<string>,
+): SceneFlow[] {
+  return document.flows.flatMap((flow) => {
+    const place = graph.place(flow.spawn);
+    return place ? [{
+      id: flow.id, walk: place.walk, x: place.x, y: place.y, hdg: place.hdg, perHour: flow.per_hour,
+      selected: selection.has(flow.id), problem: wrong.has(flow.id),
+    }] : [];
+  });
 }
 
-export function nearestPlace(
-  places: readonly Place[], x: number, y: number, reach: number,
-): Place | null {
-  let best: Place | null = null;
-  let least = reach;
-  for (const place of places) {
-    const away = Math.hypot(place.x - x, place.y - y);
-    if (away <= least) [best, least] = [place, away];
+/** Ids of all whose start lies in a rectangle. */
+export function inFrame(ones: readonly { id: string; x: number; y: number }[], [x0, y0, x1, y1]: Bounds): string[] {
+  return ones.filter(({ x, y }) => x >= x0 && x <= x1 && y >= y0 && y <= y1).map((one) => one.id);
+}
+
+/** Who is under the pointer: on the body, or within reach of the middle. */
+export function nearestOne<T extends { x: number; y: number; length?: number }>(
+  ones: readonly T[], x: number, y: number, reach: number,
+): T | null {
+  let best: T | null = null;
+  let least = Infinity;
+  for (const one of ones) {
+    const away = Math.hypot(one.x - x, one.y - y);
+    if (away <= Math.max(reach, (one.length ?? 0) / 2) && away < least) [best, least] = [one, away];
   }
   return best;
 }
@@ -86,8 +95,8 @@ export function nearestPlace(
 export function boundsOfProblem(
   problem: Problem, graph: Graph, document: ScenarioDocument,
 ): Bounds | null {
-  const actor = actorOfProblem(problem, document.actors);
-  const nodes = [...problem.nodes, ...(actor ? [actor.spawn] : [])];
+  const one = ofProblem(problem, document);
+  const nodes = [...problem.nodes, ...(one ? [one.spawn] : [])];
   const boxes: Bounds[] = nodes.flatMap((id) => {
     const place = graph.place(id);
     return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25] as Bounds] : [];
@@ -113,4 +122,9 @@ const join = (a: Bounds, b: Bounds): Bounds => [
 export function firstStep(document: ScenarioDocument): Step {
   if (document.roi.length === 0) return "region";
   return "actors";
+}
+
+/** A rectangle around places, which must be some. */
+export function boundsOfPlaces(places: readonly Place[]): Bounds {
+  return places.map(({ x, y }): Bounds => [x, y, x, y]).reduce(join);
 }

@@ -1,7 +1,8 @@
 import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
-import type { Actor, Edit, ScenarioState } from "../api/types";
+import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import { everyone } from "./placing";
 
 export type Saving = "saved" | "saving" | "failed";
 
@@ -10,33 +11,40 @@ export interface EditorState {
   scenario: ScenarioState | null;
   saving: Saving;
   /** What went wrong last, in the server's words. */
-  refusal: string | null;
+  refusal: Refusal | null;
+  /** Ids of road users and streams. */
   selection: readonly string[];
   load: () => Promise<void>;
-  /** Asks for a change; the answer is the new document, or null if it was refused. */
-  edit: (edit: Edit) => Promise<ScenarioState | null>;
+  /**
+   * Asks for a change, of one edit or of several that are one step for undo; the answer is the new
+   * document, or null if it was refused.
+   */
+  edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
   select: (ids: readonly string[]) => void;
   clearRefusal: () => void;
 }
 
+/** A change that was not made; one that was not wrong in itself can be asked for again. */
+export interface Refusal {
+  title: string;
+  message: string;
+  again: (() => Promise<ScenarioState | null>) | null;
+}
+
 export type EditorStore = UseBoundStore<StoreApi<EditorState>>;
-
-/** Ids of a selection that are still there. */
-export const stillThere = (selection: readonly string[], actors: readonly Actor[]): string[] =>
-  selection.filter((id) => actors.some((actor) => actor.id === id));
-
-/** The actors that came with a change. */
-export const added = (before: readonly Actor[], after: readonly Actor[]): string[] =>
-  after.filter((actor) => !before.some((old) => old.id === actor.id)).map((actor) => actor.id);
 
 /** Who is selected after a change: the new ones, else those that are still there. */
 export function selectionAfter(
-  selection: readonly string[], before: readonly Actor[], after: readonly Actor[],
-): string[] {
-  const fresh = added(before, after);
-  return fresh.length > 0 ? fresh : stillThere(selection, after);
+  selection: readonly string[], before: ScenarioDocument, after: ScenarioDocument,
+): readonly string[] {
+  const old = new Set(everyone(before).map((one) => one.id));
+  const now = everyone(after).map((one) => one.id);
+  const fresh = now.filter((id) => !old.has(id));
+  if (fresh.length > 0) return fresh;
+  const there = new Set(now);
+  return selection.every((id) => there.has(id)) ? selection : selection.filter((id) => there.has(id));
 }
 
 /** Holds one scenario as the server knows it; changes go out one at a time, in order. */
@@ -48,8 +56,7 @@ export function createEditorStore(name: string): EditorStore {
       set({
         scenario: next,
         saving: "saved",
-        selection: selectionAfter(
-          selection, scenario?.document.actors ?? next.document.actors, next.document.actors),
+        selection: selectionAfter(selection, scenario?.document ?? next.document, next.document),
       });
     };
     const ask = (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState | null> => {
@@ -62,23 +69,31 @@ export function createEditorStore(name: string): EditorStore {
           accept(next);
           return next;
         } catch (error) {
-          await refused(error);
+          await refused(error, () => ask(call));
           return null;
         }
       });
       queue = turn;
       return turn;
     };
-    const refused = async (error: unknown): Promise<void> => {
+    const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
+      const message = error instanceof Error ? error.message : String(error);
       if (status === 409) {
-        set({ refusal: "This scenario was changed in another tab. You now see the newest state; please repeat your last change." });
-        await get().load();
+        try {
+          await get().load();
+        } catch (failure) {
+          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: String((failure as Error).message), again } });
+          return;
+        }
+        const title = "Changed in another tab";
+        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it; you can make it again on top.", again } });
         return;
       }
+      const failed = status <= 0 || status >= 500;
       set({
-        saving: status === 0 || status >= 500 || status < 0 ? "failed" : "saved",
-        refusal: error instanceof Error ? error.message : String(error),
+        saving: failed ? "failed" : "saved",
+        refusal: { title: failed ? "Your last change is not saved" : "That is not possible", message, again: failed ? again : null },
       });
     };
     return {
@@ -88,7 +103,10 @@ export function createEditorStore(name: string): EditorStore {
       refusal: null,
       selection: [],
       load: async () => accept(await api.scenario(name)),
-      edit: (edit) => ask((version) => api.edit(name, version, edit)),
+      edit: (edit, label) => {
+        const edits = Array.isArray(edit) ? edit as readonly Edit[] : [edit as Edit];
+        return ask((version) => api.edit(name, version, edits, label));
+      },
       undo: () => ask((version) => api.undo(name, version)),
       redo: () => ask((version) => api.redo(name, version)),
       select: (ids) => set({ selection: ids }),

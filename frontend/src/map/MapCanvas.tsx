@@ -10,7 +10,7 @@ import type { Graph } from "./graph";
 import { Minimap } from "./Minimap";
 import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
-import type { Moving, Scene } from "./scene";
+import type { Mark, Moving, Scene } from "./scene";
 import { clampTo, fit, panBy, scaleBar, type Size, toWorld, type View, zoomAt } from "./view";
 import { IconFit, IconMinus, IconPlus } from "../ui/icons";
 
@@ -25,8 +25,11 @@ export interface Pointed {
 export interface MapHandle {
   setMoving(moving: Moving | null): void;
   setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  setMarks(marks: readonly Mark[]): void;
   show(bounds: Bounds): void;
   centre(x: number, y: number): void;
+  /** Acts on the middle, as Enter does. */
+  pickMiddle(): void;
 }
 
 interface Props {
@@ -40,7 +43,20 @@ interface Props {
   handle?: RefObject<MapHandle | null>;
   onPick?: (at: Pointed) => void;
   onPoint?: (at: Pointed | null) => void;
+  /** Whether the drag that begins here takes something along instead of moving the map. */
+  onGrab?: (at: Pointed) => boolean;
+  onDrop?: (at: Pointed) => void;
+  /** A drag with Shift held down has drawn a rectangle. */
+  onFrame?: (bounds: Bounds) => void;
   children?: ReactNode;
+}
+
+/** A button held down: where it was pressed, where the pointer was last, and what the drag does. */
+interface Drag {
+  from: [number, number];
+  last: [number, number];
+  moved: boolean;
+  does: "pan" | "carry" | "frame";
 }
 
 const CLICK_SLACK = 4;
@@ -48,7 +64,8 @@ const TOUCH = 14;
 
 /** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
 export function MapCanvas({
-  drawing, graph, picker, scene, label, aim = false, handle, onPick, onPoint, children,
+  drawing, graph, picker, scene, label, aim = false, handle, onPick, onPoint, onGrab, onDrop, onFrame,
+  children,
 }: Props) {
   const host = useRef<HTMLDivElement>(null);
   const layers = useRef<HTMLDivElement>(null);
@@ -56,7 +73,8 @@ export function MapCanvas({
   const view = useRef<View>({ x: 0, y: 0, scale: 1 });
   const size = useRef<Size>({ width: 1, height: 1 });
   const least = useRef(0.01);
-  const drag = useRef<{ x: number; y: number; moved: boolean } | null>(null);
+  const drag = useRef<Drag | null>(null);
+  const [frame, setFrame] = useState<readonly [x: number, y: number, width: number, height: number] | null>(null);
   const [shown, setShown] = useState<View>(view.current);
   const [crosshair, setCrosshair] = useState(false);
   const [ready, setReady] = useState<MapRenderer | null>(null);
@@ -111,9 +129,11 @@ export function MapCanvas({
   useImperativeHandle(handle, () => ({
     setMoving: (moving) => renderer.current?.setMoving(moving),
     setLamps: (lamps) => renderer.current?.setLamps(lamps),
+    setMarks: (marks) => renderer.current?.setMarks(marks),
     show: (bounds) => apply(fit(bounds, size.current, 0.15)),
     centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
-  }), [apply]);
+    pickMiddle: () => onPick?.({ x: view.current.x, y: view.current.y, reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale, shift: false }),
+  }), [apply, onPick]);
 
   // React's wheel listener is passive; the page must not scroll along.
   useEffect(() => {
@@ -168,6 +188,7 @@ export function MapCanvas({
       ref={host}
       className="map"
       data-aim={aim}
+      data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
       aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
@@ -178,7 +199,9 @@ export function MapCanvas({
         setCrosshair(false);
         event.currentTarget.setPointerCapture(event.pointerId);
         const [x, y] = local(event);
-        drag.current = { x, y, moved: false };
+        const shift = event.shiftKey;
+        const does = shift && onFrame ? "frame" : !shift && onGrab?.(pointed(x, y, false)) ? "carry" : "pan";
+        drag.current = { from: [x, y], last: [x, y], moved: false, does };
       }}
       onPointerMove={(event) => {
         const [x, y] = local(event);
@@ -187,19 +210,29 @@ export function MapCanvas({
           onPoint?.(pointed(x, y, event.shiftKey));
           return;
         }
-        if (!held.moved && Math.hypot(x - held.x, y - held.y) < CLICK_SLACK) return;
-        apply(panBy(view.current, x - held.x, y - held.y));
-        drag.current = { x, y, moved: true };
+        if (!held.moved && Math.hypot(x - held.from[0], y - held.from[1]) < CLICK_SLACK) return;
+        if (held.does === "pan") apply(panBy(view.current, x - held.last[0], y - held.last[1]));
+        else if (held.does === "carry") onPoint?.(pointed(x, y, false));
+        else setFrame([Math.min(x, held.from[0]), Math.min(y, held.from[1]), Math.abs(x - held.from[0]), Math.abs(y - held.from[1])]);
+        drag.current = { ...held, last: [x, y], moved: true };
       }}
       onPointerUp={(event) => {
         const held = drag.current;
         drag.current = null;
-        if (held && !held.moved && event.button === 0) onPick?.(pointed(held.x, held.y, event.shiftKey));
+        setFrame(null);
+        if (!held || event.button !== 0) return;
+        if (!held.moved) onPick?.(pointed(...held.from, event.shiftKey));
+        else if (held.does === "carry") onDrop?.(pointed(...local(event), false));
+        else if (held.does === "frame") {
+          const [a, b] = [toWorld(view.current, size.current, ...held.from), toWorld(view.current, size.current, ...local(event))];
+          onFrame?.([Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])]);
+        }
       }}
-      onPointerCancel={() => { drag.current = null; }}
+      onPointerCancel={() => { drag.current = null; setFrame(null); }}
       onPointerLeave={() => { if (!drag.current) onPoint?.(null); }}
     >
       <div ref={layers} className="map-layers" />
+      {frame && <div className="map-frame" aria-hidden="true" style={{ left: frame[0], top: frame[1], width: frame[2], height: frame[3] }} />}
       {crosshair && <div className="map-crosshair" aria-hidden="true" />}
       {/* Controls lie on the map but are not the map. */}
       <div

@@ -1,4 +1,5 @@
 import type { Category } from "../api/types";
+import type { MarkKind } from "./scene";
 
 /** Colours that requirements fix, the same in light and dark. */
 export const RELATION = ["#000000", "#FF4261", "#00E279"] as const;
@@ -8,6 +9,8 @@ export const ROI_BASE = "#123F8C";
 export const ROI_MEMBER = "#2B62BD";
 export const ELIGIBLE = "#7CC8FF";
 export const GOAL = "#5AC3FF";
+/** Streams of vehicles; those of people have the colour of their places. */
+export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
 
 export interface Palette {
@@ -51,3 +54,4 @@ export const CATEGORY_COLOR: Record<Category, string> = {
   motorcycle: "#c2255c", bicycle: "#2b8a3e", pedestrian: "#f2b600",
 };
 export const EGO = "#e03131";
+export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", lifted: "#5f3dc4" };

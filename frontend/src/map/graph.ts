@@ -59,6 +59,18 @@ export class Graph {
     };
   }
 
+  /** Whether the simulator can place somebody exactly here. */
+  usable(index: number, walk: boolean): boolean {
+    return (walk ? this.columns.walks.walkable : this.columns.spawnable)[index] === 1;
+  }
+
+  /** First and last index, exclusive, of the places of one lane or walkway. */
+  lanePlaces({ walk, index }: Pick<Place, "walk" | "index">): [first: number, end: number] {
+    const c: Keyed = walk ? this.columns.walks : this.columns;
+    const lane = c.lane[index];
+    return [c.first_node[lane], c.first_node[lane + 1] ?? c.lane.length];
+  }
+
   segmentId(row: number): string {
     return this.columns.segments[row].id;
   }

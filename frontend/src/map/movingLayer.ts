@@ -1,6 +1,6 @@
 import { CATEGORIES } from "../api/types";
-import { CATEGORY_COLOR, EGO, type Palette } from "./colors";
-import type { Moving } from "./scene";
+import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette } from "./colors";
+import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
 
 /** As the server numbers them. */
@@ -16,6 +16,7 @@ const DETAIL_FROM = 6;
 /** Road users of a run, drawn many at once: one path per category. */
 export class MovingLayer {
   lamps: readonly { x: number; y: number; color: string }[] = [];
+  marks: readonly Mark[] = [];
 
   draw(
     context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
@@ -25,7 +26,13 @@ export class MovingLayer {
     context.clearRect(0, 0, context.canvas.width, context.canvas.height);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.drawLamps(context, view, size);
-    if (!moving) return;
+    if (moving) this.drawMoving(context, view, size, palette, moving);
+    for (const mark of this.marks) drawMark(context, mark, view, size);
+  }
+
+  private drawMoving(
+    context: CanvasRenderingContext2D, view: View, size: Size, palette: Palette, moving: Moving,
+  ): void {
     const rows = byCategory(moving, view, size);
     rows.forEach((of, n) => {
       if (of.length === 0) return;
@@ -150,4 +157,41 @@ function mark(
   context.beginPath();
   context.arc(x, y, Math.max(11, moving.pose[p + 3] * 0.75 * view.scale), 0, 2 * Math.PI);
   context.stroke();
+}
+
+const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
+  collision: (context) => { line(context, -4, -4, 4, 4); line(context, -4, 4, 4, -4); },
+  braking: (context) => { line(context, 0, -5, 0, 1); line(context, 0, 4, 0, 4.5); },
+  lifted: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
+};
+
+function line(context: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
+  context.moveTo(x0, y0);
+  context.lineTo(x1, y1);
+}
+
+/** A sign of constant size; what is past is paler, what is new has a ring around it. */
+function drawMark(context: CanvasRenderingContext2D, mark: Mark, view: View, size: Size): void {
+  context.save();
+  context.translate((mark.x - view.x) * view.scale + size.width / 2, (view.y - mark.y) * view.scale + size.height / 2);
+  context.globalAlpha = mark.fresh ? 1 : 0.6;
+  context.beginPath();
+  context.arc(0, 0, mark.fresh ? 11 : 8.5, 0, 2 * Math.PI);
+  context.fillStyle = MARK_COLOR[mark.kind];
+  context.fill();
+  context.strokeStyle = "#ffffff";
+  context.lineWidth = 2;
+  context.stroke();
+  context.beginPath();
+  context.lineCap = "round";
+  SIGN[mark.kind](context);
+  context.stroke();
+  if (mark.fresh) {
+    context.beginPath();
+    context.arc(0, 0, 17, 0, 2 * Math.PI);
+    context.strokeStyle = MARK_COLOR[mark.kind];
+    context.lineWidth = 3;
+    context.stroke();
+  }
+  context.restore();
 }

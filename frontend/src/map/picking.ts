@@ -8,6 +8,8 @@ export interface PickOptions {
   walks: boolean;
   /** Rows of segments that may be picked in; all of them without. */
   inside?: ReadonlySet<number>;
+  /** Whether a place may be picked; all of them without. */
+  allowed?: (index: number, walk: boolean) => boolean;
 }
 
 /** Finds what lies under the pointer. */
@@ -25,11 +27,11 @@ export class Picker {
     const { columns } = this.graph;
     const found: Place[] = [];
     if (options.vehicles) {
-      const i = nearest(this.nodes, x, y, reach, options.inside, columns.segment);
+      const i = nearest(this.nodes, x, y, reach, columns.segment, false, options);
       if (i !== undefined) found.push(this.graph.vehiclePlace(i));
     }
     if (options.walks) {
-      const i = nearest(this.walks, x, y, reach, options.inside, columns.walks.segment);
+      const i = nearest(this.walks, x, y, reach, columns.walks.segment, true, options);
       if (i !== undefined) found.push(this.graph.walkPlace(i));
     }
     const away = (p: Place): number => Math.hypot(p.x - x, p.y - y);
@@ -38,7 +40,7 @@ export class Picker {
 
   /** Row of the segment whose lane is nearest. */
   segment(x: number, y: number, reach: number): number | null {
-    const i = nearest(this.nodes, x, y, reach, undefined, this.graph.columns.segment);
+    const i = nearest(this.nodes, x, y, reach, this.graph.columns.segment, false);
     return i === undefined ? null : this.graph.columns.segment[i];
   }
 
@@ -57,9 +59,10 @@ function indexed(columns: Pick<GraphColumns, "x" | "y">): Flatbush | null {
 }
 
 function nearest(
-  index: Flatbush | null, x: number, y: number, reach: number,
-  inside: ReadonlySet<number> | undefined, segment: number[],
+  index: Flatbush | null, x: number, y: number, reach: number, segment: number[], walk: boolean,
+  { inside, allowed }: Pick<PickOptions, "inside" | "allowed"> = {},
 ): number | undefined {
-  const filter = inside && ((i: number): boolean => inside.has(segment[i]));
+  const filter = (inside || allowed) && ((i: number): boolean =>
+    (!inside || inside.has(segment[i])) && (!allowed || allowed(i, walk)));
   return index?.neighbors(x, y, 1, reach, filter)[0];
 }

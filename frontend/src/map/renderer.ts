@@ -5,7 +5,7 @@ import type { Graph } from "./graph";
 import { MovingLayer } from "./movingLayer";
 import type { Picker } from "./picking";
 import { SceneLayer } from "./sceneLayer";
-import { EMPTY_SCENE, type Moving, type Scene } from "./scene";
+import { EMPTY_SCENE, type Mark, type Moving, type Scene } from "./scene";
 import type { Size, View } from "./view";
 
 /** What the page asks of a drawing of the map; another technique need only offer this. */
@@ -16,6 +16,7 @@ export interface MapRenderer {
   setScene(scene: Scene): void;
   setMoving(moving: Moving | null): void;
   setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  setMarks(marks: readonly Mark[]): void;
   /** Draws the whole map small, for the minimap. */
   drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
   destroy(): void;
@@ -96,6 +97,11 @@ export class CanvasRenderer implements MapRenderer {
 
   setLamps(lamps: readonly { x: number; y: number; color: string }[]): void {
     this.moving.lamps = lamps;
+    this.mark("moving");
+  }
+
+  setMarks(marks: readonly Mark[]): void {
+    this.moving.marks = marks;
     this.mark("moving");
   }
 

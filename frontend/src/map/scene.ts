@@ -12,6 +12,20 @@ export interface SceneActor {
   length: number;
   width: number;
   ego: boolean;
+  /** Metres to the left of the middle of its lane; `x` and `y` have it in them already. */
+  offset: number;
+  selected: boolean;
+  problem: boolean;
+}
+
+/** A stream of road users that come in at one place. */
+export interface SceneFlow {
+  id: string;
+  walk: boolean;
+  x: number;
+  y: number;
+  hdg: number;
+  perHour: number;
   selected: boolean;
   problem: boolean;
 }
@@ -23,10 +37,13 @@ export interface Scene {
   /** Which places are shown when near. */
   nodes: { vehicles: boolean; walks: boolean; inside: ReadonlySet<number> | null };
   actors: readonly SceneActor[];
+  flows: readonly SceneFlow[];
   goals: readonly Place[];
   chosenGoal: Place | null;
   path: readonly (readonly [number, number])[];
   hover: Place | null;
+  /** What is said beside the place under the pointer. */
+  hoverText: string | null;
   hoverCategory: Category | null;
 }
 
@@ -35,10 +52,12 @@ export const EMPTY_SCENE: Scene = {
   hoverSegment: null,
   nodes: { vehicles: true, walks: true, inside: null },
   actors: [],
+  flows: [],
   goals: [],
   chosenGoal: null,
   path: [],
   hover: null,
+  hoverText: null,
   hoverCategory: null,
 };
 
@@ -53,3 +72,13 @@ export interface Moving {
   ego: number;
   followed: number;
 }
+
+/** A place where something happened; `fresh` just now. */
+export interface Mark {
+  x: number;
+  y: number;
+  kind: MarkKind;
+  fresh: boolean;
+}
+
+export type MarkKind = "collision" | "braking" | "lifted";

@@ -1,9 +1,12 @@
 import {
-  CATEGORY_COLOR, EGO, ELIGIBLE, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, RELATION, ROI_BASE,
+  CATEGORY_COLOR, EGO, ELIGIBLE, type Palette, PEDESTRIAN_NODE, PROBLEM, RELATION, ROI_BASE,
   ROI_MEMBER, VEHICLE_NODE,
 } from "./colors";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
+import {
+  badge, body, dots, drawFlow, drawGoal, drawLane, drawOffset, drawPath, drawWalkEdges, spot, tag,
+} from "./marks";
 import type { Picker } from "./picking";
 import type { Scene, SceneActor, SegmentStyle } from "./scene";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
@@ -11,6 +14,15 @@ import type { Bounds, Category } from "../api/types";
 
 const NODES_FROM = 2.6;
 const EDGES_FROM = 7;
+/** From so many on, everybody is a dot while the whole crowd is in sight. */
+const CROWD = 300;
+/** More names than these would lie on top of each other. */
+const FEW = 3;
+/** Least length of the arrow at the pointer, pixels. */
+const ARROW = 26;
+/** No body reaches further from its middle, metres. */
+const ROOM = 12;
+const UNUSABLE = "#8b949d";
 
 const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
   base: { fill: ROI_BASE, alpha: 0.72 },
@@ -47,6 +59,7 @@ export class SceneLayer {
       this.drawGraph(context, view, size, scene, palette);
     }
     drawPath(context, view, scene);
+    if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (x: number, y: number): [number, number] => [
       (x - view.x) * view.scale + size.width / 2,
@@ -55,7 +68,23 @@ export class SceneLayer {
     for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
-    for (const actor of scene.actors) this.drawActor(context, at(actor.x, actor.y), view, actor, palette);
+    const plain = scene.actors.length > CROWD && view.scale < NODES_FROM;
+    const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
+    const seen = visible(view, size);
+    for (const actor of scene.actors) {
+      const box: Bounds = [actor.x - ROOM, actor.y - ROOM, actor.x + ROOM, actor.y + ROOM];
+      if (!overlaps(box, seen)) continue;
+      if (plain && !actor.selected && !actor.ego && !actor.problem) {
+        spot(context, at(actor.x, actor.y), CATEGORY_COLOR[actor.category]);
+      } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette, named);
+    }
+    for (const flow of scene.flows) drawFlow(context, at(flow.x, flow.y), flow, palette);
+    if (scene.hover && scene.hoverText) {
+      const [x, y] = at(scene.hover.x, scene.hover.y);
+      // Below the arrow where it points down.
+      const down = Math.max(0, -Math.sin(scene.hover.hdg)) * Math.max(ARROW, 4 * view.scale);
+      tag(context, scene.hoverText, x, y + 24 + down);
+    }
   }
 
   private drawSegments(
@@ -89,15 +118,26 @@ export class SceneLayer {
       const rows = this.picker.within(...seen, false)
         .filter((i) => !inside || inside.has(columns.segment[i]));
       if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette);
-      dots(context, view, columns, rows, VEHICLE_NODE);
+      this.drawPlaces(context, view, rows, false);
     }
     if (scene.nodes.walks) {
       const { walks } = columns;
       const rows = this.picker.within(...seen, true)
         .filter((i) => !inside || inside.has(walks.segment[i]));
       if (view.scale >= EDGES_FROM) drawWalkEdges(context, view, this.graph, new Set(rows));
-      dots(context, view, walks, rows, PEDESTRIAN_NODE);
+      this.drawPlaces(context, view, rows, true);
     }
+  }
+
+  /** Places in their colour; grey where nobody can start. */
+  private drawPlaces(
+    context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean,
+  ): void {
+    if (!this.graph) return;
+    const graph = this.graph;
+    const at = walk ? graph.columns.walks : graph.columns;
+    dots(context, view, at, rows.filter((i) => !graph.usable(i, walk)), UNUSABLE);
+    dots(context, view, at, rows.filter((i) => graph.usable(i, walk)), walk ? PEDESTRIAN_NODE : VEHICLE_NODE);
   }
 
   private drawEdges(
@@ -139,7 +179,7 @@ export class SceneLayer {
     context.fill();
     context.stroke();
     if (!place.walk) {
-      const tip = Math.max(26, 4 * view.scale);
+      const tip = Math.max(ARROW, 4 * view.scale);
       context.beginPath();
       context.moveTo(9, 0);
       context.lineTo(tip, 0);
@@ -158,10 +198,11 @@ export class SceneLayer {
 
   private drawActor(
     context: CanvasRenderingContext2D, [x, y]: [number, number], view: View, actor: SceneActor,
-    palette: Palette,
+    palette: Palette, named: boolean,
   ): void {
     const color = CATEGORY_COLOR[actor.category];
     const near = actor.length * view.scale > 10;
+    if (near && actor.offset) drawOffset(context, x, y, view, actor, palette);
     if (near) body(context, x, y, view, actor, color);
     const lift = near ? Math.max(20, actor.width * view.scale * 0.5 + 18) : 0;
     const radius = actor.selected ? 14 : 12;
@@ -173,7 +214,7 @@ export class SceneLayer {
     }
     badge(context, this.glyphs[actor.category], x, y - lift, radius, color, actor.category);
     if (actor.ego) tag(context, "EGO", x, y - lift - radius - 11);
-    else if (actor.selected) tag(context, actor.id, x, y - lift - radius - 11);
+    else if (actor.selected && named) tag(context, actor.id, x, y - lift - radius - 11);
   }
 }
 
@@ -181,130 +222,4 @@ function addRing(path: Path2D, ring: Float64Array): void {
   path.moveTo(ring[0], ring[1]);
   for (let i = 2; i < ring.length; i += 2) path.lineTo(ring[i], ring[i + 1]);
   path.closePath();
-}
-
-function dots(
-  context: CanvasRenderingContext2D, view: View, at: { x: number[]; y: number[] }, rows: number[],
-  color: string,
-): void {
-  const r = Math.min(Math.max(1.5, view.scale * 0.3), 6) / view.scale;
-  context.fillStyle = color;
-  context.beginPath();
-  for (const i of rows) {
-    if (view.scale < 5) context.rect(at.x[i] - r, at.y[i] - r, 2 * r, 2 * r);
-    else {
-      context.moveTo(at.x[i] + r, at.y[i]);
-      context.arc(at.x[i], at.y[i], r, 0, 2 * Math.PI);
-    }
-  }
-  context.fill();
-}
-
-function drawWalkEdges(
-  context: CanvasRenderingContext2D, view: View, graph: Graph, rows: Set<number>,
-): void {
-  const { walks } = graph.columns;
-  context.beginPath();
-  for (let e = 0; e < walks.source.length; e++) {
-    if (!rows.has(walks.source[e])) continue;
-    context.moveTo(walks.x[walks.source[e]], walks.y[walks.source[e]]);
-    context.lineTo(walks.x[walks.target[e]], walks.y[walks.target[e]]);
-  }
-  context.strokeStyle = "#a58a00";
-  context.lineWidth = 1.1 / view.scale;
-  context.stroke();
-}
-
-function drawPath(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
-  if (scene.path.length < 2) return;
-  context.beginPath();
-  scene.path.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
-  context.lineCap = "round";
-  context.lineJoin = "round";
-  context.strokeStyle = "#ffffff";
-  context.lineWidth = Math.max(1.3, 7 / view.scale);
-  context.stroke();
-  context.strokeStyle = "#1f9bf0";
-  context.lineWidth = Math.max(0.8, 4 / view.scale);
-  context.stroke();
-}
-
-function drawGoal(
-  context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean,
-): void {
-  context.beginPath();
-  context.arc(x, y, chosen ? 10 : 7, 0, 2 * Math.PI);
-  context.fillStyle = GOAL;
-  context.fill();
-  context.lineWidth = 2.5;
-  context.strokeStyle = chosen ? ROI_BASE : "#ffffff";
-  context.stroke();
-  if (!chosen) return;
-  context.beginPath();
-  context.moveTo(x - 2.500, y + 5);
-  context.lineTo(x - 2.500, y - 6);
-  context.lineTo(x + 5, y - 3);
-  context.lineTo(x - 2.500, y);
-  context.fillStyle = ROI_BASE;
-  context.fill();
-  context.lineWidth = 1.500;
-  context.stroke();
-}
-
-function body(
-  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, color: string,
-): void {
-  context.save();
-  context.translate(x, y);
-  context.rotate(-actor.hdg);
-  const l = actor.length * view.scale;
-  const w = actor.width * view.scale;
-  context.fillStyle = color;
-  context.strokeStyle = "#ffffff";
-  context.lineWidth = 1.5;
-  context.beginPath();
-  context.moveTo(-l / 2, -w / 2);
-  context.lineTo(l / 2 - w * 0.35, -w / 2);
-  context.lineTo(l / 2, -w * 0.22);
-  context.lineTo(l / 2, w * 0.22);
-  context.lineTo(l / 2 - w * 0.35, w / 2);
-  context.lineTo(-l / 2, w / 2);
-  context.closePath();
-  context.fill();
-  context.stroke();
-  context.restore();
-}
-
-function badge(
-  context: CanvasRenderingContext2D, glyph: Path2D, x: number, y: number, radius: number,
-  color: string, category: Category,
-): void {
-  context.save();
-  context.translate(x, y);
-  context.beginPath();
-  context.arc(0, 0, radius, 0, 2 * Math.PI);
-  context.fillStyle = color;
-  context.fill();
-  context.lineWidth = 1.5;
-  context.strokeStyle = "#ffffff";
-  context.stroke();
-  const k = (radius * 1.45) / 24;
-  context.scale(k, k);
-  context.translate(-12, -12);
-  context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
-  context.fill(glyph, "evenodd");
-  context.restore();
-}
-
-function tag(context: CanvasRenderingContext2D, text: string, x: number, y: number): void {
-  context.font = "600 11px system-ui, sans-serif";
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  const width = context.measureText(text).width + 10;
-  context.fillStyle = "#22282e";
-  context.beginPath();
-  context.roundRect(x - width / 2, y - 8, width, 16, 8);
-  context.fill();
-  context.fillStyle = "#ffffff";
-  context.fillText(text, x, y + 0.5);
 }

@@ -57,6 +57,15 @@ export class Crowd {
     for (const actor of actors) this.known.set(actor.index, actor);
   }
 
+  everybody(): Introduced[] {
+    return [...this.known.values()];
+  }
+
+  /** Ids of the road users that are marked as the person's own. */
+  egos(): string[] {
+    return this.everybody().filter((one) => one.ego).map((one) => one.id);
+  }
+
   named(index: number): Introduced | undefined {
     return this.known.get(index);
   }

@@ -1,12 +1,13 @@
-import { api } from "../api/client";
+import { type Incident, runs } from "../api/runs";
 import { Crowd, decodeFrame, type Frame, type Introduced } from "./frames";
 
 export interface LiveEvents {
   onFrame: (frame: Frame, crowd: Crowd) => void;
   onLights: (lights: Record<string, string>) => void;
-  onState: (state: string) => void;
-  /** The connection is gone: the run has ended, or the server is not there. */
-  onClose: () => void;
+  onState: (state: string, speed?: number | null) => void;
+  onIncidents: (incidents: Incident[]) => void;
+  /** Everybody who will ever be on the road is known. */
+  onIntroduced: (crowd: Crowd) => void;
 }
 
 interface Message {
@@ -14,6 +15,8 @@ interface Message {
   actors?: Introduced[];
   lights?: Record<string, string>;
   state?: string;
+  speed?: number | null;
+  events?: Incident[];
 }
 
 /** Listens to a run; the newest frame is drawn with the next picture, then the next one is asked for. */
@@ -22,20 +25,17 @@ export class Live {
   private readonly socket: WebSocket;
   private waiting: ArrayBuffer | null = null;
   private pending = 0;
-  private closed = false;
 
   constructor(run: string, private readonly events: LiveEvents) {
-    this.socket = new WebSocket(api.liveUrl(run));
+    this.socket = new WebSocket(runs.liveUrl(run));
     this.socket.binaryType = "arraybuffer";
     this.socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
       if (typeof event.data === "string") this.read(event.data);
       else this.take(event.data);
     };
-    this.socket.onclose = () => { if (!this.closed) events.onClose(); };
   }
 
   close(): void {
-    this.closed = true;
     cancelAnimationFrame(this.pending);
     this.socket.close();
   }
@@ -43,9 +43,13 @@ export class Live {
   private read(text: string): void {
     const message = JSON.parse(text) as Message;
     if (message.origin) this.crowd.origin = message.origin;
-    if (message.actors) this.crowd.introduce(message.actors);
+    if (message.actors) {
+      this.crowd.introduce(message.actors);
+      this.events.onIntroduced(this.crowd);
+    }
     if (message.lights) this.events.onLights(message.lights);
-    if (message.state) this.events.onState(message.state);
+    if (message.events) this.events.onIncidents(message.events);
+    if (message.state) this.events.onState(message.state, message.speed);
   }
 
   private take(data: ArrayBuffer): void {

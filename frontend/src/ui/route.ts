@@ -4,12 +4,14 @@ import { useSyncExternalStore } from "react";
 export type Route =
   | { view: "catalogue" }
   | { view: "editor"; scenario: string }
-  | { view: "run"; scenario: string; run: string };
+  | { view: "run"; scenario: string; run: string }
+  | { view: "runs"; scenario: string };
 
 export function parseRoute(hash: string): Route {
   const [view, scenario, run] = hash.replace(/^#\/?/, "").split("/").map(decode);
   if (view === "edit" && scenario) return { view: "editor", scenario };
   if (view === "run" && scenario && run) return { view: "run", scenario, run };
+  if (view === "runs" && scenario) return { view: "runs", scenario };
   return { view: "catalogue" };
 }
 
@@ -18,6 +20,7 @@ export function hashOf(route: Route): string {
   const enc = encodeURIComponent;
   if (route.view === "editor") return `#/edit/${enc(route.scenario)}`;
   if (route.view === "run") return `#/run/${enc(route.scenario)}/${enc(route.run)}`;
+  if (route.view === "runs") return `#/runs/${enc(route.scenario)}`;
   return "#/";
 }
 

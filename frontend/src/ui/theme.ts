@@ -1,10 +1,26 @@
-import { createTheme } from "@mantine/core";
+import { createTheme, type CSSVariablesResolver, Modal, ModalHeader } from "@mantine/core";
 
 export const theme = createTheme({
   primaryColor: "blue",
-  primaryShade: { light: 8, dark: 7 },
+  primaryShade: 8,
   fontFamily: "system-ui, 'Segoe UI', 'Helvetica Neue', Arial, 'DejaVu Sans', sans-serif",
   defaultRadius: "md",
   autoContrast: true,
   cursorType: "pointer",
+  components: {
+    Modal: Modal.extend({ defaultProps: { closeButtonProps: { "aria-label": "Close" } } }),
+    // A window's head is not a second head of the page.
+    ModalHeader: ModalHeader.extend({ defaultProps: { role: "presentation" } }),
+  },
+});
+
+/** Secondary text and light alerts with a contrast of 4.5 at least, which Mantine's own colours miss. */
+export const contrast: CSSVariablesResolver = () => ({
+  variables: {},
+  light: {
+    "--mantine-color-dimmed": "var(--mantine-color-gray-7)",
+    "--mantine-color-blue-light-color": "var(--mantine-color-blue-9)",
+    "--mantine-color-red-light-color": "var(--mantine-color-red-9)",
+  },
+  dark: { "--mantine-color-dimmed": "var(--mantine-color-dark-1)" },
 });

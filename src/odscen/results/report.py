@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odscen.catalog.markup import Markup, element, join, number
+from odscen.results.curves import presence
 from odscen.results.plots import Series, line_chart
 from odscen.results.report_map import CATEGORIES, run_map
 from odscen.results.report_tables import (
@@ -24,7 +25,7 @@ from odscen.results.report_tables import (
     report_section,
 )
 from odscen.results.summary import actor_counts, key_figures
-from odscen.results.traces import bin_width, counts_over_time, speed_over_time, tidy, travel
+from odscen.results.traces import bin_width, speed_over_time, tidy, travel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -300,11 +301,7 @@ def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
 def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | None:
     if not actors:
         return None
-    depart, inserted, arrived = (
-        np.array([_number(getattr(actor, key)) for actor in actors])
-        for key in ("depart", "inserted", "arrived")
-    )
-    counts = counts_over_time(depart, inserted, arrived, end=end, width=bin_width(end))
+    counts = presence(actors, end=end)
     series = [
         Series("on the road", "c-running", counts.running),
         Series("reached their goal", "c-arrived", counts.arrived),
@@ -322,10 +319,6 @@ def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | No
         "waits to enter means that there is no room at their start."
     )
     return report_section("Entering and arriving", chart, explained=explained, ident="progress")
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else float("nan")
 
 
 def _foot(summary: Mapping[str, Any]) -> Markup:

@@ -266,7 +266,10 @@ class RunProgress(Answer):
 
 
 class RunInfo(Answer):
-    """A run, going on or finished; ``summary`` is that of ``summary.json``."""
+    """A run, going on or finished; ``summary`` is that of ``summary.json``.
+
+    ``finished`` is when its results were written, in seconds since 1970.
+    """
 
     run: str
     state: RunState
@@ -276,6 +279,53 @@ class RunInfo(Answer):
     progress: RunProgress | None = None
     summary: dict[str, Any] | None = None
     error: str | None = None
+    finished: float | None = None
+
+
+class RunCurve(Answer):
+    """How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds."""
+
+    time: list[float]
+    running: list[float]
+    arrived: list[float]
+    waiting: list[float]
+
+
+class RunSpeeds(Answer):
+    """Speeds of all vehicles in m/s around each ``time``: mean, and 10th and 90th percentile."""
+
+    time: list[float]
+    mean: list[float | None]
+    low: list[float | None]
+    high: list[float | None]
+
+
+class RunShares(Answer):
+    """Share of all vehicle time spent between ``edges[i]`` and ``edges[i + 1]``, m/s."""
+
+    edges: list[float]
+    share: list[float]
+
+
+class RunCurves(Answer):
+    """What a finished run looked like over time."""
+
+    counts: RunCurve
+    speeds: RunSpeeds
+    shares: RunShares
+
+
+class RunContent(Answer):
+    """``digest`` is the same where scenarios differ at most in name and description."""
+
+    digest: str
+
+
+class RunEvents(Answer):
+    """Incidents of a finished run, as the live view tells them; ``left_off`` were too many."""
+
+    events: list[dict[str, Any]]
+    left_off: int
 
 
 MapDetails.model_rebuild()

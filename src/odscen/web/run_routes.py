@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Query
@@ -12,24 +14,44 @@ from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from odscen.errors import InputError, NotFoundError
-from odscen.results.records import Plan
+from odscen.results.curves import SpeedShares, run_curves
+from odscen.results.records import EventKind, Plan, event_row, events_from_json
 from odscen.results.replay import replay_columns
+from odscen.results.summary import actors_from_json
+from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
 from odscen.web.live import LiveView
-from odscen.web.messages import Control, NewRun, RunInfo, RunStarted
+from odscen.web.messages import (
+    Control,
+    NewRun,
+    RunContent,
+    RunCurve,
+    RunCurves,
+    RunEvents,
+    RunInfo,
+    RunShares,
+    RunSpeeds,
+    RunStarted,
+)
 from odscen.web.packed import answer, pack
 from odscen.web.services import Shared
 
+if TYPE_CHECKING:
+    import polars as pl
+
 router = APIRouter(prefix="/api/runs")
+
+MOST_EVENTS = 5_000
+"""Incidents that are told of a finished run; nobody reads more."""
 
 _REPORT = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 """Content security policy of a report: it holds everything that it needs."""
 
 
 @router.get("")
-def list_runs(shared: Shared) -> list[RunInfo]:
-    """All runs, the newest last."""
-    return shared.runs.rows()
+def list_runs(shared: Shared, scenario: str | None = None) -> list[RunInfo]:
+    """All runs, or those of one scenario, the newest last."""
+    return shared.runs.rows(scenario=scenario)
 
 
 @router.post("", status_code=202)
@@ -60,10 +82,7 @@ def control(run: str, wish: Control, shared: Shared) -> RunInfo:
 @router.get("/{run}/report.html", response_class=Response)
 def report(run: str, shared: Shared) -> Response:
     """Report of a completed run."""
-    path = shared.runs.folder(run) / layout.REPORT_FILE
-    if not path.is_file():
-        what = "report of run"
-        raise NotFoundError(what, run, [])
+    path = _kept(shared, run, layout.REPORT_FILE)
     headers = {"Content-Security-Policy": _REPORT}
     return FileResponse(path, media_type="text/html", headers=headers)
 
@@ -76,28 +95,92 @@ def summary(run: str, shared: Shared) -> dict[str, Any]:
     return found
 
 
+@router.get("/{run}/content")
+def content(run: str, shared: Shared) -> RunContent:
+    """Whether two runs are of the same scenario can be told from this."""
+    return RunContent(digest=shared.runs.content(run))
+
+
+@router.get("/{run}/events")
+def events(run: str, shared: Shared) -> RunEvents:
+    """What went wrong on the road in a finished run: the first thousands of incidents."""
+    path = _kept(shared, run, layout.EVENTS_FILE)
+    found = [
+        event_row(event)
+        for event in events_from_json(path.read_text(encoding="utf-8"))
+        if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
+    ]
+    return RunEvents(events=found[:MOST_EVENTS], left_off=max(0, len(found) - MOST_EVENTS))
+
+
+@router.get("/{run}/curves")
+def curves(run: str, shared: Shared) -> RunCurves:
+    """How many were where, and how fast, over time."""
+    table, plan = _recorded(shared, run)
+    actors = actors_from_json(_kept(shared, run, layout.ACTORS_FILE).read_text(encoding="utf-8"))
+    found = run_curves(plan, actors, table, end=_sim_seconds(summary(run, shared)))
+    return RunCurves(
+        counts=RunCurve(**_lists(found.counts)),
+        speeds=RunSpeeds(**_lists(found.speeds)),
+        shares=RunShares(**_lists(found.shares)),
+    )
+
+
 @router.get("/{run}/trajectories")
 def trajectories(
     run: str,
     request: Request,
     shared: Shared,
     every: Annotated[int, Query(ge=1, le=10_000)] = 1,
+    most: Annotated[
+        int | None, Query(ge=1, description="Rows at most; fewer steps if need be.")
+    ] = None,
 ) -> Any:
     """Where everybody was, as columns; see ``docs/server.md``."""
-    import polars as pl
-
-    folder = shared.runs.folder(run)
-    file = folder / layout.TRAJECTORIES_FILE
-    if not file.is_file():
-        what = "trajectories of run"
-        raise NotFoundError(what, run, [])
-    plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
-    columns = replay_columns(pl.read_parquet(file), plan, every=every)
+    table, plan = _recorded(shared, run)
+    if most is not None:
+        every = max(every, math.ceil(table.height / most))
+    columns = replay_columns(table, plan, every=every)
     columns["actors"] = [
         {"id": a.id, "category": a.category, "length": a.length, "width": a.width, "ego": a.ego}
         for a in plan.actors
     ]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
+def _kept(shared: Shared, run: str, name: str) -> Path:
+    """A file of a finished run; :class:`NotFoundError` if it was never written."""
+    path = shared.runs.folder(run) / name
+    if not path.is_file():
+        what = f"{name} of run"
+        raise NotFoundError(what, run, [])
+    return path
+
+
+def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan]:
+    """Trajectories and plan; a run that was killed has left no trajectories that can be read."""
+    import polars as pl
+
+    file = _kept(shared, run, layout.TRAJECTORIES_FILE)
+    plan = Plan.from_json(_kept(shared, run, layout.PLAN_FILE).read_text(encoding="utf-8"))
+    try:
+        return pl.read_parquet(file), plan
+    except pl.exceptions.PolarsError as error:
+        what = "complete trajectories of run"
+        raise NotFoundError(what, run, []) from error
+
+
+def _sim_seconds(said: dict[str, Any]) -> float:
+    seconds = said.get("sim_seconds")
+    return float(seconds) if isinstance(seconds, int | float) else 0.0
+
+
+def _lists(columns: Counts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
+    """Columns to four digits, as JSON has them: no number is null."""
+    return {
+        name: [None if math.isnan(v) else round(v, 4) for v in column.tolist()]
+        for name, column in columns._asdict().items()
+    }
 
 
 @router.websocket("/{run}/live")

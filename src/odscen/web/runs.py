@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import json
+import re
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -141,7 +143,7 @@ class Runs:
         if active is None:
             return self._finished(run)
         progress = active.live.progress
-        summary = self._summary(run) if active.ended is not None else None
+        over = active.ended is not None
         return RunInfo(
             run=run,
             state=active.state,
@@ -149,16 +151,23 @@ class Runs:
             map=active.scenario.map.name,
             speed=active.live.pace.speed,
             progress=None if progress is None else RunProgress(**asdict(progress)),
-            summary=summary,
+            summary=self._summary(run) if over else None,
             error=active.error,
+            finished=self._end_time(run) if over else None,
         )
 
-    def rows(self) -> list[RunInfo]:
-        """All runs, without their summaries; the newest last."""
+    def rows(self, *, scenario: str | None = None) -> list[RunInfo]:
+        """Runs, without their summaries; the newest last.
+
+        ``scenario`` is the name of a scenario file, if only its runs are wanted.
+        """
+        wanted = (lambda _run: True) if scenario is None else _names_of(scenario).fullmatch
         with self._lock:
-            names = dict.fromkeys(self._active)
+            names = dict.fromkeys(filter(wanted, self._active))
         folders = self._workspace.runs.iterdir() if self._workspace.runs.is_dir() else ()
-        done = [path for path in folders if (path / layout.SUMMARY_FILE).is_file()]
+        done = [
+            path for path in folders if wanted(path.name) and (path / layout.SUMMARY_FILE).is_file()
+        ]
         done.sort(key=lambda path: ((path / layout.SUMMARY_FILE).stat().st_mtime, path.name))
         order = dict.fromkeys([*(p.name for p in done if p.name not in names), *names])
         rows = []
@@ -181,6 +190,18 @@ class Runs:
             raise NotFoundError(what, run, [])
         return folder
 
+    def content(self, run: str) -> str:
+        """Digest of what a finished run's scenario says, its name and description left out."""
+        try:
+            text = (self.folder(run) / layout.SCENARIO_FILE).read_text(encoding="utf-8")
+            said = json.loads(text)
+            said.pop("name", None)
+            said.pop("description", None)
+        except (OSError, ValueError, AttributeError) as error:
+            what = "scenario of run"
+            raise NotFoundError(what, run, []) from error
+        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
     def remove(self, run: str) -> None:
         """Remove a finished run."""
         with self._lock:
@@ -189,6 +210,8 @@ class Runs:
                 msg = f"run {run!r} is going on; stop it first"
                 raise ConflictError(msg)
             self._active.pop(run, None)
+        if active is not None and not (self._workspace.runs / run).exists():
+            return  # it failed before it had anything to keep
         folder = self.folder(run)
         try:
             discard(folder)
@@ -248,7 +271,7 @@ class Runs:
 
     def _free_id(self, name: str) -> str:
         for number in itertools.count(1):
-            free = f"{name[:56]}-{number}"
+            free = f"{_stem(name)}-{number}"
             if free not in self._active and not (self._workspace.runs / free).exists():
                 return free
         raise AssertionError
@@ -264,7 +287,14 @@ class Runs:
             map=summary.get("map"),
             summary=summary,
             error=summary.get("error"),
+            finished=self._end_time(folder.name),
         )
+
+    def _end_time(self, run: str) -> float | None:
+        try:
+            return (self._workspace.runs / run / layout.SUMMARY_FILE).stat().st_mtime
+        except OSError:
+            return None
 
     def _summary(self, run: str) -> dict[str, Any] | None:
         try:
@@ -273,3 +303,13 @@ class Runs:
         except (OSError, ValueError):
             return None
         return summary
+
+
+def _stem(scenario: str) -> str:
+    """Beginning of the ids of a scenario's runs; a number follows."""
+    return scenario[:56]
+
+
+def _names_of(scenario: str) -> re.Pattern[str]:
+    """Ids of a scenario's runs that a server has started."""
+    return re.compile(rf"{re.escape(_stem(scenario))}-[1-9]\d*")

@@ -1,0 +1,80 @@
+/** What became of one element of a map; `fate` is kept, repaired, guessed or lost. */
+export interface Entry {
+  fate: string;
+  element: string;
+  reason: string;
+}
+
+export interface ConversionReport {
+  counts: Record<string, number>;
+  figures: Record<string, number>;
+  entries: Entry[];
+}
+
+/** Entries that say the same of several elements. */
+export interface Finding {
+  text: string;
+  places: string[];
+}
+
+export interface Group {
+  fate: string;
+  title: string;
+  findings: Finding[];
+}
+
+const TITLES: [fate: string, title: string][] = [
+  ["lost", "Could not be used"],
+  ["repaired", "Was repaired"],
+  ["guessed", "Was adapted or filled in"],
+  ["kept", "Was taken over as it is"],
+];
+
+/** The commonest findings as people say them. */
+const PLAIN: [RegExp, string][] = [
+  [/of a connecting road have no SUMO lane: nothing leads there/, "Short pieces of lanes inside junctions are left out, as no lane leads there"],
+  [/have no SUMO lane: nothing leads there/, "Short pieces of lanes are left out, as no lane leads there"],
+  [/lanes of type (\w+) are open to nobody and left out/, "Lanes of the kind “$1” are not driven on and are left out"],
+  [/every crossing of a junction with lights has a light/, "Every crosswalk of a junction with traffic lights got a light for pedestrians"],
+  [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
+  [/traffic lights? have programs of odscen's own/, "The map does not say when its lights turn green: they got a timing of their own, in which no two ways that meet have green"],
+  [/^crosswalk, as a crossing/, "Crosswalks, with place and width"],
+  [/^yield, as right of way/, "Signs to give way"],
+  [/^traffic light, as right of way/, "Traffic lights"],
+  [/^stop, as right of way/, "Stop signs"],
+];
+
+/** One sentence without the numbers of a single place. */
+export function plainFinding(reason: string): string {
+  for (const [pattern, text] of PLAIN) {
+    const match = pattern.exec(reason);
+    if (match) return text.replace("$1", match[1] ?? "");
+  }
+  const words = reason.replace(/\bSUMO('s)?( network)?/g, "the simulation$1");
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}
+
+/** What became of a map, what matters most first; elements of which the same is said are together. */
+export function grouped(report: ConversionReport): Group[] {
+  return TITLES.flatMap(([fate, title]) => {
+    const found = new Map<string, string[]>();
+    for (const entry of report.entries) {
+      if (entry.fate !== fate) continue;
+      const text = plainFinding(entry.reason);
+      found.set(text, [...(found.get(text) ?? []), entry.element]);
+    }
+    const findings = [...found].map(([text, places]) => ({ text, places }));
+    findings.sort((a, b) => b.places.length - a.places.length);
+    return findings.length > 0 ? [{ fate, title, findings }] : [];
+  });
+}
+
+/** How much of the lanes can be driven and walked, in whole percent; null where there are none. */
+export function coverage({ figures }: ConversionReport): { driving: number | null; walking: number | null } {
+  const share = (kind: string): number | null => {
+    const all = (figures[`${kind}_road_length`] ?? 0) + (figures[`${kind}_junction_length`] ?? 0);
+    const used = (figures[`${kind}_road_covered`] ?? 0) + (figures[`${kind}_junction_covered`] ?? 0);
+    return all > 0 ? Math.floor((100 * used) / all + 1e-6) : null;
+  };
+  return { driving: share("driving"), walking: share("walking") };
+}

@@ -1,0 +1,45 @@
+import { Button, Group, Text } from "@mantine/core";
+import { useCallback } from "react";
+
+import { api } from "../api/client";
+import type { Roi } from "../api/types";
+import { go } from "../ui/route";
+import { useLoaded } from "../ui/useLoaded";
+import { mapFacts } from "../ui/words";
+
+export function MapStep({ name, onShow }: { name: string; onShow: () => void }) {
+  const load = useCallback(() => api.map(name), [name]);
+  const { value } = useLoaded(load);
+  return (
+    <>
+      <Text size="sm">{value ? mapFacts(value.statistics).join(" · ") : "…"}</Text>
+      <Group>
+        <Button size="compact-sm" variant="default" onClick={onShow}>Show the whole map</Button>
+        <Button size="compact-sm" variant="subtle" onClick={() => go({ view: "catalogue" })}>Choose another map</Button>
+      </Group>
+    </>
+  );
+}
+
+export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
+  segments: number; roi: Roi; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
+}) {
+  if (segments === 0) {
+    return (
+      <>
+        <Text size="sm">Click the road or junction where your scenario begins. It turns dark blue; then let the region grow around it.</Text>
+        <Group><Button size="compact-sm" variant="default" onClick={onBegin}>Begin in the middle of what I see</Button></Group>
+      </>
+    );
+  }
+  return (
+    <>
+      <Text size="sm">Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.</Text>
+      <Group>
+        <Button size="compact-sm" variant="default" disabled={roi.candidates.length === 0} onClick={onAll}>Add all {roi.candidates.length} neighbours</Button>
+        <Button size="compact-sm" variant="subtle" onClick={onShow}>Show the region</Button>
+      </Group>
+      <Button onClick={onNext}>Next: weather and time</Button>
+    </>
+  );
+}

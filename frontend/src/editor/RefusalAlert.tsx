@@ -1,0 +1,17 @@
+import { Alert, Button } from "@mantine/core";
+
+import type { EditorStore } from "./store";
+
+/** Why the last change was not made; one that still makes sense can be asked for again. */
+export function RefusalAlert({ store }: { store: EditorStore }) {
+  const { refusal, clearRefusal } = store();
+  if (!refusal) return null;
+  return (
+    <div className="notices refusal">
+      <Alert color="red.9" variant="filled" title={refusal.title} withCloseButton closeButtonLabel="Close this message" onClose={clearRefusal} role="alert">
+        {refusal.message}
+        {refusal.again && <div><Button mt="xs" size="compact-sm" variant="white" color="dark" onClick={() => void refusal.again?.()}>Make my change again</Button></div>}
+      </Alert>
+    </div>
+  );
+}

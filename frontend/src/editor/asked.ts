@@ -1,0 +1,67 @@
+import { useEffect, useState } from "react";
+
+import { api } from "../api/client";
+import type { Actor, Flow, Roi } from "../api/types";
+import type { Graph, Place } from "../map/graph";
+import { tellError } from "../ui/notices";
+import { go } from "../ui/route";
+
+const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
+
+/** What may be added to the region and taken out of it; asked of the server, which knows the rule. */
+export function useRegion(name: string, roiKey: string): Roi {
+  const [roi, setRoi] = useState<Roi>(NO_ROI);
+  useEffect(() => {
+    let current = true;
+    api.roi(name).then((found) => { if (current) setRoi(found); }, tellError);
+    return () => { current = false; };
+  }, [name, roiKey]);
+  return roi;
+}
+
+export interface Ways {
+  /** Null until they are known. */
+  goals: Place[] | null;
+  path: [number, number][];
+}
+
+/** Where the chosen one can go, and the way to its goal. */
+export function useWays(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Ways {
+  const [goals, setGoals] = useState<Place[] | null>(null);
+  const [path, setPath] = useState<[number, number][]>([]);
+  const spawn = one?.spawn ?? null;
+  const goal = one?.goal ?? null;
+  useEffect(() => {
+    setGoals(null);
+    if (spawn === null) return;
+    let current = true;
+    api.goals(name, spawn).then(
+      (found) => { if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? [])); },
+      () => { if (current) setGoals([]); },
+    );
+    return () => { current = false; };
+  }, [name, spawn, roiKey, graph]);
+  useEffect(() => {
+    setPath([]);
+    if (spawn === null || goal === null) return;
+    let current = true;
+    api.path(name, spawn, goal).then((found) => { if (current) setPath(found.points); }, () => undefined);
+    return () => { current = false; };
+  }, [name, spawn, goal, roiKey]);
+  return { goals, path };
+}
+
+/** Starts a run and leads to it. */
+export function useStarter(name: string): { busy: boolean; start: () => void } {
+  const [busy, setBusy] = useState(false);
+  return {
+    busy,
+    start: () => {
+      setBusy(true);
+      api.startRun(name).then(
+        ({ run }) => go({ view: "run", scenario: name, run }),
+        (error: unknown) => { setBusy(false); tellError(error); },
+      );
+    },
+  };
+}

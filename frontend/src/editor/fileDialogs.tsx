@@ -1,0 +1,53 @@
+import { Alert, Button, Group, Loader, Modal, Stack, Text, TextInput } from "@mantine/core";
+import { type FormEvent, useState } from "react";
+
+import { api } from "../api/client";
+import { go } from "../ui/route";
+import { useLoaded } from "../ui/useLoaded";
+import { count } from "../ui/words";
+
+/** Asks for a name; a name that the server refuses can be changed and tried again. */
+export function NameDialog({ title, label, value, action, onName, onClose }: {
+  title: string; label: string; value: string; action: string;
+  onName: (name: string) => Promise<void>; onClose: () => void;
+}) {
+  const [name, setName] = useState(value);
+  const [busy, setBusy] = useState(false);
+  const [failure, setFailure] = useState<string | null>(null);
+  const submit = (event: FormEvent): void => {
+    event.preventDefault();
+    setBusy(true);
+    setFailure(null);
+    onName(name.trim()).catch((error: unknown) => setFailure(String((error as Error).message))).finally(() => setBusy(false));
+  };
+  return (
+    <Modal opened onClose={onClose} title={title} centered>
+      <form onSubmit={submit}>
+        <TextInput data-autofocus label={label} value={name} error={failure} onChange={(event) => setName(event.currentTarget.value)} />
+        <Group justify="flex-end" mt="md">
+          <Button variant="default" onClick={onClose}>Cancel</Button>
+          <Button type="submit" loading={busy} disabled={!name.trim()}>{action}</Button>
+        </Group>
+      </form>
+    </Modal>
+  );
+}
+
+/** All scenarios, those changed last first. */
+export function OpenDialog({ current, onClose }: { current: string; onClose: () => void }) {
+  const { value, error } = useLoaded(api.scenarios);
+  const others = value?.filter((one) => one.name !== current && !one.error);
+  return (
+    <Modal opened onClose={onClose} title="Open another scenario" centered>
+      {error && <Alert color="red">{error}</Alert>}
+      {!others && !error && <Loader aria-label="Loading the scenarios" />}
+      {others?.length === 0 && <Text size="sm">There is no other one yet. “Save as” makes a copy of this one.</Text>}
+      <Stack gap={6}>
+        {others?.map((one) => (
+          <Button key={one.name} variant="default" justify="space-between" onClick={() => go({ view: "editor", scenario: one.name })}
+            rightSection={<Text size="xs" c="dimmed">{one.map}, {count(one.actors, "road user")}</Text>}>{one.name}</Button>
+        ))}
+      </Stack>
+    </Modal>
+  );
+}

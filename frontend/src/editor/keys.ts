@@ -1,0 +1,70 @@
+import { useEffect, useRef } from "react";
+
+export interface KeyActions {
+  undo: () => void;
+  redo: () => void;
+  remove: () => void;
+  escape: () => void;
+  sheet: () => void;
+  copy: () => void;
+  move: () => void;
+  selectAll: () => void;
+  /** 1 to 7 a kind of road user, 8 and 9 a stream. */
+  tool: (n: number) => void;
+}
+
+/** Shortcuts that hold everywhere but in fields and dialogs. */
+export function useKeys(actions: KeyActions): void {
+  const latest = useRef(actions);
+  useEffect(() => { latest.current = actions; });
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent): void => {
+      const target = event.target as HTMLElement;
+      if (target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
+      const act = actionOf(event, latest.current);
+      if (!act) return;
+      act();
+      event.preventDefault();
+    };
+    addEventListener("keydown", onKey);
+    return () => removeEventListener("keydown", onKey);
+  }, []);
+}
+
+function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | null {
+  const key = event.key.toLowerCase();
+  if (event.ctrlKey || event.metaKey) {
+    // With text marked on the page, Ctrl+C copies that text.
+    const marked = !getSelection()?.isCollapsed;
+    const named: Record<string, () => void> = {
+      z: event.shiftKey ? actions.redo : actions.undo, y: actions.redo, a: actions.selectAll,
+      ...(marked ? {} : { c: actions.copy }),
+    };
+    return named[key] ?? null;
+  }
+  if (event.altKey) return null;
+  const plain: Record<string, () => void> = {
+    delete: actions.remove, backspace: actions.remove, escape: actions.escape, "?": actions.sheet, m: actions.move,
+  };
+  if (/^[1-9]$/.test(key)) return () => actions.tool(Number(key) - 1);
+  return plain[key] ?? null;
+}
+
+export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
+  ["Ctrl+Z / Ctrl+Y", "Undo / redo"],
+  ["1 – 7", "Place a car, van, truck, bus, motorcycle, bicycle, pedestrian"],
+  ["8 / 9", "Place a stream of traffic / of people"],
+  ["Ctrl+C", "Copy what is selected: then choose where"],
+  ["M", "Move what is selected: then choose where"],
+  ["Ctrl+A", "Select everybody"],
+  ["Shift + click", "Select several"],
+  ["Shift + drag", "Select all in a rectangle"],
+  ["Delete", "Remove what is selected"],
+  ["Escape", "Stop placing, select nothing"],
+  ["Arrow keys", "On the map: move it (with Shift: a little)"],
+  ["+ / −", "On the map: zoom"],
+  ["0", "On the map: show everything"],
+  ["Enter", "On the map: choose what is in the middle"],
+  ["↑ / ↓", "In the table: the row before or after"],
+  ["?", "This sheet"],
+];

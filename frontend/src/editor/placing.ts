@@ -1,0 +1,126 @@
+import type { Actor, Category, Flow, ScenarioDocument } from "../api/types";
+import type { Graph, Place } from "../map/graph";
+import type { Picker } from "../map/picking";
+
+/** What a click on the map does; with no tool it selects. */
+export type Tool =
+  | { does: "place"; category: Category }
+  | { does: "stream"; walk: boolean }
+  | { does: "copy"; ids: readonly string[] }
+  | { does: "move"; ids: readonly string[] };
+
+/** Where each of several goes: its id and its new start. */
+export type Moves = readonly (readonly [id: string, spawn: string])[];
+
+export const isFlow = (one: Actor | Flow): one is Flow => "per_hour" in one;
+export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [...document.actors, ...document.flows];
+
+/** How far from a click a start may be found, metres, when the map is zoomed in. */
+const SNAP = 12;
+
+/** The places of a region that are offered as starts: those that are usable and free. */
+export class Starts {
+  private readonly taken: ReadonlySet<string>;
+
+  constructor(
+    private readonly graph: Graph, private readonly picker: Picker,
+    private readonly inside: ReadonlySet<number>, document: ScenarioDocument,
+  ) {
+    this.taken = new Set(everyone(document).map((one) => one.spawn));
+  }
+
+  private free(index: number, walk: boolean, besides?: ReadonlySet<string>): boolean {
+    if (!this.graph.usable(index, walk)) return false;
+    const { id } = walk ? this.graph.walkPlace(index) : this.graph.vehiclePlace(index);
+    return !this.taken.has(id) && !besides?.has(id);
+  }
+
+  /** The free start nearest to a point; `reach` in metres is that of the pointer. */
+  near(x: number, y: number, reach: number, walk: boolean, besides?: ReadonlySet<string>): Place | null {
+    return this.picker.place(x, y, Math.max(3 * reach, SNAP), {
+      vehicles: !walk, walks: walk, inside: this.inside, allowed: (i, onFoot) => this.free(i, onFoot, besides),
+    });
+  }
+
+  /** Why there is no start at a point, in words. */
+  reasonAt(x: number, y: number, reach: number, walk: boolean, who: string): string {
+    const wide = Math.max(3 * reach, SNAP);
+    const options = { vehicles: !walk, walks: walk };
+    const allowed = (i: number, onFoot: boolean): boolean => this.graph.usable(i, onFoot);
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed })) return `Every point here is taken. Start the ${who} a little further away.`;
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside })) return `No ${who} may start here: the grey points cannot be used.`;
+    if (this.picker.place(x, y, wide, options)) return `That is outside the region. Start the ${who} inside it, or let the region grow.`;
+    return `No ${who} may start here. ${walk ? "People start on the yellow points beside the road." : "Vehicles start on the blue points of the lanes."}`;
+  }
+
+  /** The first free start, in the order of the map; far enough from others to stand there. */
+  first(walk: boolean, others: readonly Place[]): Place | null {
+    let fallback: Place | null = null;
+    for (const place of this.all(walk)) {
+      fallback ??= place;
+      if (others.every((other) => Math.hypot(other.x - place.x, other.y - place.y) > SNAP)) return place;
+    }
+    return fallback;
+  }
+
+  /** The next free start along the lane, forwards or back. */
+  along(from: Place, step: 1 | -1): Place | null {
+    const [first, end] = this.graph.lanePlaces(from);
+    const segment = (from.walk ? this.graph.columns.walks : this.graph.columns).segment;
+    for (let i = from.index + step; i >= first && i < end; i += step) {
+      if (!this.inside.has(segment[i])) return null;
+      if (this.free(i, from.walk)) return this.at(i, from.walk);
+    }
+    return null;
+  }
+
+  /** A free start on the next lane of the region; after the last comes the first. */
+  otherLane(from: Place): Place | null {
+    const [, end] = this.graph.lanePlaces(from);
+    const lane = (from.walk ? this.graph.columns.walks : this.graph.columns).lane;
+    let wrapped: Place | null = null;
+    for (const place of this.all(from.walk)) {
+      if (lane[place.index] === lane[from.index]) continue;
+      if (place.index >= end) return place;
+      wrapped ??= place;
+    }
+    return wrapped;
+  }
+
+  /**
+   * Where several go when the first of them goes to `to`: they keep their distances, each on the
+   * free start nearest to where that is; those that find none are left out.
+   */
+  shifted(ones: readonly (Actor | Flow)[], to: Place): Moves {
+    const lead = ones.length > 0 ? this.graph.place(ones[0].spawn) : undefined;
+    if (!lead) return [];
+    const used = new Set<string>();
+    return ones.flatMap((one, n) => {
+      const old = this.graph.place(one.spawn);
+      if (!old) return [];
+      const place = n === 0 && old.walk === to.walk
+        ? to : this.near(old.x + to.x - lead.x, old.y + to.y - lead.y, 0, old.walk, used);
+      if (!place || used.has(place.id)) return [];
+      used.add(place.id);
+      return [[one.id, place.id] as const];
+    });
+  }
+
+  private at(index: number, walk: boolean): Place {
+    return walk ? this.graph.walkPlace(index) : this.graph.vehiclePlace(index);
+  }
+
+  private *all(walk: boolean): Generator<Place> {
+    const { segment } = walk ? this.graph.columns.walks : this.graph.columns;
+    for (let i = 0; i < segment.length; i++) {
+      if (this.inside.has(segment[i]) && this.free(i, walk)) yield this.at(i, walk);
+    }
+  }
+}
+
+/** Whose tool it is, for messages: `bus`, `stream of traffic`, `copy`. */
+export function toolWord(tool: Tool, word: Record<Category, string>): string {
+  if (tool.does === "place") return word[tool.category].toLowerCase();
+  if (tool.does === "stream") return tool.walk ? "stream of people" : "stream of traffic";
+  return tool.does === "copy" ? "copy" : "road user";
+}

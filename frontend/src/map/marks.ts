@@ -1,0 +1,192 @@
+import { FLOW, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, ROI_BASE, VEHICLE_NODE } from "./colors";
+import type { Graph, Place } from "./graph";
+import type { Scene, SceneActor, SceneFlow } from "./scene";
+import type { View } from "./view";
+import type { Category } from "../api/types";
+
+export function dots(
+  context: CanvasRenderingContext2D, view: View, at: { x: number[]; y: number[] }, rows: number[],
+  color: string,
+): void {
+  const r = Math.min(Math.max(1.5, view.scale * 0.3), 6) / view.scale;
+  context.fillStyle = color;
+  context.beginPath();
+  for (const i of rows) {
+    if (view.scale < 5) context.rect(at.x[i] - r, at.y[i] - r, 2 * r, 2 * r);
+    else {
+      context.moveTo(at.x[i] + r, at.y[i]);
+      context.arc(at.x[i], at.y[i], r, 0, 2 * Math.PI);
+    }
+  }
+  context.fill();
+}
+
+export function drawWalkEdges(
+  context: CanvasRenderingContext2D, view: View, graph: Graph, rows: Set<number>,
+): void {
+  const { walks } = graph.columns;
+  context.beginPath();
+  for (let e = 0; e < walks.source.length; e++) {
+    if (!rows.has(walks.source[e])) continue;
+    context.moveTo(walks.x[walks.source[e]], walks.y[walks.source[e]]);
+    context.lineTo(walks.x[walks.target[e]], walks.y[walks.target[e]]);
+  }
+  context.strokeStyle = "#a58a00";
+  context.lineWidth = 1.1 / view.scale;
+  context.stroke();
+}
+
+export function drawPath(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
+  if (scene.path.length < 2) return;
+  context.beginPath();
+  scene.path.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.lineCap = "round";
+  context.lineJoin = "round";
+  context.strokeStyle = "#ffffff";
+  context.lineWidth = Math.max(1.3, 7 / view.scale);
+  context.stroke();
+  context.strokeStyle = "#1f9bf0";
+  context.lineWidth = Math.max(0.8, 4 / view.scale);
+  context.stroke();
+}
+
+/** The lane under the pointer, through its places. */
+export function drawLane(context: CanvasRenderingContext2D, graph: Graph, place: Place): void {
+  const at = place.walk ? graph.columns.walks : graph.columns;
+  const [first, end] = graph.lanePlaces(place);
+  context.beginPath();
+  for (let i = first; i < end; i++) context.lineTo(at.x[i], at.y[i]);
+  context.lineCap = "butt";
+  context.lineWidth = at.width[place.index];
+  context.strokeStyle = place.walk ? `${PEDESTRIAN_NODE}55` : `${VEHICLE_NODE}44`;
+  context.stroke();
+}
+
+/** How far beside the middle of its lane somebody stands. */
+export function drawOffset(
+  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, palette: Palette,
+): void {
+  const cx = x + actor.offset * Math.sin(actor.hdg) * view.scale;
+  const cy = y + actor.offset * Math.cos(actor.hdg) * view.scale;
+  const along = actor.length * 0.75 * view.scale;
+  const [dx, dy] = [along * Math.cos(actor.hdg), -along * Math.sin(actor.hdg)];
+  context.strokeStyle = palette.ink;
+  context.lineWidth = 1.5;
+  context.setLineDash([5, 4]);
+  context.beginPath();
+  context.moveTo(cx - dx, cy - dy);
+  context.lineTo(cx + dx, cy + dy);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+export function spot(context: CanvasRenderingContext2D, [x, y]: [number, number], color: string): void {
+  context.beginPath();
+  context.arc(x, y, 4, 0, 2 * Math.PI);
+  context.fillStyle = color;
+  context.fill();
+}
+
+/** Chevrons in the direction of travel, and how many come in an hour. */
+export function drawFlow(
+  context: CanvasRenderingContext2D, [x, y]: [number, number], flow: SceneFlow, palette: Palette,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.rotate(-flow.hdg);
+  context.lineCap = context.lineJoin = "round";
+  const rim = flow.problem ? PROBLEM : flow.selected ? palette.ink : "#ffffff";
+  for (const [color, width] of [[rim, flow.selected || flow.problem ? 9 : 7], [flow.walk ? PEDESTRIAN_NODE : FLOW, 4]] as const) {
+    context.strokeStyle = color;
+    context.lineWidth = width;
+    context.beginPath();
+    for (const k of [-12, -1, 10]) {
+      context.moveTo(k - 4, -8);
+      context.lineTo(k + 4, 0);
+      context.lineTo(k - 4, 8);
+    }
+    context.stroke();
+  }
+  context.restore();
+  tag(context, `${Math.round(flow.perHour)} an hour`, x, y - 22);
+}
+
+export function drawGoal(
+  context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean,
+): void {
+  context.beginPath();
+  context.arc(x, y, chosen ? 13 : 7, 0, 2 * Math.PI);
+  context.fillStyle = chosen ? ROI_BASE : GOAL;
+  context.fill();
+  context.lineWidth = 2.5;
+  context.strokeStyle = chosen ? GOAL : "#ffffff";
+  context.stroke();
+  if (!chosen) return;
+  context.beginPath();
+  context.moveTo(x - 2.500, y + 5);
+  context.lineTo(x - 2.500, y - 6);
+  context.lineTo(x + 5, y - 3);
+  context.lineTo(x - 2.500, y);
+  context.fillStyle = context.strokeStyle = "#ffffff";
+  context.fill();
+  context.lineWidth = 1.500;
+  context.stroke();
+}
+
+export function body(
+  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, color: string,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.rotate(-actor.hdg);
+  const l = actor.length * view.scale;
+  const w = actor.width * view.scale;
+  context.fillStyle = color;
+  context.strokeStyle = "#ffffff";
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(-l / 2, -w / 2);
+  context.lineTo(l / 2 - w * 0.35, -w / 2);
+  context.lineTo(l / 2, -w * 0.22);
+  context.lineTo(l / 2, w * 0.22);
+  context.lineTo(l / 2 - w * 0.35, w / 2);
+  context.lineTo(-l / 2, w / 2);
+  context.closePath();
+  context.fill();
+  context.stroke();
+  context.restore();
+}
+
+export function badge(
+  context: CanvasRenderingContext2D, glyph: Path2D, x: number, y: number, radius: number,
+  color: string, category: Category,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.beginPath();
+  context.arc(0, 0, radius, 0, 2 * Math.PI);
+  context.fillStyle = color;
+  context.fill();
+  context.lineWidth = 1.5;
+  context.strokeStyle = "#ffffff";
+  context.stroke();
+  const k = (radius * 1.45) / 24;
+  context.scale(k, k);
+  context.translate(-12, -12);
+  context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
+  context.fill(glyph, "evenodd");
+  context.restore();
+}
+
+export function tag(context: CanvasRenderingContext2D, text: string, x: number, y: number): void {
+  context.font = "600 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const width = context.measureText(text).width + 10;
+  context.fillStyle = "#22282e";
+  context.beginPath();
+  context.roundRect(x - width / 2, y - 8, width, 16, 8);
+  context.fill();
+  context.fillStyle = "#ffffff";
+  context.fillText(text, x, y + 0.5);
+}

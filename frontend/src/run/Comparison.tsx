@@ -1,0 +1,56 @@
+import { Alert, Anchor, Loader, Table, Text, Title, VisuallyHidden } from "@mantine/core";
+import { useCallback } from "react";
+
+import { type RunInfo, runs, type Summary } from "../api/runs";
+import { hashOf } from "../ui/route";
+import { useLoaded } from "../ui/useLoaded";
+import { compared, when } from "./figures";
+
+interface Last {
+  info: RunInfo;
+  summary: Summary;
+  changed: boolean;
+}
+
+/** The key figures beside those of the run of this scenario before it. */
+export function Comparison({ info, scenario }: { info: RunInfo; scenario: string }) {
+  const { run, finished, summary } = info;
+  const load = useCallback(() => lastBefore(scenario, run, finished ?? Infinity), [scenario, run, finished]);
+  const { value, error } = useLoaded(load);
+  if (error) return <Alert color="gray" title="Earlier runs cannot be compared">{error}</Alert>;
+  if (!value) return <Loader aria-label="Looking for the last run" />;
+  const [last] = value;
+  if (!summary || !last) {
+    return <Text size="sm" c="dimmed">This is the first run of this scenario. After the next one, both are shown beside each other here.</Text>;
+  }
+  return (
+    <>
+      <Title order={3} size="h5">Compared with the last run</Title>
+      <Text size="sm" mt={4}>
+        <Anchor href={hashOf({ view: "run", scenario, run: last.info.run })}>{last.info.finished ? when(last.info.finished) : last.info.run}</Anchor>.{" "}
+        {last.changed ? "The scenario was changed in between." : "The scenario is the same."}
+      </Text>
+      <Table mt="xs" verticalSpacing={4} fz={13} aria-label="Compared with the last run">
+        <Table.Thead><Table.Tr><Table.Th><VisuallyHidden>Figure</VisuallyHidden></Table.Th><Table.Th>This run</Table.Th><Table.Th>Last run</Table.Th><Table.Th>Difference</Table.Th></Table.Tr></Table.Thead>
+        <Table.Tbody>
+          {compared(summary, last.summary).map((one) => (
+            <Table.Tr key={one.label}>
+              <Table.Th scope="row" fw={400}>{one.label}</Table.Th><Table.Td>{one.value}</Table.Td><Table.Td>{one.before}</Table.Td>
+              <Table.Td fw={one.difference === "same" ? 400 : 700}>{one.difference}</Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </>
+  );
+}
+
+/** The run before this one that has figures, if there is one: a list of one or none. */
+async function lastBefore(scenario: string, run: string, finished: number): Promise<Last[]> {
+  const earlier = (await runs.list(scenario)).filter((one) =>
+    one.run !== run && one.state !== "failed" && one.finished != null && one.finished < finished);
+  const newest = earlier.sort((a, b) => (b.finished ?? 0) - (a.finished ?? 0))[0];
+  if (!newest) return [];
+  const [info, here, there] = await Promise.all([runs.info(newest.run), runs.content(run), runs.content(newest.run)]);
+  return info.summary ? [{ info, summary: info.summary, changed: here.digest !== there.digest }] : [];
+}

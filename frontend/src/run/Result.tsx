@@ -1,0 +1,55 @@
+import { Alert, Button, Group, Text, Title } from "@mantine/core";
+import { useState } from "react";
+
+import { api } from "../api/client";
+import { type RunInfo, runs } from "../api/runs";
+import { tellError } from "../ui/notices";
+import { go } from "../ui/route";
+import { Comparison } from "./Comparison";
+import { keyFigures } from "./figures";
+
+const TITLE: Record<string, string> = { failed: "The run broke off", stopped: "The run was stopped" };
+
+/** What came of a run, in figures. */
+export function Result({ info, scenario, onBack }: { info: RunInfo; scenario: string; onBack: () => void }) {
+  const [busy, setBusy] = useState(false);
+  const again = (): void => {
+    setBusy(true);
+    api.startRun(scenario).then(
+      ({ run }) => go({ view: "run", scenario, run }),
+      (error: unknown) => { setBusy(false); tellError(error); });
+  };
+  const failed = info.state === "failed";
+  return (
+    <section aria-label="Result of the run">
+      <Title order={2} size="h3">{TITLE[info.state] ?? "The run is finished"}</Title>
+      {failed && <Failure info={info} />}
+      {info.summary && !failed && (
+        <dl className="run-figures">
+          {keyFigures(info.summary).map(({ label, value }) => <div key={label}><dt>{label}</dt><dd>{value}</dd></div>)}
+        </dl>
+      )}
+      <Group mt="md" mb="lg" gap="xs">
+        <Button onClick={onBack}>Back to the editor</Button>
+        {info.summary && !failed && <Button variant="default" component="a" href={runs.reportUrl(info.run)} target="_blank" rel="noreferrer">Full report</Button>}
+        <Button variant="default" loading={busy} onClick={again}>Run again</Button>
+      </Group>
+      {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
+    </section>
+  );
+}
+
+function Failure({ info }: { info: RunInfo }) {
+  const words = typeof info.error === "string" ? info.error : info.error?.message;
+  return (
+    <>
+      <Alert color="red" mt="sm" title="The simulation could not go on">
+        Your scenario is as it was, and other runs go on. Try to run it again; if it breaks off at the same time, remove the road users that came last.
+      </Alert>
+      <details className="words" style={{ marginTop: 12 }}>
+        <summary>What the simulator said</summary>
+        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">It said nothing.</Text>}
+      </details>
+    </>
+  );
+}

@@ -1,0 +1,102 @@
+import { Button, Group, Progress, Select, Text } from "@mantine/core";
+
+import { type Incident, type RunInfo, runs } from "../api/runs";
+import { MARK_COLOR } from "../map/colors";
+import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
+import { tellError } from "../ui/notices";
+import { clock } from "../ui/words";
+import { REPLAY_SPEEDS, type Speed, SPEEDS, STATE_WORD } from "./figures";
+import { markKind } from "./incidents";
+import type { Now } from "./usePicture";
+import type { Player } from "./useReplay";
+
+const STEP = 0.5;
+
+/** Steers a run that goes on, and says how far it is. */
+export function LiveStrip({ info, now, onBack, learn }: {
+  info: RunInfo; now: Now; onBack: () => void; learn: (state: string, speed?: number | null) => void;
+}) {
+  const { run, state } = info;
+  const control = (action: string, speed?: number | null): void => {
+    runs.control(run, action, speed).then((told) => learn(told.state, told.speed), tellError);
+  };
+  const going = state === "running" || state === "paused";
+  const until = info.progress?.until ?? 0;
+  return (
+    <div className="strip" role="region" aria-label="The run">
+      <Back onBack={onBack} />
+      <Group gap={6} role="group" aria-label="Control the run">
+        {state === "paused"
+          ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Go on</Button>
+          : <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>Pause</Button>}
+        <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>
+        <Button variant="default" leftSection={<IconStop />} disabled={!going && state !== "preparing"} onClick={() => control("stop")}>Stop</Button>
+        <SpeedChoice speeds={SPEEDS} speed={info.speed ?? null} onChange={(speed) => control("speed", speed)} />
+      </Group>
+      <div className="time-line">
+        <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="How much of the run is over" />
+        <Text size="sm" mt={4}>{STATE_WORD[state] ?? state}</Text>
+      </div>
+      <Shown label="Time" value={clock(now.time)} />
+      <Shown label="Times real speed" value={now.pace.toFixed(1)} />
+      <Shown label="On the road" value={String(now.running)} />
+      <Shown label="Arrived" value={String(now.arrived)} />
+    </div>
+  );
+}
+
+/** Plays a recording: a slider over its time, with what went wrong marked above it. */
+export function ReplayStrip({ player, running, incidents, onBack, onPlay }: {
+  player: Player; running: number; incidents: readonly Incident[]; onBack: () => void;
+  /** Also the first time, when there is nothing to play yet. */
+  onPlay: () => void;
+}) {
+  const { replay, time, playing } = player;
+  const [begin, end] = replay ? [replay.begin, replay.end] : [0, 0];
+  return (
+    <div className="strip" role="region" aria-label="The recording">
+      <Back onBack={onBack} />
+      <Group gap={6} role="group" aria-label="Control the recording">
+        {playing && replay
+          ? <Button leftSection={<IconPause />} onClick={player.pause}>Pause</Button>
+          : <Button leftSection={<IconPlay />} onClick={onPlay} loading={player.loading} disabled={player.error !== null}>{replay ? "Play" : "Watch again"}</Button>}
+        <SpeedChoice speeds={REPLAY_SPEEDS} speed={player.speed} onChange={(speed) => player.setSpeed(speed ?? 1)} />
+      </Group>
+      {replay ? (
+        <div className="scrub">
+          <div className="scrub-marks" aria-hidden="true">
+            {end > begin && incidents.slice(0, 200).map((one, n) => (
+              <i key={n} style={{ left: `${(100 * (one.time - begin)) / (end - begin)}%`, background: MARK_COLOR[markKind(one)] }} />
+            ))}
+          </div>
+          <input type="range" aria-label="Moment of the run" min={begin} max={end} step={Math.min(STEP, (end - begin) / 2 || STEP)} value={time}
+            aria-valuetext={`${clock(time)} of ${clock(end)}`} onChange={(event) => { player.pause(); player.seek(Number(event.currentTarget.value)); }} />
+        </div>
+      ) : <Text size="sm" className="time-line" c="dimmed">{player.error ? "There is no recording of this run." : player.loading ? "Fetching the recording …" : "The run is over."}</Text>}
+      {replay && <Shown label={`of ${clock(end)}`} value={clock(time)} />}
+      {replay && <Shown label="On the road" value={String(running)} />}
+    </div>
+  );
+}
+
+function Back({ onBack }: { onBack: () => void }) {
+  return <Button variant="default" leftSection={<IconBack />} onClick={onBack}>Back to the editor</Button>;
+}
+
+function SpeedChoice({ speeds, speed, onChange }: {
+  speeds: Speed[]; speed: number | null; onChange: (speed: number | null) => void;
+}) {
+  const known = speeds.find((one) => one.speed === speed);
+  return (
+    <Select aria-label="Speed" w={150} data={speeds.map(({ value, label }) => ({ value, label }))} allowDeselect={false}
+      value={known?.value ?? null} placeholder={speed === null ? undefined : `${speed} ×`}
+      onChange={(value) => {
+        const found = speeds.find((one) => one.value === value);
+        if (found) onChange(found.speed);
+      }} />
+  );
+}
+
+function Shown({ label, value }: { label: string; value: string }) {
+  return <div className="figure"><b>{value}</b><span>{label}</span></div>;
+}

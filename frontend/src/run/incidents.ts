@@ -1,0 +1,47 @@
+import type { Incident } from "../api/runs";
+import type { Category } from "../api/types";
+import type { Mark, MarkKind } from "../map/scene";
+import { CATEGORY_WORD } from "../ui/words";
+
+/** Simulated seconds for which something counts as having just happened. */
+const FRESH = 4;
+/** No more than this many, the newest, are drawn. */
+const DRAWN = 300;
+
+const KIND: Record<string, MarkKind> = {
+  collision: "collision", emergency_stop: "braking", teleport_start: "lifted", teleport_end: "lifted",
+};
+
+export const MARK_WORD: Record<MarkKind, string> = {
+  collision: "Collision", braking: "Emergency braking", lifted: "Stuck, taken off the road",
+};
+
+export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "lifted";
+
+/** What happened in plain words, with whom. */
+export function sentence(incident: Incident, categories: ReadonlyMap<string, Category>): string {
+  const who = named(incident.actor, categories);
+  switch (incident.kind) {
+    case "collision":
+      return incident.partner ? `${who} collided with ${named(incident.partner, categories)}` : `${who} collided`;
+    case "emergency_stop": return `${who} had to brake as hard as it could`;
+    case "teleport_start": return `${who} was stuck for too long and was taken off the road`;
+    case "teleport_end": return `${who} was put back on the road`;
+    default: return `${who}: ${incident.kind.replaceAll("_", " ")}`;
+  }
+}
+
+function named(id: string, categories: ReadonlyMap<string, Category>): string {
+  const category = categories.get(id);
+  return !category || id.toLowerCase().startsWith(category) ? id : `${CATEGORY_WORD[category]} ${id}`;
+}
+
+/** What is drawn of it at a time: everything up to then, the newest most visible. */
+export function marksAt(incidents: readonly Incident[], time: number): Mark[] {
+  return incidents
+    .filter((one) => one.time <= time + 1e-6)
+    .slice(-DRAWN)
+    .flatMap((one) => one.x === undefined || one.y === undefined ? [] : [{
+      x: one.x, y: one.y, kind: markKind(one), fresh: time - one.time < FRESH,
+    }]);
+}

@@ -1,0 +1,94 @@
+import type { ReplayColumns } from "../api/runs";
+import { Crowd, type Frame } from "./frames";
+
+const ROW = 6;
+
+/** A recorded run that can be shown at any time; between two moments places are interpolated. */
+export class Replay {
+  readonly crowd = new Crowd();
+  readonly begin: number;
+  readonly end: number;
+  /** Seconds between two recorded moments. */
+  readonly spacing: number;
+  /** The same road user's row in the next moment, or -1. */
+  private readonly next: Int32Array;
+
+  constructor(private readonly columns: ReplayColumns) {
+    const { times, x, y } = columns;
+    this.begin = times[0] ?? 0;
+    this.end = times[times.length - 1] ?? 0;
+    this.spacing = times.length > 1 ? (this.end - this.begin) / (times.length - 1) : 0;
+    this.next = following(columns);
+    this.crowd.origin = [Math.round(x[0] ?? 0), Math.round(y[0] ?? 0)];
+    this.crowd.introduce(columns.actors.map((actor, index) => ({ ...actor, index })));
+  }
+
+  /** Everybody on the road at a time, as a live frame would say it; `arrived` is not known. */
+  at(time: number): Frame {
+    const { times, first, actor, x, y, hdg, speed } = this.columns;
+    if (times.length === 0) return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
+    const i = momentAt(times, time);
+    const count = first[i + 1] - first[i];
+    const rows = new Float32Array(ROW * count);
+    const span = i + 1 < times.length ? times[i + 1] - times[i] : 0;
+    const share = span > 0 ? Math.min(1, Math.max(0, (time - times[i]) / span)) : 0;
+    for (let k = 0; k < count; k++) {
+      const a = first[i] + k;
+      const b = this.next[a];
+      let pose: Pose = { x: x[a], y: y[a], hdg: hdg[a], speed: speed[a] };
+      if (b >= 0 && share > 0) pose = between(pose, { x: x[b], y: y[b], hdg: hdg[b], speed: speed[b] }, span, share);
+      rows.set([actor[a], pose.x - this.crowd.origin[0], pose.y - this.crowd.origin[1], pose.hdg, pose.speed, 0], ROW * k);
+    }
+    return { step: i, time, count, pace: 0, arrived: 0, rows };
+  }
+}
+
+interface Pose {
+  x: number;
+  y: number;
+  hdg: number;
+  speed: number;
+}
+
+/**
+ * Place between two that are `span` seconds apart, along a curve that leaves and arrives with the
+ * recorded heading and speed. Whoever was put elsewhere stays until then.
+ */
+export function between(a: Pose, b: Pose, span: number, share: number): Pose {
+  const far = Math.hypot(b.x - a.x, b.y - a.y);
+  if (far > 2 * span * Math.max(a.speed, b.speed) + 10) return a;
+  const t = share;
+  const [h0, h1] = [(1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t)];
+  const [d0, d1] = [t * (1 - t) ** 2 * span * a.speed, t * t * (t - 1) * span * b.speed];
+  const turn = Math.atan2(Math.sin(b.hdg - a.hdg), Math.cos(b.hdg - a.hdg));
+  return {
+    x: h0 * a.x + h1 * b.x + d0 * Math.cos(a.hdg) + d1 * Math.cos(b.hdg),
+    y: h0 * a.y + h1 * b.y + d0 * Math.sin(a.hdg) + d1 * Math.sin(b.hdg),
+    hdg: a.hdg + turn * t,
+    speed: a.speed + (b.speed - a.speed) * t,
+  };
+}
+
+/** Last moment that is not after `time`; the first one before all. */
+export function momentAt(times: readonly number[], time: number): number {
+  let [low, high] = [0, times.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+function following({ first, actor, actors }: ReplayColumns): Int32Array {
+  const next = new Int32Array(actor.length).fill(-1);
+  const last = new Int32Array(actors.length).fill(-1);
+  for (let i = 0; i + 1 < first.length; i++) {
+    for (let row = first[i]; row < first[i + 1]; row++) {
+      const before = last[actor[row]];
+      if (i > 0 && before >= first[i - 1]) next[before] = row;
+      last[actor[row]] = row;
+    }
+  }
+  return next;
+}

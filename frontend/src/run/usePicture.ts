@@ -1,0 +1,82 @@
+import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
+
+import type { MapHandle, Pointed } from "../map/MapCanvas";
+import type { Moving } from "../map/scene";
+import type { Crowd, Frame } from "./frames";
+
+/** Wall milliseconds between two updates of the figures; the map itself is drawn with every frame. */
+const READABLE = 150;
+
+export interface Now {
+  time: number;
+  pace: number;
+  running: number;
+  arrived: number;
+  /** Whether whoever is followed is on the road. */
+  there: boolean;
+}
+
+/** The newest picture of a run, live or recorded, and who is followed in it. */
+export interface Picture {
+  now: Now;
+  followed: string | null;
+  show: (frame: Frame, crowd: Crowd) => void;
+  /** Once more, on a map that has just come. */
+  redraw: () => void;
+  clear: () => void;
+  follow: (id: string | null) => void;
+  /** Who is near a place, if anybody. */
+  near: (at: Pointed) => string | null;
+  /** The newest frame, read when it is needed. */
+  latest: () => { frame: Frame; crowd: Crowd } | null;
+}
+
+export function usePicture(handle: RefObject<MapHandle | null>): Picture {
+  const [now, setNow] = useState<Now>({ time: 0, pace: 0, running: 0, arrived: 0, there: false });
+  const [followed, setFollowed] = useState<string | null>(null);
+  const last = useRef<{ frame: Frame; crowd: Crowd; moving: Moving } | null>(null);
+  const watched = useRef<string | null>(null);
+  const pending = useRef(0);
+
+  const show = useCallback((frame: Frame, crowd: Crowd) => {
+    const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
+    last.current = { frame, crowd, moving };
+    handle.current?.setMoving(moving);
+    const row = moving.followed;
+    if (row >= 0) handle.current?.centre(moving.pose[5 * row], moving.pose[5 * row + 1]);
+    pending.current ||= window.setTimeout(() => {
+      pending.current = 0;
+      if (!last.current) return;
+      const { frame: { time, pace, count, arrived }, moving: { followed: row } } = last.current;
+      setNow({ time, pace, running: count, arrived, there: row >= 0 });
+    }, READABLE);
+  }, [handle]);
+  const redraw = useCallback(() => {
+    if (last.current) show(last.current.frame, last.current.crowd);
+  }, [show]);
+  const clear = useCallback(() => {
+    last.current = null;
+    handle.current?.setMoving(null);
+    setNow((old) => ({ ...old, running: 0, there: false }));
+  }, [handle]);
+  const follow = useCallback((id: string | null) => {
+    watched.current = id;
+    setFollowed(id);
+    redraw();
+  }, [redraw]);
+  const near = useCallback((at: Pointed): string | null => {
+    if (!last.current) return null;
+    const { crowd, moving } = last.current;
+    let best: string | null = null;
+    let least = Math.max(at.reach, 3);
+    for (const { id } of crowd.everybody()) {
+      const row = crowd.row(id);
+      if (row < 0) continue;
+      const away = Math.hypot(moving.pose[5 * row] - at.x, moving.pose[5 * row + 1] - at.y);
+      if (away < least) [best, least] = [id, away];
+    }
+    return best;
+  }, []);
+  const latest = useCallback(() => last.current, []);
+  return useMemo(() => ({ now, followed, show, redraw, clear, follow, near, latest }), [now, followed, show, redraw, clear, follow, near, latest]);
+}

@@ -1,0 +1,80 @@
+import { useCallback, useEffect, useMemo, useState } from "react";
+
+import { api } from "../api/client";
+import { type RunInfo, runs } from "../api/runs";
+import type { Bounds, MapInfo } from "../api/types";
+import { insideRows, segmentsBounds } from "../editor/scene";
+import type { PackedDrawing } from "../map/drawing";
+import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
+import { EMPTY_SCENE, type Scene } from "../map/scene";
+import { hasEnded } from "./figures";
+
+const POLL = 700;
+/** How often results are asked for after the end; a run that failed early has none. */
+const ENOUGH = 20;
+
+export interface Run {
+  info: RunInfo | null;
+  failure: string | null;
+  /** What the live picture tells sooner than one asks. */
+  learn: (state: string, speed?: number | null) => void;
+}
+
+/** How a run stands; asked rarely, as the picture comes by itself. */
+export function useRun(run: string): Run {
+  const [info, setInfo] = useState<RunInfo | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  const ended = info !== null && hasEnded(info.state);
+  const complete = ended && (info.summary != null || info.state === "failed");
+  useEffect(() => {
+    if (complete) return;
+    let current = true;
+    let left = ENOUGH;
+    const ask = (): void => {
+      if (ended && left-- <= 0) return;
+      runs.info(run).then(
+        (found) => { if (current) setInfo(found); },
+        (error: unknown) => { if (current) setFailure(String((error as Error).message)); });
+    };
+    ask();
+    const timer = setInterval(ask, POLL);
+    return () => { current = false; clearInterval(timer); };
+  }, [run, ended, complete]);
+  const learn = useCallback((state: string, speed?: number | null) => setInfo((old) =>
+    old && { ...old, state, speed: speed === undefined ? old.speed : speed }), []);
+  return { info, failure, learn };
+}
+
+export interface Ground {
+  map: MapInfo | null;
+  drawing: PackedDrawing | null;
+  loaded: LoadedGraph | null;
+  scene: Scene;
+  /** Where the scenario takes place; null if it is gone or nothing is known yet. */
+  bounds: Bounds | null;
+  failure: string | null;
+}
+
+/** The map below a run; of the scenario, which may be gone, only its region. */
+export function useGround(name: string | null, scenario: string): Ground {
+  const [map, setMap] = useState<MapInfo | null>(null);
+  const [drawing, setDrawing] = useState<PackedDrawing | null>(null);
+  const [loaded, setLoaded] = useState<LoadedGraph | null>(null);
+  const [roi, setRoi] = useState<string[] | null>(null);
+  const [failure, setFailure] = useState<string | null>(null);
+  useEffect(() => {
+    if (!name) return;
+    const fail = (error: unknown): void => setFailure(String((error as Error).message));
+    // Side by side, for a person waits.
+    api.map(name).then(setMap, fail);
+    loadDrawing(name).then(setDrawing, fail);
+    loadGraph(name).then(setLoaded, fail);
+  }, [name]);
+  useEffect(() => {
+    api.scenario(scenario).then(({ document }) => setRoi(document.roi), () => setRoi([]));
+  }, [scenario]);
+  const inside = useMemo(() => loaded && roi && roi.length > 0 ? insideRows(loaded.graph, roi) : null, [loaded, roi]);
+  const bounds = useMemo(() => loaded && roi ? segmentsBounds(loaded.graph, roi) : null, [loaded, roi]);
+  const scene = useMemo<Scene>(() => ({ ...EMPTY_SCENE, nodes: { vehicles: false, walks: false, inside } }), [inside]);
+  return { map, drawing, loaded, scene, bounds, failure };
+}

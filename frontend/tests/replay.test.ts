@@ -1,0 +1,102 @@
+import { expect, test } from "vitest";
+
+import type { ReplayColumns } from "../src/api/runs";
+import { compared } from "../src/run/figures";
+import { marksAt, sentence } from "../src/run/incidents";
+import { between, momentAt, Replay } from "../src/run/replay";
+import { thinned, ticks } from "../src/run/scale";
+import { hashOf, parseRoute } from "../src/ui/route";
+
+const columns = (): ReplayColumns => ({
+  times: [0, 1, 2],
+  first: [0, 1, 3, 4],
+  actor: [0, 0, 1, 1],
+  x: [1_000_000, 1_000_010, 1_000_100, 1_000_900],
+  y: [5, 5, 7, 7],
+  hdg: [0, 0, 3.1, -3.1],
+  speed: [10, 10, 5, 5],
+  actors: [
+    { id: "car-1", category: "car", length: 4, width: 2, ego: true },
+    { id: "bus-1", category: "bus", length: 12, width: 2.5, ego: false },
+  ],
+});
+
+const shown = (time: number): Record<string, [number, number]> => {
+  const replay = new Replay(columns());
+  const frame = replay.at(time);
+  const { pose } = replay.crowd.arrange(frame, null, null);
+  const found: Record<string, [number, number]> = {};
+  for (const who of replay.crowd.everybody()) {
+    const row = replay.crowd.row(who.id);
+    if (row >= 0) found[who.id] = [pose[5 * row], pose[5 * row + 1]];
+  }
+  return found;
+};
+
+test("between two moments everybody is on the way, far from zero too", () => {
+  expect(shown(0.5)).toEqual({ "car-1": [1_000_005, 5] });
+  expect(shown(-3)).toEqual({ "car-1": [1_000_000, 5] });
+});
+
+test("who has not been recorded any more is gone with the next moment", () => {
+  expect(Object.keys(shown(1.5)).sort()).toEqual(["bus-1", "car-1"]);
+  expect(Object.keys(shown(2))).toEqual(["bus-1"]);
+  expect(Object.keys(shown(99))).toEqual(["bus-1"]);
+});
+
+test("who was put elsewhere does not fly there", () => {
+  expect(shown(1.9)["bus-1"]).toEqual([1_000_100, 7]);
+});
+
+test("headings turn the short way, and a bend is driven as a bend", () => {
+  const a = { x: 0, y: 0, hdg: 3.1, speed: 1 };
+  expect(Math.cos(between(a, { x: -1, y: 0, hdg: -3.1, speed: 1 }, 1, 0.5).hdg)).toBeCloseTo(-1, 5);
+  // A quarter circle of radius 10 in a second: the chord's middle is 2.9 m off.
+  const speed = 5 * Math.PI;
+  const middle = between({ x: 0, y: 0, hdg: 0, speed }, { x: 10, y: 10, hdg: Math.PI / 2, speed }, 1, 0.5);
+  expect(Math.hypot(middle.x, middle.y - 10)).toBeCloseTo(10, 0);
+});
+
+test("a run in which nobody was ever on the road can be replayed", () => {
+  const empty = { ...columns(), times: [], first: [0], actor: [], x: [], y: [], hdg: [], speed: [] };
+  expect(new Replay(empty).at(3).count).toBe(0);
+});
+
+test("the moment is the last one that is not later", () => {
+  expect([-1, 0, 0.99, 1, 5].map((time) => momentAt([0, 1, 2], time))).toEqual([0, 0, 0, 1, 2]);
+});
+
+const crash = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
+
+test("incidents are told in words and marked from when they happen", () => {
+  const categories = new Map([["car-1", "car"], ["x7", "bicycle"]] as const);
+  expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
+  expect(marksAt([crash], 2.9)).toEqual([]);
+  expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
+  expect(marksAt([crash], 30)[0].fresh).toBe(false);
+  expect(marksAt([{ time: 0, kind: "emergency_stop", actor: "a" }], 1)).toEqual([]);
+});
+
+test("two runs are compared figure by figure", () => {
+  const before = { sim_seconds: 60, actors: { arrived: 5, collided: 0 }, figures: { mean_speed: 10, mean_delay: 1.5 } };
+  const now = { sim_seconds: 60, actors: { arrived: 3, collided: 1 }, figures: { mean_speed: 10.5, mean_delay: null } };
+  const found = Object.fromEntries(compared(now, before).map((one) => [one.label, one.difference]));
+  expect(found).toEqual({
+    "Simulated time": "same", "Arrived": "−2", "In collisions": "+1", "Mean speed": "+1.8 km/h", "Mean delay": "–",
+  });
+});
+
+test("axes have round numbers that hold everything", () => {
+  expect(ticks(17)).toEqual([0, 5, 10, 15, 20]);
+  expect(ticks(0.3)).toEqual([0, 0.1, 0.2, 0.3]);
+  expect(ticks(0)).toEqual([0, 0.5, 1]);
+});
+
+test("a long table is thinned evenly with its end kept", () => {
+  expect(thinned([0, 1, 2, 3, 4, 5, 6, 7, 8], 3)).toEqual([0, 4, 8]);
+  expect(thinned([1, 2], 3)).toEqual([1, 2]);
+});
+
+test("the list of a scenario's runs has an address", () => {
+  expect(parseRoute(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
+});

@@ -1,0 +1,182 @@
+"""axe finds nothing in any view, light and dark; what can be clicked can be reached by keyboard.
+
+A picture of each view is kept under build/browser/views.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import psutil
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import ARTEFACTS, CROSSING
+from tests.browser.pages import OdscenPage, settle
+from tools import page as tool
+
+AXE = tool.ROOT / "frontend/node_modules/axe-core/axe.min.js"
+
+# Composite widgets have one stop of their own; hidden helpers double what has keys already.
+UNREACHABLE = """() => [...document.querySelectorAll("a[href], button, input, select, textarea")]
+    .filter(e => e.checkVisibility({visibilityProperty: true}) && !e.disabled && e.tabIndex < 0)
+    .filter(e => !e.closest(["menu", "listbox", "radiogroup", "tablist"]
+        .map(role => `[role=${role}]`).join() + ",[aria-hidden=true]"))
+    .map(e => e.outerHTML.slice(0, 200))"""
+
+
+class Inspector:
+    """Looks at one view after the other and collects what is wrong."""
+
+    def __init__(self, user: OdscenPage, scheme: str) -> None:
+        self.page: Page = user.page
+        self.scheme = scheme
+        self.wrong = Wrongs()
+
+    def look(self, view: str) -> None:
+        settle(self.page)
+        ARTEFACTS.joinpath("views").mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=ARTEFACTS / f"views/{view}-{self.scheme}.png")
+        self.page.evaluate(AXE.read_text(encoding="utf-8"))
+        found: list[dict[str, Any]] = self.page.evaluate("async () => (await axe.run()).violations")
+        for rule in found:
+            for node in rule["nodes"]:
+                message = node["any"][0]["message"] if node["any"] else rule["help"]
+                self.wrong.append(view, f"{rule['id']}: {node['html'][:120]} {message}")
+        for element in self.page.evaluate(UNREACHABLE):
+            self.wrong.append(view, f"no keyboard reaches {element}")
+
+
+class Wrongs:
+    """What is wrong, and in which views."""
+
+    def __init__(self) -> None:
+        self.views: dict[str, list[str]] = {}
+
+    def append(self, view: str, what: str) -> None:
+        self.views.setdefault(what, []).append(view)
+
+    def __str__(self) -> str:
+        return "".join(f"\n{what}\n    in {', '.join(views)}" for what, views in self.views.items())
+
+
+@pytest.fixture(params=["light", "dark"])
+def scheme(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def visit(scheme: str, open_page: Callable[..., OdscenPage]) -> Iterator[Callable[..., Any]]:
+    """Opens a page in one colour scheme, with an inspector; at the end nothing may be wrong."""
+    inspectors: list[Inspector] = []
+
+    def opened(url: str, **options: Any) -> tuple[OdscenPage, Inspector]:
+        user = open_page(url, color_scheme=scheme, **options)
+        inspectors.append(Inspector(user, scheme))
+        return user, inspectors[-1]
+
+    yield opened
+    assert not any(one.wrong.views for one in inspectors), "".join(
+        str(one.wrong) for one in inspectors
+    )
+
+
+def test_the_first_screen(
+    visit: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    with tool.served(tmp_path_factory.mktemp("empty")) as server:
+        user, inspector = visit(server.url)
+        user.open_catalogue()
+        inspector.look("catalogue-empty")
+
+
+def test_the_catalogue(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.open_catalogue()
+    expect(user.page.get_by_role("link", name=sampled)).to_be_visible()
+    inspector.look("catalogue")
+    user.remove(CROSSING).click()
+    expect(user.page.get_by_role("dialog")).to_be_visible()
+    inspector.look("catalogue-remove")
+
+
+def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.page.goto("/#/edit/nowhere")
+    expect(user.page.get_by_role("alert")).to_be_visible()
+    inspector.look("editor-nowhere")
+    user.open_catalogue()
+    user.new_scenario(CROSSING).click()
+    user.wait_for_editor()
+    inspector.look("editor-new")
+    user.open_editor(sampled)
+    for step in ("Map", "Region", "Weather and time", "Road users", "Run"):
+        user.step(step).click()
+        inspector.look("editor-" + step.lower().replace(" ", "-"))
+    user.step("Weather and time").click()
+    user.page.get_by_role("button", name="Fine-tune").click()
+    inspector.look("editor-weather-fine")
+    user.step("Road users").click()
+    user.names.first.click()
+    expect(user.ego).to_be_visible()
+    inspector.look("editor-road-user")
+    user.kind("Pedestrian").click()
+    inspector.look("editor-placing")
+    user.keys.click()
+    expect(user.page.get_by_role("dialog")).to_be_visible()
+    inspector.look("editor-keys")
+    user.page.keyboard.press("Escape")
+    for entry, view in (("Rename", "rename"), ("Save as", "copy"), ("Open another", "open")):
+        user.choose_in_menu(entry)
+        expect(user.page.get_by_role("dialog")).to_be_visible()
+        inspector.look(f"editor-{view}")
+        user.page.keyboard.press("Escape")
+        expect(user.page.get_by_role("dialog")).to_have_count(0)
+
+
+def test_the_tour(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url, tour=True)
+    user.open_editor(sampled)
+    for number in (1, 2, 3):
+        expect(user.tour).to_contain_text(f"{number} of 3")
+        inspector.look(f"tour-{number}")
+        user.tour.get_by_role("button", name="Done" if number == 3 else "Next").click()
+    expect(user.tour).to_have_count(0)
+    user.page.reload()
+    user.wait_for_editor()
+    expect(user.tour).to_have_count(0)
+
+
+def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.page.goto(f"/#/run/{sampled}/nowhere")
+    expect(user.page.get_by_role("alert")).to_be_visible()
+    inspector.look("run-nowhere")
+    user.open_editor(sampled)
+    user.step("Run").click()
+    user.run.click()
+    user.wait_until_moving()
+    inspector.look("run-live")
+    user.control("Pause").click()
+    expect(user.control("Go on")).to_be_enabled()
+    inspector.look("run-paused")
+    user.control("Go on").click()
+    user.choose_speed("As fast")
+    expect(user.result).to_contain_text("finished")
+    expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
+    inspector.look("run-finished")
+
+
+def test_a_failed_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.open_editor(sampled)
+    user.step("Run").click()
+    server = psutil.Process(served.process.pid)
+    before = set(server.children(recursive=True))
+    user.run.click()
+    user.wait_until_moving()
+    for child in set(server.children(recursive=True)) - before:
+        child.kill()
+    expect(user.result).to_contain_text("failed")
+    inspector.look("run-failed")

@@ -1,0 +1,80 @@
+"""From the first screen to a running scenario, with only the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.pages import OdscenPage
+from tools import page as tool
+
+MOST_CLICKS = 20
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tool.Served]:
+    """A server that nobody has used yet."""
+    root: Path = tmp_path_factory.mktemp("empty")
+    with tool.served(root) as server:
+        yield server
+
+
+def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
+    empty: tool.Served, open_page: Callable[..., OdscenPage]
+) -> None:
+    user = open_page(empty.url, tour=True)
+    user.open_catalogue()
+    expect(user.maps).to_have_count(0)
+    user.add_shipped.click()
+    expect(user.maps).to_have_count(len(list((tool.ROOT / "maps").glob("*.xodr"))))
+
+    user.new_scenario("signal_crossing").click()
+    user.wait_for_editor()
+    user.close_tour()
+    junction = user.graph.junction()
+    with user.changing():
+        user.map.click(user.graph.middle(junction))
+    with user.changing():
+        user.add_all.click()
+
+    user.step("Road users").click()
+    roi = user.document()["roi"]
+    assert len(roi) == 1 + len(user.graph.neighbours(junction))
+    kinds = ("Car", "Van", "Truck", "Motorcycle")
+    starts = user.graph.starts(roi, len(kinds))
+    for kind, start in zip(kinds, starts, strict=True):
+        user.kind(kind).click()
+        with user.changing():
+            user.map.click(start)
+        if kind == "Car":
+            with user.changing():
+                user.ego.click()
+    user.kind("Pedestrian").click()
+    with user.changing():
+        user.map.click(user.graph.starts(roi, 1, walking=True)[0])
+    expect(user.names).to_have_count(5)
+
+    user.step("Run").click()
+    user.run.click()
+    user.wait_until_moving()
+    actions = user.actions()
+    assert actions["key"] == 0
+    assert actions["pointer"] <= MOST_CLICKS
+
+    actors = user.document()["actors"]
+    assert sorted(actor["category"] for actor in actors) == [
+        "car",
+        "motorcycle",
+        "pedestrian",
+        "truck",
+        "van",
+    ]
+    assert [actor["category"] for actor in actors if actor["ego"]] == ["car"]
+    user.choose_speed("As fast")
+    expect(user.result).to_contain_text("finished")
+    user.result.get_by_role("button", name="Back to the editor").click()
+    user.wait_for_editor()
+    assert user.document()["actors"] == actors

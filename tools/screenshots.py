@@ -1,0 +1,96 @@
+"""Writes docs/images/page-*.png: every view of the page, light and dark.
+
+``python -m tools.screenshots [FOLDER]``. Colours are reduced to a palette, which hardly shows
+and makes the files a third as large.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+from playwright.sync_api import Browser, expect
+
+from odscen import workflow
+from odscen.catalog.shipped import shipped_maps
+from odscen.catalog.store import Workspace
+from tests.browser.pages import OdscenPage, settle
+from tools import page as tool
+
+IMAGES = tool.ROOT / "docs/images"
+MAP = "town_5x5"
+SIZE = {"width": 1280, "height": 800}
+LARGEST = 400_000
+
+
+class Camera:
+    """Takes pictures of one page in one colour scheme."""
+
+    def __init__(self, user: OdscenPage, scheme: str, folder: Path) -> None:
+        self.user, self.scheme, self.folder = user, scheme, folder
+
+    def take(self, view: str) -> None:
+        """Keep what is seen now, once nothing moves, under the view's name."""
+        settle(self.user.page)
+        raw = Image.open(io.BytesIO(self.user.page.screenshot())).convert("RGB")
+        path = self.folder / f"page-{view}-{self.scheme}.png"
+        raw.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+        size = path.stat().st_size
+        if size > LARGEST:
+            sys.exit(f"{path} has {size} bytes, more than {LARGEST}")
+        print(f"{path.name}: {size // 1000} kB")
+
+
+def main() -> None:
+    folder = Path(sys.argv[1]) if sys.argv[1:] else IMAGES
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name:
+        workspace = Workspace.open(Path(name))
+        for path in shipped_maps():
+            workspace.add_map(path)
+        made = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.15, roi_segments=7)[0]
+        scenario = made.name.removesuffix(workflow.SUFFIX)
+        with tool.served(Path(name)) as server, tool.launched() as browser:
+            for scheme in ("light", "dark"):
+                _views(browser, server.url, scheme, scenario, folder)
+
+
+def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path) -> None:
+    with browser.new_context(base_url=url, viewport=SIZE, color_scheme=scheme) as context:
+        context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
+        user = OdscenPage(context.new_page())
+        camera = Camera(user, scheme, folder)
+        user.open_catalogue()
+        expect(user.maps).to_have_count(len(shipped_maps()))
+        user.page.wait_for_load_state("networkidle")  # the cards' pictures
+        camera.take("catalogue")
+        user.open_editor(scenario)
+        for step in ("Region", "Weather and time"):
+            user.step(step).click()
+            if step == "Region":
+                user.page.get_by_role("button", name="Show the region").click()
+            camera.take(step.split(maxsplit=1)[0].lower())
+        user.step("Road users").click()
+        user.names.first.click()
+        expect(user.ego).to_be_visible()
+        user.page.get_by_role("button", name="Show goals").click()
+        camera.take("road-users")
+        user.step("Run").click()
+        user.run.click()
+        user.wait_until_moving()
+        expect(user.figure("Time").first).to_have_text("0:06.0", timeout=30_000)
+        user.control("Pause").click()
+        expect(user.control("Go on")).to_be_enabled()
+        camera.take("run")
+        user.control("Go on").click()
+        user.choose_speed("As fast")
+        expect(user.result).to_contain_text("finished", timeout=60_000)
+        expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
+        camera.take("result")
+
+
+if __name__ == "__main__":
+    main()
