@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
 from odscen.sumo.process import messages
@@ -71,7 +72,7 @@ class ServedJob:
 def run_served(job: ServedJob, live: Live) -> Done | Failed:
     """Run a job in its process; watchers of ``live`` see it, and can steer it."""
     with (
-        open(job.log, "ab") as log,
+        Path(job.log).open("ab") as log,
         _Worker(
             [sys.executable, "-m", WORKER],
             stdin=subprocess.PIPE,

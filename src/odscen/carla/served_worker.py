@@ -1,4 +1,4 @@
-"""The process of a mirrored run that a page has asked for: ``python -m odscen.carla.served_worker``.
+"""The process of a mirrored run for a page: ``python -m odscen.carla.served_worker``.
 
 The client may end its process, and holds Python's lock while it waits; a web server has neither to
 spare. The job is the first line of standard input, commands are the lines after it, and what is to
@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,9 +36,10 @@ _WINDOW = 0.5
 
 def main() -> int:
     """Run the job; 0 when it has ended by itself or was stopped."""
-    job = ServedJob.from_line(sys.stdin.buffer.raw.readline())  # type: ignore[attr-defined]
+    # Unbuffered: what comes after the line is read by the steering.
+    with FileIO(sys.stdin.fileno(), closefd=False) as stdin:
+        job = ServedJob.from_line(stdin.readline())
     with captured_output(Path(job.log)) as stdout:
-
         sending = threading.Lock()  # pictures come in a thread of their own
 
         def send(message: Message, payload: bytes) -> None:
