@@ -82,7 +82,7 @@ def test_a_mirrored_run_is_watched_steered_and_kept(
         assert len(left(standin)) > 1
         again = page.post("/api/runs", json=wish)
         assert again.status_code == 409
-        assert "CARLA shows another run" in again.json()["message"]
+        assert "CARLA shows another run" in again.json()["error"]["message"]
     page.post(f"/api/runs/{run}/control", json={"action": "speed", "speed": None})
     page.post(f"/api/runs/{run}/control", json={"action": "resume"})
     time.sleep(0.5)

@@ -10,7 +10,9 @@ from fastapi import APIRouter
 from starlette.responses import Response, StreamingResponse
 
 from odscen.errors import NotFoundError
+from odscen.sumo import layout
 from odscen.web.messages import CarlaInfo
+from odscen.web.run_routes import page_of_run
 from odscen.web.runs import Active
 from odscen.web.services import Shared
 
@@ -40,6 +42,12 @@ async def camera(run: str, shared: Shared) -> Response:
     return StreamingResponse(
         _pictures(active), media_type=kind, headers={"Cache-Control": "no-store"}
     )
+
+
+@router.get("/runs/{run}/parity.html", response_class=Response)
+def parity(run: str, shared: Shared) -> Response:
+    """How far SUMO and CARLA agreed in a finished run."""
+    return page_of_run(shared, run, layout.PARITY_FILE)
 
 
 async def _pictures(run: Active) -> AsyncIterator[bytes]:
