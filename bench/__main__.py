@@ -5,7 +5,16 @@ from __future__ import annotations
 import importlib
 import sys
 
-ALL = ("startup", "lane_graph", "maps_add", "recording", "live_view", "canvas", "in_browser")
+ALL = (
+    "startup",
+    "lane_graph",
+    "maps_add",
+    "recording",
+    "live_view",
+    "canvas",
+    "in_browser",
+    "carla_mirror",
+)
 
 
 def main() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -65,83 +66,86 @@ class Observer:
         self.boxes = seen["boxes"]
 
 
+class Notes:
+    """What has been seen so far."""
+
+    def __init__(self, world: Any) -> None:
+        self._world = world
+        self._raw: list[Any] = []
+        self._shown: list[tuple[int, dict[int, str]]] = []
+        self._names: dict[int, str] = {}
+        self._frames: dict[int, dict[str, Any]] = {}
+        self._boxes: dict[str, list[float]] = {}
+        lights = world.get_actors().filter("traffic.traffic_light*")
+        self._lights = {light.id: light for light in lights}
+        self._signs = {light.id: light.get_opendrive_id() for light in lights}
+        world.on_tick(self._hear)
+
+    def _hear(self, snapshot: Any) -> None:
+        self._raw.append(snapshot)
+        # The client keeps the newest state only: read while this one is it.
+        states = {number: str(light.get_state()) for number, light in self._lights.items()}
+        self._shown.append((snapshot.frame, states))
+
+    def take(self) -> None:
+        """Write down what has been heard."""
+        while self._raw:
+            snapshot = self._raw.pop(0)
+            seen = {actor.id: actor for actor in snapshot}
+            self._meet([number for number in seen if number not in self._names])
+            self._frames[snapshot.frame] = {
+                "number": snapshot.frame,
+                "elapsed": snapshot.timestamp.elapsed_seconds,
+                "users": {
+                    self._names[number]: _numbers(actor)
+                    for number, actor in seen.items()
+                    if self._names.get(number)
+                },
+                "lights": {},
+            }
+
+    def _meet(self, fresh: list[int]) -> None:
+        for actor in self._world.get_actors(fresh) if fresh else ():
+            role = actor.attributes.get("role_name", "")
+            ours = role.startswith(ROLE) and role != ROLE + "measure"
+            self._names[actor.id] = role.removeprefix(ROLE) if ours else ""
+            if ours:
+                box = actor.bounding_box
+                self._boxes[self._names[actor.id]] = [
+                    box.location.x, box.location.z, box.extent.x, box.extent.z
+                ]  # fmt: skip
+
+    def to_json(self) -> str:
+        """Frames in their order, and boxes of road users."""
+        for number, states in self._shown:
+            if number in self._frames:
+                lights = {self._signs[light]: state for light, state in states.items()}
+                self._frames[number]["lights"] = lights
+        frames = [self._frames[number] for number in sorted(self._frames)]
+        return json.dumps({"frames": frames, "boxes": self._boxes})
+
+
+def _numbers(actor: Any) -> list[float]:
+    at, v = actor.get_transform(), actor.get_velocity()
+    where, turn = at.location, at.rotation
+    return [where.x, where.y, where.z, turn.pitch, turn.yaw, v.x, v.y, v.z]
+
+
 def main() -> None:
     import carla
 
     host, port, file = sys.argv[1:]
     client = carla.Client(host, int(port))
     client.set_timeout(10.0)
-    world = client.get_world()
-    frames: dict[int, dict[str, Any]] = {}
-    names: dict[int, str] = {}
-    lights: dict[int, Any] = {}
-    boxes: dict[str, list[float]] = {}
-    raw: list[Any] = []
-    world.on_tick(raw.append)
-
-    def take() -> None:
-        while raw:
-            snapshot = raw.pop(0)
-            users, numbers = {}, []
-            for actor in snapshot:
-                at, v = actor.get_transform(), actor.get_velocity()
-                numbers.append(actor.id)
-                users[actor.id] = [
-                    at.location.x, at.location.y, at.location.z, at.rotation.pitch,
-                    at.rotation.yaw, v.x, v.y, v.z,
-                ]  # fmt: skip
-            fresh = [number for number in numbers if number not in names]
-            for actor in world.get_actors(fresh) if fresh else ():
-                role = actor.attributes.get("role_name", "")
-                names[actor.id] = role
-                if actor.type_id == "traffic.traffic_light":
-                    lights[actor.id] = actor
-                elif role.startswith(ROLE):
-                    box = actor.bounding_box
-                    boxes[role.removeprefix(ROLE)] = [
-                        box.location.x, box.location.z, box.extent.x, box.extent.z
-                    ]  # fmt: skip
-            frames[snapshot.frame] = {
-                "number": snapshot.frame,
-                "elapsed": snapshot.timestamp.elapsed_seconds,
-                "users": {
-                    names[number].removeprefix(ROLE): values
-                    for number, values in users.items()
-                    if names.get(number, "").startswith(ROLE)
-                    and names[number] != ROLE + "measure"
-                },
-                "lights": {},
-            }
-
-    def watch_lights(snapshot: Any) -> None:
-        # The client keeps the newest state only: read while this one is it.
-        seen.append((snapshot.frame, {i: str(light.get_state()) for i, light in lights.items()}))
-
-    take_first = world.get_actors().filter("traffic.traffic_light*")
-    lights |= {actor.id: actor for actor in take_first}
-    signs = {actor.id: actor.get_opendrive_id() for actor in take_first}
-    seen: list[tuple[int, dict[int, str]]] = []
-    world.on_tick(watch_lights)
+    notes = Notes(client.get_world())
     sys.stdout.write("ready\n")
     sys.stdout.flush()
-    import threading
-
     done = threading.Event()
-
-    def wait() -> None:
-        sys.stdin.read()
-        done.set()
-
-    threading.Thread(target=wait, daemon=True).start()
+    threading.Thread(target=lambda: (sys.stdin.read(), done.set()), daemon=True).start()
     while not done.wait(0.02):
-        take()
-    take()
-    for number, states in seen:
-        if number in frames:
-            frames[number]["lights"] = {signs[i]: s for i, s in states.items() if i in signs}
-    Path(file).write_text(
-        json.dumps({"frames": [frames[n] for n in sorted(frames)], "boxes": boxes})
-    )
+        notes.take()
+    notes.take()
+    Path(file).write_text(notes.to_json())
 
 
 if __name__ == "__main__":

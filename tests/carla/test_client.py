@@ -114,8 +114,9 @@ def test_weather_and_traffic_lights_are_given_back() -> None:
             assert world.get_weather().fog_density == 77.0
             lights = server.take_lights()
             server.apply(Batch(signals=dict.fromkeys(lights.values(), "Off")))
-            state = world.get_snapshot
-            assert state().frame
+            first = world.get_actors().filter("traffic.traffic_light*")[0]
+            assert first.get_state() == carla.TrafficLightState.Off
+            assert first.is_frozen()
         assert world.get_weather() == before
         world.wait_for_tick(2.0)
         light = world.get_actors().filter("traffic.traffic_light*")[0]
@@ -174,9 +175,12 @@ def test_another_release_is_refused_before_anything_is_touched() -> None:
 
 def test_another_map_is_refused_by_name_if_none_may_be_loaded() -> None:
     text = ROUNDABOUT.read_text(encoding="utf-8")
-    with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
-        with pytest.raises(CarlaError, match="shows signal_crossing, and the scenario is on round"):
-            ensure_map(server, "roundabout", text, load=False)
+    with (
+        StandIn(CROSSING) as stand_in,
+        Server(address_of(stand_in)) as server,
+        pytest.raises(CarlaError, match="shows signal_crossing, and the scenario is on round"),
+    ):
+        ensure_map(server, "roundabout", text, load=False)
 
 
 def test_the_server_loads_the_map_if_it_has_it() -> None:

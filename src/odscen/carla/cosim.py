@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from odscen.carla.camera import Camera
     from odscen.catalog.store import Workspace
     from odscen.results.records import Plan
-    from odscen.sumo.in_step import Driven, Step
-    from odscen.sumo.progress import OnProgress
+    from odscen.sumo.in_step import Step
+    from odscen.sumo.progress import OnProgress, Place
     from odscen.sumo.runner import PreparedRun, RunResult
 
 TICK = 0.05
@@ -298,7 +298,7 @@ class _Show:
         report.signals = len(known & self._joined.keys())
         report.signals_missing = sorted(known - self._joined.keys())
 
-    def on_step(self, step: Step) -> Driven | None:
+    def on_step(self, step: Step) -> Place | None:
         """Show a step; an error ends the run, whose results are kept."""
         if self._interrupted.is_set():
             self._report.interrupted = True

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Self
 
 from odscen.carla.batch import Place
 from odscen.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla, xodr_to_sumo
-from odscen.sumo.in_step import Driven
+from odscen.sumo.progress import Place as SumoPlace
 
 if TYPE_CHECKING:
     from odscen.carla.server import Server
@@ -51,7 +51,7 @@ class ExternalEgo:
             hero = server.spawn_free(blueprint, HERO, at)
         return cls(server, plan, row, hero, server.shape(hero).centre[0])
 
-    def driven(self, step: Step) -> Driven | None:
+    def driven(self, step: Step) -> SumoPlace | None:
         """Where the hero is now, SUMO's way; ``None`` while SUMO's ego is not on the road."""
         if self.row not in step.index:
             return None
@@ -65,4 +65,5 @@ class ExternalEgo:
             length=self._length,
             net_offset=self._offset,
         )
-        return Driven(float(front.x), float(front.y), float(front.angle_deg))
+        speed = self._server.speed(self._hero, at)
+        return SumoPlace(float(front.x), float(front.y), float(front.angle_deg), speed)

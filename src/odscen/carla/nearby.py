@@ -53,7 +53,7 @@ class Nearby:
             chosen &= far <= np.where(shown, self.radius * HYSTERESIS, self.radius)
         if self.most is not None and np.count_nonzero(chosen) > self.most:
             # Who is shown counts as nearer than it is, so that neighbours do not take turns.
-            rank = np.lexsort((np.where(shown, far / HYSTERESIS, far), ~shown & (far == 0)))
+            rank = np.lexsort((~shown, np.where(shown, far / HYSTERESIS, far)))
             rank = rank[chosen[rank]]
             chosen[rank[self.most :]] = False
         return chosen

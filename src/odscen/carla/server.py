@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Self
@@ -306,6 +307,13 @@ class Server:
         at = found.get_transform()
         where, turn = at.location, at.rotation
         return Place(where.x, where.y, where.z, turn.pitch, turn.yaw)
+
+    def speed(self, actor: int, at: Place) -> float:
+        """m/s ahead of an actor that is at a place, 0 if it goes backwards."""
+        found = self._world.get_snapshot().find(actor)
+        velocity = found.get_velocity()
+        yaw = math.radians(at.yaw)
+        return max(0.0, float(velocity.x * math.cos(yaw) + velocity.y * math.sin(yaw)))
 
     # ------------------------------------------------------------------------------- lights
     def take_lights(self) -> dict[str, int]:

@@ -17,6 +17,7 @@ from odscen.cli.demo import demo
 from odscen.cli.doctor import doctor
 from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
+from odscen.cli.pull import pull
 from odscen.cli.runs import run
 from odscen.cli.scenarios import check, export, generate
 from odscen.cli.serve import serve
@@ -29,6 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+maps.command()(pull)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.command()(generate)

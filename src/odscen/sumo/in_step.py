@@ -62,15 +62,6 @@ class Step:
     incidents: Sequence[Mapping[str, Any]] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Driven:
-    """The vehicle of the plan that somebody else drives: front centre, SUMO frame."""
-
-    x: float
-    y: float
-    angle_deg: float
-
-
 class InStep:
     """A companion of a run that is called after each step.
 
@@ -91,7 +82,7 @@ class InStep:
         self,
         plan: Plan,
         ground: Ground,
-        on_step: Callable[[Step], Driven | None],
+        on_step: Callable[[Step], Place | None],
         *,
         placed: int | None = None,
     ) -> None:
@@ -127,7 +118,7 @@ class InStep:
             return
         driven = self._on_step(step)
         if driven is not None:
-            self._say(Place(driven.x, driven.y, driven.angle_deg))
+            self._say(driven)
         if self._placed is not None and not self._stopped:
             self._say(Command("step"))
 

@@ -81,7 +81,7 @@ class LockstepWatch:
             command = self._next()
             if isinstance(command, Place):
                 if self._placed is not None:
-                    session.place(self._placed, command.x, command.y, command.angle_deg)
+                    session.place(self._placed, command)
             elif command.do == "step":
                 self._steps += 1
                 return True

@@ -131,11 +131,12 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """To the worker: where the vehicle that somebody else drives is, front, SUMO frame."""
+    """To the worker: the vehicle that somebody else drives; front, SUMO frame, m/s."""
 
     x: float
     y: float
     angle_deg: float
+    speed: float
 
 
 @dataclass(frozen=True, slots=True)

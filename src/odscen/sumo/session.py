@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from odscen.sumo.progress import Place
 
+
+_UNCHECKED = 0
+"""``setSpeedMode``: the speed that is set, whatever is safe, possible or permitted."""
+_FAST = 200.0
+"""m/s; no limit of a model, for a vehicle whose speed is set."""
 _EDGES_AHEAD = 3
 """Edges that the route of a vehicle driven from outside has at least, its own included."""
 
@@ -165,17 +171,20 @@ class Session:
         lane, pos = self._sumo.person.getLaneID, self._sumo.person.getLanePosition
         return [(lane(name), pos(name)) for name in ids]
 
-    def place(self, vehicle: str, x: float, y: float, angle_deg: float) -> bool:
+    def place(self, vehicle: str, at: Place) -> bool:
         """Put a vehicle where somebody else has driven it; false if SUMO cannot.
 
-        The place (centre of the front, SUMO frame) is taken exactly, on or off the road, and the
-        speed follows from the way since the last step. ``keepRoute=2`` lets the vehicle leave its
-        route; its new one would end with the edge that it is on, so it is led on a little: others
-        must know where it may be going.
+        The place is taken exactly, on or off the road, and so is the speed, whatever limits,
+        lights and right of way say: nothing of SUMO's drives it. ``keepRoute=2`` lets the vehicle
+        leave its route; its new one would end with the edge that it is on, so it is led on a
+        little: others must know where it may be going.
         """
         vehicles = self._sumo.vehicle
         try:
-            vehicles.moveToXY(vehicle, "", -1, x, y, angle_deg, 2)
+            vehicles.setSpeedMode(vehicle, _UNCHECKED)
+            vehicles.setMaxSpeed(vehicle, _FAST)
+            vehicles.setSpeed(vehicle, at.speed)
+            vehicles.moveToXY(vehicle, "", -1, at.x, at.y, at.angle_deg, 2)
             route, index = vehicles.getRoute(vehicle), vehicles.getRouteIndex(vehicle)
             if index >= 0 and len(route) - index < _EDGES_AHEAD:
                 self._lead_on(vehicle, route[index:])

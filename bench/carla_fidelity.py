@@ -1,0 +1,60 @@
+"""Sampled scenarios on signalised maps, mirrored and held against SUMO's recording.
+
+``python -m bench.carla_fidelity [COUNT [SECONDS]]``: 100 scenarios of 60 s if nothing is said. The
+judge is that of ``tests/carla/test_mirror_on_maps.py``; a run that fails it ends the bench.
+"""
+
+from __future__ import annotations
+
+import collections
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import tests.carla.test_mirror_on_maps as judge
+from bench.common import shared_maps
+from odscen import workflow
+from odscen.catalog.store import Workspace
+
+SHIPPED = ("signal_crossing", "town_5x5")
+SHARED = ("carla-2019/Town05", "carla-2019/Town03")
+
+
+def main() -> None:
+    count, seconds = (*map(float, sys.argv[1:]), *(100, 60)[len(sys.argv) - 1 :])
+    judge.SECONDS = seconds
+    folder = shared_maps()
+    files = [Path(__file__).parents[1] / "maps" / f"{name}.xodr" for name in SHIPPED]
+    files += [folder / f"{name}.xodr" for name in SHARED] if folder else []
+    off: dict[str, list[float]] = collections.defaultdict(list)
+    categories: collections.Counter[str] = collections.Counter()
+    with tempfile.TemporaryDirectory() as root:
+        workspace = Workspace.open(Path(root))
+        for number in range(int(count)):
+            xodr = files[number % len(files)]
+            workspace.add_map(xodr)
+            [path] = workflow.generate(
+                workspace, map_name=xodr.stem, seed=number, fill=0.15, roi_segments=15
+            )
+            with tempfile.TemporaryDirectory() as out:
+                found = judge.check(workspace, path, xodr, Path(out))
+                [plan] = Path(out).glob("*/plan.json")
+                actors = json.loads(plan.read_text())["actors"]
+            categories.update(actor["category"] for actor in actors)
+            for name, values in found.items():
+                off[name] += values
+            worst = ", ".join(f"{name} {max(values):.4f}" for name, values in found.items())
+            print(
+                f"{number + 1:3d} {path.name}: {len(actors)} road users; worst {worst}", flush=True
+            )
+    print(f"{int(count)} scenarios of {seconds:g} s; {dict(categories)}")
+    for name, values in off.items():
+        median, high = np.percentile(values, [50, 99])
+        print(f"{name}: {len(values):,}; {median:.5f}, 99 % {high:.5f}, worst {max(values):.5f}")
+
+
+if __name__ == "__main__":
+    main()

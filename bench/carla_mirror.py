@@ -1,0 +1,127 @@
+"""A tick of the CARLA mirror, 200 vehicles and 100 pedestrians, against a call per actor.
+
+The stand-in server answers; its own time is not CARLA's. Ours is what is left of a tick without
+waiting for the server: aim at most 5 ms. The peer moves each actor by calls of its own, as bridges
+do, on the same server in the same run; SUMO has no part in either.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from odscen.carla.blueprints import choose_blueprints
+from odscen.carla.client import Address, import_carla
+from odscen.carla.mirror import ROLE, Mirror
+from odscen.carla.server import Server
+from odscen.catalog.assets import shipped_assets
+from odscen.results.records import Plan, PlannedActor
+from odscen.sumo.in_step import Step
+from tests.carla_standin.process import StandIn
+
+MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
+VEHICLES, WALKERS = 200, 100
+TICKS = 100
+DELTA = 0.05
+
+
+def main() -> None:
+    plan = _plan()
+    with StandIn(MAP) as stand_in:
+        address = Address(stand_in.host, stand_in.port)
+        with Server(address) as server:
+            server.synchronize(DELTA)
+            blueprints = choose_blueprints(plan.actors, shipped_assets(), server.library())
+            mirror = Mirror(plan, blueprints, server.shapes(blueprints))
+            _show(server, mirror, _step(0))
+            assert mirror.spawned == VEHICLES + WALKERS, mirror.refusals
+            stand_in.reset_calls()
+            ours, whole = [], []
+            for number in range(1, TICKS + 1):
+                step = _step(number)
+                waited, start = server.waited, time.perf_counter()
+                _show(server, mirror, step)
+                took = time.perf_counter() - start
+                whole.append(took)
+                ours.append(took - (server.waited - waited))
+            calls = sum(stand_in.calls().values()) / TICKS
+            stand_in.reset_calls()
+            peer = _peer(address, TICKS)
+            peer_calls = sum(stand_in.calls().values()) / TICKS
+    mine, own, theirs = (statistics.median(times) * 1e3 for times in (whole, ours, peer))
+    print(f"{VEHICLES} vehicles, {WALKERS} pedestrians; medians of {TICKS} ticks")
+    print(f"own share {own:.2f} ms (95th percentile {np.percentile(ours, 95) * 1e3:.2f} ms)")
+    print(f"whole tick with the stand-in {mine:.1f} ms, {calls:.1f} RPCs")
+    print(f"a call per actor: {theirs:.1f} ms, {peer_calls:.1f} RPCs")
+    print(f"ratio of whole ticks {mine / theirs:.2f}")
+
+
+def _show(server: Server, mirror: Mirror, step: Step) -> None:
+    for batch in mirror.batches(step, 1):
+        mirror.answered(server.apply(batch))
+
+
+def _peer(address: Address, ticks: int) -> list[float]:
+    carla = import_carla()
+    client = carla.Client(address.host, address.port)
+    client.set_timeout(10.0)
+    world = client.get_world()
+    world.tick()
+    actors: dict[int, Any] = {}
+    for actor in world.get_actors():
+        role = actor.attributes.get("role_name", "")
+        if role.startswith(ROLE):
+            actors[int(role.removeprefix(ROLE + "a"))] = actor
+    times = []
+    for number in range(ticks):
+        step = _step(number)
+        start = time.perf_counter()
+        for row in step.index.tolist():
+            at = carla.Transform(
+                carla.Location(step.x[row], -step.y[row], 0.0),
+                carla.Rotation(0.0, -np.degrees(step.hdg[row]), 0.0),
+            )
+            actors[row].set_transform(at)
+            actors[row].set_target_velocity(carla.Vector3D(step.speed[row], 0.0, 0.0))
+        world.tick()
+        times.append(time.perf_counter() - start)
+    return times
+
+
+def _plan() -> Plan:
+    kinds = ("car", "van", "truck", "bus", "motorcycle", "bicycle")
+    actors = [
+        PlannedActor(
+            f"a{row}",
+            kinds[row % len(kinds)] if row < VEHICLES else "pedestrian",
+            "", None, 0.0, 4.5, 1.8, 0.0, 0.0, 0.0, 0.0,
+        )
+        for row in range(VEHICLES + WALKERS)
+    ]  # fmt: skip
+    return Plan("bench", 0, 60.0, DELTA, (0.0, 0.0), tuple(actors))
+
+
+def _step(number: int) -> Step:
+    """Everybody on a grid of 20 m, circling; brake lights come and go."""
+    count = VEHICLES + WALKERS
+    row = np.arange(count)
+    turn = 0.02 * number + row
+    return Step(
+        time=number * DELTA,
+        index=row,
+        x=20.0 * (row % 20) + 2.0 * np.cos(turn),
+        y=20.0 * (row // 20) + 2.0 * np.sin(turn),
+        z=np.zeros(count),
+        hdg=np.mod(turn, 2 * np.pi) - np.pi,
+        pitch=np.zeros(count),
+        speed=np.full(count, 1.5),
+        signals=np.where((row + number) % 10 == 0, 8, 0),
+    )
+
+
+if __name__ == "__main__":
+    main()
