@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +159,17 @@ def test_a_server_that_dies_is_told_in_words_and_what_was_told_is_kept(
     assert pl.read_parquet(told["files"]["trajectories"]).height > 100
 
 
+def test_what_a_crashed_traffic_manager_leaves_is_taken_away(options: Any, sample: Sample) -> None:
+    """It ends its process when the server stands still for longer than the time limit."""
+    path = sample(CROSSING, seed=5)
+    with StandIn(CROSSING, freeze_at_tick=60, freeze_seconds=4.0) as server:
+        code, told, _ = run(path, *options(server), "--until", 60, "--timeout", 2)
+        assert left(server) == []
+    assert code == 3
+    assert told["status"] == "failed"
+    assert not [note for note in told["carla"]["notes"] if "taken back" in note]
+
+
 def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING, refuse_spawn_every=3) as server:
@@ -164,3 +177,25 @@ def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> No
     assert code == 0
     assert told["actors"]["inserted"] == told["actors"]["planned"]
     assert told["figures"]["depart_delay_max"] > 0.0
+
+
+def test_ctrl_c_keeps_what_there_is_and_gives_the_server_back(options: Any, sample: Sample) -> None:
+    path = sample(CROSSING, seed=5)
+    with StandIn(CROSSING) as server:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "odscen", "cosim", path, *map(str, options(server)),
+             "--native", "--json"],
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        deadline = time.monotonic() + 60.0
+        while not left(server):
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+        assert left(server) == []
+    told = json.loads(out)
+    assert process.returncode == 130
+    assert told["carla"]["interrupted"]
+    assert told["stopped"]
+    assert told["actors"]["inserted"] > 0

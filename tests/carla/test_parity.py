@@ -10,7 +10,6 @@ import pytest
 
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
-from odscen.carla.server import Server
 from odscen.catalog.store import Workspace
 from odscen.sumo.in_step import Step
 from tests.carla.conftest import MAPS, Sample
@@ -32,11 +31,11 @@ def test_what_somebody_else_does_to_the_mirror_is_in_the_comparison(
         client = carla.Client(standin.host, standin.port)
         client.set_timeout(5.0)
 
+        light = next(iter(client.get_world().get_actors().filter("traffic.traffic_light*")))
+
         def interfere(step: Step) -> bool:
             """After this step, switch a light; the mirror sets only those that change."""
             if step.time == MOVED:
-                world = client.get_world()
-                light = next(iter(world.get_actors().filter("traffic.traffic_light*")))
                 state, other = light.get_state(), carla.TrafficLightState
                 light.set_state(other.Red if state != other.Red else other.Green)
             return True
@@ -44,8 +43,6 @@ def test_what_somebody_else_does_to_the_mirror_is_in_the_comparison(
         options = CosimOptions(address=address, on_step=interfere)
         result, report = cosim(workspace, path, options, out=tmp_path, until=6.0)
         assert report.error is None
-        with Server(address):
-            pass
     folder = result.folder
     figures = json.loads((folder / "parity.json").read_text(encoding="utf-8"))
     assert figures["share_mirrored"] == 1.0

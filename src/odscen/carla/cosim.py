@@ -194,7 +194,7 @@ def cosim(
     sky = weather_parameters(scenario.environment, assets)
     report = CosimReport(str(options.address))
     with (
-        _interrupts() as interrupted,
+        interrupts() as interrupted,
         Server(options.address) as server,
         ExitStack() as stack,
     ):
@@ -374,7 +374,7 @@ class _Show:
 
 
 @contextmanager
-def _interrupts() -> Iterator[threading.Event]:
+def interrupts() -> Iterator[threading.Event]:
     """Let Ctrl-C and SIGTERM end a run between two steps; a second Ctrl-C ends it at once.
 
     Everything is still given back then. Outside the main thread nothing can be caught.

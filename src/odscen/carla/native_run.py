@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -17,12 +19,14 @@ import numpy as np
 from odscen import workflow
 from odscen.carla.camera import first_view
 from odscen.carla.client import Address
+from odscen.carla.cosim import interrupts
 from odscen.carla.environment import weather_parameters
 from odscen.carla.native import native_actors
 from odscen.carla.native_worker import NativeJob, Note, Shot, Tick, work
 from odscen.carla.pictures import Wish
+from odscen.carla.server import Server
 from odscen.catalog.assets import shipped_assets
-from odscen.errors import in_file
+from odscen.errors import CarlaError, in_file
 from odscen.frames import XodrPose, xodr_to_sumo
 from odscen.results.records import Event, EventKind, events_to_json
 from odscen.results.summary import actor_outcomes, actors_to_json
@@ -74,6 +78,14 @@ class NativeOptions:
     on_picture: Callable[[bytes], None] | None = None
 
 
+@dataclass(slots=True)
+class NativeReport:
+    """What is to be known of a run besides its folder: notes in words, and whether it was ended."""
+
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
 def run_native(
     workspace: Workspace,
     path: Path,
@@ -84,8 +96,10 @@ def run_native(
     until: float | None = None,
     weather: bool = True,
     progress: OnProgress | None = None,
-) -> tuple[RunResult, list[str]]:
-    """Let CARLA's Traffic Manager and walkers run a scenario; the run, and notes on it in words.
+) -> tuple[RunResult, NativeReport]:
+    """Let CARLA's Traffic Manager and walkers run a scenario.
+
+    Ctrl-C ends it between two ticks, and what it did so far is kept.
 
     Raises
     ------
@@ -105,7 +119,7 @@ def run_native(
         scenario, loaded.sumo, entry.path("net"), assets, seed=seed, until=until, weather=weather
     )
     plan = prepared.plan
-    notes: list[str] = []
+    report = NativeReport()
 
     def simulate(folder: Path) -> Ended:
         job = NativeJob(
@@ -123,7 +137,11 @@ def run_native(
             pictures=options.pictures,
             watched=options.on_picture is not None,
         )
-        return _Follower(job, folder, notes, progress, options.on_picture).run()
+        with interrupts() as interrupted:
+            follower = _Follower(job, folder, report, progress, options.on_picture)
+            ended = follower.run(interrupted)
+            report.interrupted = interrupted.is_set()
+        return ended
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         write_report(folder, summary, drawing=loaded.drawing)
@@ -144,7 +162,7 @@ def run_native(
         finish=finish,
         simulate=simulate,
     )
-    return result, notes
+    return result, report
 
 
 class _Follower:
@@ -154,20 +172,21 @@ class _Follower:
         self,
         job: NativeJob,
         folder: Path,
-        notes: list[str],
+        report: NativeReport,
         progress: OnProgress | None,
         on_picture: Callable[[bytes], None] | None,
     ) -> None:
         self._job = job
         self._folder = folder
-        self._notes = notes
+        self._notes = report.notes
         self._progress = progress
         self._on_picture = on_picture
         self._events: list[Event] = []
         self._times: list[float] = []
         self._rows: list[np.ndarray] = []
+        self._own: tuple[int, ...] = ()
 
-    def run(self) -> Ended:
+    def run(self, interrupted: threading.Event) -> Ended:
         """Run the worker to its end, whatever that is; what it told until then is written."""
         start = time.perf_counter()
         context = multiprocessing.get_context("spawn")
@@ -176,13 +195,15 @@ class _Follower:
         process.start()
         there.close()
         try:
-            last = self._follow(here)
+            last = self._follow(here, interrupted)
         finally:
             here.close()  # the worker sees that, and gives the server back
             process.join(GRACE)
             if process.is_alive():
                 process.kill()
                 process.join()
+        if last is None and self._own:
+            self._clear_up()
         self._write()
         seconds = time.perf_counter() - start
         if isinstance(last, Done):
@@ -191,13 +212,17 @@ class _Follower:
             return Ended(None, seconds, last.reason)
         return Ended(None, seconds, self._crash(process.exitcode or 0))
 
-    def _follow(self, pipe: Connection) -> Done | Failed | None:
+    def _follow(self, pipe: Connection, interrupted: threading.Event) -> Done | Failed | None:
         last: Done | Failed | None = None
+        asked = False
         while True:
             try:
                 told: Told = pipe.recv()
             except EOFError:
                 return last
+            if interrupted.is_set() and not asked:
+                asked = True
+                pipe.send("stop")
             if isinstance(told, Done | Failed):
                 last = told
             elif isinstance(told, Note):
@@ -209,6 +234,7 @@ class _Follower:
                 self._take(told)
 
     def _take(self, tick: Tick) -> None:
+        self._own = tick.own
         self._events += tick.events
         self._notes += tick.notes
         self._times.append(tick.time)
@@ -221,6 +247,18 @@ class _Follower:
             self._progress(
                 Progress(tick.time, plan.until, tick.running, departed, arrived, planned)
             )
+
+    def _clear_up(self) -> None:
+        """Take away what a worker that has died has left, if its server answers in time."""
+        deadline = time.monotonic() + GRACE
+        while self._job.address.listens() and time.monotonic() < deadline:
+            with suppress(CarlaError), Server(self._job.address) as server:
+                server.inherit(self._own)
+                return
+        self._notes.append(
+            f"the CARLA server at {self._job.address} did not answer any more: what was made "
+            "there, if it still runs, could not be taken back"
+        )
 
     def _crash(self, code: int) -> str:
         """Say what an exit code means: the Traffic Manager aborts when it meets an error."""

@@ -82,13 +82,17 @@ class NativeJob:
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What a tick has brought; rows as :meth:`odscen.carla.traffic.Traffic.rows`."""
+    """What a tick has brought; rows as :meth:`odscen.carla.traffic.Traffic.rows`.
+
+    ``own`` are the actors that would be left on the server if this process ended now.
+    """
 
     time: float
     rows: np.ndarray
     events: tuple[Event, ...]
     notes: tuple[str, ...]
     running: int
+    own: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +171,7 @@ def _steps(
         happened = traffic.step(now, job.delta)
         rows = traffic.rows(job.delta)
         events, notes = tuple(happened.events), tuple(happened.notes)
-        tell(Tick(now, rows, events, notes, traffic.running))
+        tell(Tick(now, rows, events, notes, traffic.running, traffic.own))
         if camera is not None and ego is not None:
             for row in rows[rows[:, 0] == ego]:
                 camera.follow(row[1], row[2], row[3])

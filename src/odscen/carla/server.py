@@ -153,6 +153,20 @@ class Server:
         """The ``carla.World``; its calls raise plain ``RuntimeError``."""
         return self._world
 
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Actors that have been made and not yet been taken away."""
+        return tuple(sorted(self._own))
+
+    def inherit(self, actors: Sequence[int]) -> None:
+        """Take over from a process that has died: its actors, and a world that waits for ticks.
+
+        At the end they are gone, and the world's time goes on by itself.
+        """
+        self._own |= set(actors)
+        self._settings.synchronous_mode = False
+        self._settings.fixed_delta_seconds = None
+
     def spawn(self, commands: Sequence[Any]) -> list[int | str]:
         """Make actors in one call; the id of each, or why there is none. No tick is made."""
         if not commands:

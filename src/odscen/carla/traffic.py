@@ -136,6 +136,11 @@ class Traffic:
         """How many are on the road."""
         return len(self._underway)
 
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Actors that have been made on the server."""
+        return self._server.own
+
     def refusals(self) -> dict[str, str]:
         """Why the server would not take somebody, by id; of those who never came."""
         return {

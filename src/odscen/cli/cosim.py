@@ -163,11 +163,12 @@ def _run_native(
     workspace: Path | None,
     as_json: bool,
 ) -> NoReturn:
+    from odscen.carla.cosim import INTERRUPTED
     from odscen.carla.native_run import run_native
     from odscen.catalog.store import Workspace
 
     with progress("driving in CARLA") as step:
-        result, notes = run_native(
+        result, report = run_native(
             Workspace.open(workspace),
             scenario,
             options,
@@ -180,17 +181,20 @@ def _run_native(
             ),
         )
     if as_json:
-        print_json({**result.to_dict(), "carla": {"notes": notes}})
+        print_json({**result.to_dict(), "carla": asdict(report)})
     else:
         keys = ("planned", "inserted", "arrived", "running")
         counts = result.summary["actors"]
         row = (result.folder.name, result.status, *(counts[key] for key in keys))
         print_table("", ("run", "status", *keys), [row])
-    for words in (*notes, result.summary["error"]):
+    for words in (*report.notes, result.summary["error"]):
         if words:
             log(words)
+    if report.interrupted:
+        log("Interrupted; what CARLA did so far is kept.")
     log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
-    raise typer.Exit(result.exit_code)
+    failed = result.status == "failed"
+    raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
 
 
 def _exit_code(result: RunResult, report: CosimReport) -> int:
