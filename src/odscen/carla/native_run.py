@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -38,6 +37,7 @@ from odscen.sumo.progress import Done, Failed, Progress
 from odscen.sumo.runner import run_prepared
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Callable, Mapping
     from multiprocessing.connection import Connection
     from pathlib import Path
@@ -218,11 +218,12 @@ class _Follower:
         while True:
             try:
                 told: Told = pipe.recv()
-            except EOFError:
+            except (EOFError, ConnectionResetError):
                 return last
             if interrupted.is_set() and not asked:
                 asked = True
-                pipe.send("stop")
+                with suppress(OSError):  # it has just ended
+                    pipe.send("stop")
             if isinstance(told, Done | Failed):
                 last = told
             elif isinstance(told, Note):

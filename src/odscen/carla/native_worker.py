@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -122,9 +122,17 @@ def work(job: NativeJob, pipe: Connection) -> None:
         with sending:
             pipe.send(told)
 
+    def asked() -> bool:
+        """Whether this is to end. Takes what was said: unread, it would cut off our last words."""
+        if not pipe.poll():
+            return False
+        with suppress(EOFError):  # whoever listened is gone
+            pipe.recv()
+        return True
+
     with captured_output(job.log):
         try:
-            tell(_run(job, tell, pipe.poll))
+            tell(_run(job, tell, asked))
         except OdscenError as error:
             tell(Failed(str(error)))
         except RuntimeError as error:  # the client's own, met outside of our door
