@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.carla.batch import Batch, Place, Spawn, Velocity
+from odscen.carla.batch import Batch, Move, Place, Shine, Spawn, Velocity
 from odscen.carla.client import Address, connect
 from odscen.carla.maps import ensure_map, same_map
 from odscen.carla.server import Server
@@ -76,6 +76,19 @@ def test_a_time_step_that_was_never_set_is_not_restored_as_a_number() -> None:
         with Server(address_of(stand_in)) as server:
             server.synchronize(0.05)
         assert is_free_running(stand_in)
+
+
+def test_a_tick_is_two_calls_however_many_actors_there_are() -> None:
+    with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
+        server.synchronize(0.05)
+        made = server.apply(Batch(spawn=tuple(car(10.0 * number) for number in range(30))))
+        at = Place(0.0, 0.0, 0.0, 0.0, 90.0)
+        moves = [Move(int(actor), at, STILL, 0.0, False) for actor in made]
+        shines = [Shine(int(actor), 8) for actor in made]
+        for few in (1, 30):
+            stand_in.reset_calls()
+            server.apply(Batch(move=tuple(moves[:few]), shine=tuple(shines[:few])))
+            assert stand_in.calls() == {"apply_batch": 1, "tick_cue": 1}
 
 
 def test_what_others_spawned_is_left_alone() -> None:

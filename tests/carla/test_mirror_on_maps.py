@@ -50,6 +50,10 @@ class Oracle:
             roads.setdefault(table.lane_list[piece.sumo].id, set()).add(key)
         self.own = {lane: np.isin(road, sorted(names)) for lane, names in roads.items()}
 
+    def nearest(self, points: np.ndarray, x: float, y: float) -> int:
+        xy = self.xyz[points, :2]
+        return int(points[np.argmin(np.hypot(xy[:, 0] - x, xy[:, 1] - y))])
+
     def ground(
         self, lane: str, x: float, y: float, yaw: float
     ) -> tuple[float, float, float] | None:

@@ -264,17 +264,14 @@ class Server:
             self._own |= set(made.values())
             self.tick()
             for name, number in made.items():
-                shapes[name] = self._shape(number)
+                shapes[name] = self.shape(number)
             self._destroy(sorted(made.values()))
         return shapes
 
     def shape(self, actor: int) -> Shape:
         """Bounding box of an actor."""
         with self._answering():
-            return self._shape(actor)
-
-    def _shape(self, actor: int) -> Shape:
-        box = self._world.get_actor(actor).bounding_box
+            box = self._world.get_actor(actor).bounding_box
         return Shape(
             (box.extent.x, box.extent.y, box.extent.z),
             (box.location.x, box.location.y, box.location.z),
@@ -324,8 +321,7 @@ class Server:
 
     def speed(self, actor: int, at: Place) -> float:
         """m/s ahead of an actor that is at a place, 0 if it goes backwards."""
-        found = self._world.get_snapshot().find(actor)
-        velocity = found.get_velocity()
+        velocity = self._world.get_snapshot().find(actor).get_velocity()
         yaw = math.radians(at.yaw)
         return max(0.0, float(velocity.x * math.cos(yaw) + velocity.y * math.sin(yaw)))
 
