@@ -29,7 +29,8 @@ from tools import page as tool
 
 SHIPPED = "signal_crossing"
 STEP = 0.05
-CROWD_SECONDS = 60.0
+PACED_SECONDS = 60.0
+HURRIED_SECONDS = 20.0
 REPEATS = 3
 
 _PROBE = """
@@ -128,7 +129,7 @@ def usable(browser: Browser, url: str, name: str) -> None:
 def paced(browser: Browser, url: str, scenario: str) -> None:
     """Real time with a crowd, seen by a user who also pans the map."""
     with _user(browser, url) as user:
-        run = _start(url, scenario, speed=1)
+        run = _start(url, scenario, speed=1, until=PACED_SECONDS)
         user.page.goto(f"/#/run/{scenario}/{run}")
         user.page.wait_for_function("odscenProbe.frames.length > 20", timeout=120_000)
         for what, pan in (("still", False), ("panned all the time", True)):
@@ -172,10 +173,11 @@ def hurried(browser: Browser, url: str, scenario: str) -> None:
         for kind, values in times.items():
             with ExitStack() as stack:
                 user = stack.enter_context(_user(browser, url)) if kind == "watched" else None
-                run = _start(url, scenario, speed=None)
+                run = _start(url, scenario, speed=None, until=HURRIED_SECONDS)
                 if kind == "never read":
                     live = f"{url.replace('http', 'ws')}/api/runs/{run}/live"
-                    stack.enter_context(connect(live, max_queue=1, close_timeout=0.1))
+                    never = connect(live, max_queue=1, close_timeout=0.1, ping_interval=None)
+                    stack.enter_context(never)
                 if user:
                     user.page.goto(f"/#/run/{scenario}/{run}")
                 values.append(_duration(url, run))
@@ -183,13 +185,13 @@ def hurried(browser: Browser, url: str, scenario: str) -> None:
     for kind, values in times.items():
         ratios = [a / b for a, b in zip(values, times["unwatched"], strict=True)]
         print(
-            f"{CROWD_SECONDS:g} s with a crowd, {kind}: {statistics.median(values):.2f} s, "
+            f"{HURRIED_SECONDS:g} s with a crowd, {kind}: {statistics.median(values):.2f} s, "
             f"{statistics.median(ratios):.3f} of unwatched ({base:.2f} s; aim 1.10)"
         )
 
 
-def _start(url: str, scenario: str, *, speed: float | None) -> str:
-    wish = {"scenario": scenario, "speed": speed, "step_length": STEP, "until": CROWD_SECONDS}
+def _start(url: str, scenario: str, *, speed: float | None, until: float) -> str:
+    wish = {"scenario": scenario, "speed": speed, "step_length": STEP, "until": until}
     answer = httpx2.post(f"{url}/api/runs", json=wish, timeout=60)
     answer.raise_for_status()
     return str(answer.json()["run"])

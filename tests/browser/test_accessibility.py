@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import ARTEFACTS, CROSSING
-from tests.browser.pages import OdscenPage, settle
+from tests.browser.pages import FAILED, OdscenPage, settle
 from tools import page as tool
 
 AXE = tool.ROOT / "frontend/node_modules/axe-core/axe.min.js"
@@ -94,7 +94,7 @@ def test_the_first_screen(
 def test_the_catalogue(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_catalogue()
-    expect(user.page.get_by_role("link", name=sampled)).to_be_visible()
+    expect(user.page.get_by_role("link", name=sampled, exact=True)).to_be_visible()
     inspector.look("catalogue")
     user.remove(CROSSING).click()
     expect(user.page.get_by_role("dialog")).to_be_visible()
@@ -178,5 +178,5 @@ def test_a_failed_run(visit: Callable[..., Any], served: tool.Served, sampled: s
     user.wait_until_moving()
     for child in set(server.children(recursive=True)) - before:
         child.kill()
-    expect(user.result).to_contain_text("failed")
+    expect(user.result).to_contain_text(FAILED)
     inspector.look("run-failed")

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.conftest import CROSSING
-from tests.browser.pages import OdscenPage
+from tests.browser.pages import OdscenPage, settle
 from tools.page import Served
 
 
@@ -187,6 +187,7 @@ def test_a_stream_of_traffic_is_placed_and_undone(region: OdscenPage) -> None:
 def test_a_random_crowd_fills_the_region_in_one_step(region: OdscenPage) -> None:
     region.step("Road users").click()
     region.page.get_by_role("button", name="Fill the region at random").click()
+    settle(region.page)
     button = region.page.get_by_role("button", name="Fill the region", exact=True)
     with region.changing():
         button.click()

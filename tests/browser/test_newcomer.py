@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.conftest import PATIENCE
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 
@@ -29,7 +30,8 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
     user.open_catalogue()
     expect(user.maps).to_have_count(0)
     user.add_shipped.click()
-    expect(user.maps).to_have_count(len(list((tool.ROOT / "maps").glob("*.xodr"))))
+    shipped = len(list((tool.ROOT / "maps").glob("*.xodr")))
+    expect(user.maps).to_have_count(shipped, timeout=6 * PATIENCE)
 
     user.new_scenario("signal_crossing").click()
     user.wait_for_editor()

@@ -8,7 +8,7 @@ from itertools import pairwise
 import psutil
 from playwright.sync_api import expect
 
-from tests.browser.pages import OdscenPage
+from tests.browser.pages import FAILED, OdscenPage
 from tools.page import Served
 
 
@@ -72,7 +72,7 @@ def test_a_run_that_crashes_says_so_and_harms_no_other(
         child for child in set(server.children(recursive=True)) - workers if not child.children()
     }
     crashing.kill()
-    expect(other.result).to_contain_text("failed")
+    expect(other.result).to_contain_text(FAILED)
     expect(user.result).to_have_count(0)
     shown, clock = user.time(), user.figure("Time").first.inner_text()
     expect(user.figure("Time").first).not_to_have_text(clock)

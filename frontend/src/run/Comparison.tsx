@@ -27,7 +27,7 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
     <>
       <Title order={3} size="h5">Compared with the last run</Title>
       <Text size="sm" mt={4}>
-        <Anchor href={hashOf({ view: "run", scenario, run: last.info.run })}>{last.info.finished ? when(last.info.finished) : last.info.run}</Anchor>.{" "}
+        <Anchor underline="always" href={hashOf({ view: "run", scenario, run: last.info.run })}>{last.info.finished ? when(last.info.finished) : last.info.run}</Anchor>.{" "}
         {last.changed ? "The scenario was changed in between." : "The scenario is the same."}
       </Text>
       <Table mt="xs" verticalSpacing={4} fz={13} aria-label="Compared with the last run">

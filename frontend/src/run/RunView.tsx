@@ -1,6 +1,6 @@
 import "./run.css";
 
-import { Alert, Button, Loader, Tabs } from "@mantine/core";
+import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import type { Category } from "../api/types";
@@ -81,7 +81,8 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   if (wrong) {
     return (
       <div className="catalogue">
-        <Alert color="red" title="This run cannot be shown">{wrong}</Alert>
+        <Title order={1} size="h3" mb="sm">This run cannot be shown</Title>
+        <Alert color="red">{wrong}</Alert>
         <Button mt="md" onClick={back}>Back to the editor</Button>
       </div>
     );
@@ -129,7 +130,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
         </aside>
       </div>
       {ended && mode !== null
-        ? <ReplayStrip player={player} running={now.running} incidents={incidents} onBack={back} onPlay={() => { setMode("replay"); player.play(); }} />
+        ? <ReplayStrip player={player} recorded={replayable} running={now.running} incidents={incidents} onBack={back} onPlay={() => { setMode("replay"); player.play(); }} />
         : <LiveStrip info={info} now={now} onBack={back} learn={learn} />}
     </div>
   );

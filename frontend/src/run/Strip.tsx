@@ -46,8 +46,11 @@ export function LiveStrip({ info, now, onBack, learn }: {
 }
 
 /** Plays a recording: a slider over its time, with what went wrong marked above it. */
-export function ReplayStrip({ player, running, incidents, onBack, onPlay }: {
-  player: Player; running: number; incidents: readonly Incident[]; onBack: () => void;
+export function ReplayStrip({ player, recorded, running, incidents, onBack, onPlay }: {
+  player: Player;
+  /** Whether the run left a recording. */
+  recorded: boolean;
+  running: number; incidents: readonly Incident[]; onBack: () => void;
   /** Also the first time, when there is nothing to play yet. */
   onPlay: () => void;
 }) {
@@ -59,7 +62,7 @@ export function ReplayStrip({ player, running, incidents, onBack, onPlay }: {
       <Group gap={6} role="group" aria-label="Control the recording">
         {playing && replay
           ? <Button leftSection={<IconPause />} onClick={player.pause}>Pause</Button>
-          : <Button leftSection={<IconPlay />} onClick={onPlay} loading={player.loading} disabled={player.error !== null}>{replay ? "Play" : "Watch again"}</Button>}
+          : <Button leftSection={<IconPlay />} onClick={onPlay} loading={player.loading} disabled={!recorded || player.error !== null}>{replay ? "Play" : "Watch again"}</Button>}
         <SpeedChoice speeds={REPLAY_SPEEDS} speed={player.speed} onChange={(speed) => player.setSpeed(speed ?? 1)} />
       </Group>
       {replay ? (
@@ -72,7 +75,7 @@ export function ReplayStrip({ player, running, incidents, onBack, onPlay }: {
           <input type="range" aria-label="Moment of the run" min={begin} max={end} step={Math.min(STEP, (end - begin) / 2 || STEP)} value={time}
             aria-valuetext={`${clock(time)} of ${clock(end)}`} onChange={(event) => { player.pause(); player.seek(Number(event.currentTarget.value)); }} />
         </div>
-      ) : <Text size="sm" className="time-line" c="dimmed">{player.error ? "There is no recording of this run." : player.loading ? "Fetching the recording …" : "The run is over."}</Text>}
+      ) : <Text size="sm" className="time-line" c="dimmed">{!recorded || player.error ? "There is no recording of this run." : player.loading ? "Fetching the recording …" : "The run is over."}</Text>}
       {replay && <Shown label={`of ${clock(end)}`} value={clock(time)} />}
       {replay && <Shown label="On the road" value={String(running)} />}
     </div>

@@ -25,7 +25,8 @@ export function useRun(run: string): Run {
   const [info, setInfo] = useState<RunInfo | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const ended = info !== null && hasEnded(info.state);
-  const complete = ended && (info.summary != null || info.state === "failed");
+  // The live picture may tell of the end before its results, or its reason, are there.
+  const complete = ended && (info.summary != null || info.error != null);
   useEffect(() => {
     if (complete) return;
     let current = true;
