@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+import psutil
 import pytest
 
 from odscen import workflow
@@ -79,6 +80,18 @@ def run(*arguments: object) -> tuple[int, dict[str, Any], str]:
         timeout=150,
     )
     return done.returncode, json.loads(done.stdout), done.stderr
+
+
+def start(*arguments: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "odscen", "cosim", *map(str, arguments)]
+    return subprocess.Popen([*command, "--native", "--json"], stdout=subprocess.PIPE, text=True)
+
+
+def wait_for_actors(server: StandIn) -> None:
+    deadline = time.monotonic() + 60.0
+    while len(left(server)) < 10:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
 
 
 def left(server: StandIn) -> list[str]:
@@ -159,10 +172,12 @@ def test_a_server_that_dies_is_told_in_words_and_what_was_told_is_kept(
     assert pl.read_parquet(told["files"]["trajectories"]).height > 100
 
 
-def test_what_a_crashed_traffic_manager_leaves_is_taken_away(options: Any, sample: Sample) -> None:
-    """It ends its process when the server stands still for longer than the time limit."""
+def test_a_server_that_stands_still_too_long_ends_the_run_and_is_given_back(
+    options: Any, sample: Sample
+) -> None:
+    """The Traffic Manager or the tick ends it, whichever waits just then: by crash or by word."""
     path = sample(CROSSING, seed=5)
-    with StandIn(CROSSING, freeze_at_tick=60, freeze_seconds=4.0) as server:
+    with StandIn(CROSSING, freeze_at_tick=60, freeze_seconds=8.0) as server:
         code, told, _ = run(path, *options(server), "--until", 60, "--timeout", 2)
         assert left(server) == []
     assert code == 3
@@ -179,18 +194,26 @@ def test_a_spawn_that_is_refused_comes_later(options: Any, sample: Sample) -> No
     assert told["figures"]["depart_delay_max"] > 0.0
 
 
+def test_what_a_crashed_traffic_manager_leaves_is_taken_away(options: Any, sample: Sample) -> None:
+    path = sample(CROSSING, seed=5)
+    with StandIn(CROSSING) as server:
+        process = start(path, *options(server))
+        wait_for_actors(server)
+        children = psutil.Process(process.pid).children()
+        [worker] = [one for one in children if "spawn_main" in " ".join(one.cmdline())]
+        worker.send_signal(signal.SIGABRT)
+        out, _ = process.communicate(timeout=60)
+        assert left(server) == []
+    told = json.loads(out)
+    assert process.returncode == 3
+    assert "Traffic Manager has given up" in told["error"]
+
+
 def test_ctrl_c_keeps_what_there_is_and_gives_the_server_back(options: Any, sample: Sample) -> None:
     path = sample(CROSSING, seed=5)
     with StandIn(CROSSING) as server:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "odscen", "cosim", path, *map(str, options(server)),
-             "--native", "--json"],
-            stdout=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        deadline = time.monotonic() + 60.0
-        while not left(server):
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
+        process = start(path, *options(server))
+        wait_for_actors(server)
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=60)
         assert left(server) == []
