@@ -35,14 +35,14 @@ class Served:
 
 
 @contextmanager
-def served(workspace: Path) -> Iterator[Served]:
-    """``odscen serve`` as a process, on a free port of this machine."""
+def served(workspace: Path, *options: str) -> Iterator[Served]:
+    """``odscen serve`` as a process with more options, on a free port of this machine."""
     command = [sys.executable, "-m", "odscen", "serve", "--no-browser", "--port", "0"]
     log = workspace / "serve.log"
     with (
         log.open("w", encoding="utf-8") as told,
         subprocess.Popen(
-            [*command, "--workspace", str(workspace)], stderr=told, text=True
+            [*command, "--workspace", str(workspace), *options], stderr=told, text=True
         ) as process,
     ):
         try:

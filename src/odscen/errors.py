@@ -14,6 +14,7 @@
     `-- ToolError (3)               a program or library that we call failed, in its own words
         |-- SimulationError         SUMO: refused to start, died, or stopped early
         `-- CarlaError              a CARLA server that is not there, does not fit, or went away
+            `-- CarlaReleaseError   it is another release
 
 Messages read ``place: what is wrong``; a place is a file, then the path of the element in it.
 """
@@ -150,6 +151,10 @@ class SimulationError(ToolError):
 
 class CarlaError(ToolError):
     """A CARLA server is not there, does not fit, or went away; the message says what to do."""
+
+
+class CarlaReleaseError(CarlaError):
+    """A CARLA server of another release than the client that is installed."""
 
 
 @contextmanager

@@ -14,7 +14,9 @@ GROUND = (70, 70, 70, 255)
 """B, G, R, A."""
 BODY = {Kind.VEHICLE: (200, 120, 40, 255), Kind.WALKER: (40, 200, 240, 255)}
 _HEIGHT = 40.0
-"""Metres above the camera from which its picture is taken, with the camera's own field of view."""
+"""Metres above a level camera from which its picture is taken, with its own field of view."""
+_DOWN = -80.0
+"""Degrees of pitch below which a camera looks down, and its picture is taken from where it is."""
 
 
 def take(actor: Actor, bodies: Iterable[Actor], *, frame: int, elapsed: float) -> bytes:
@@ -24,9 +26,10 @@ def take(actor: Actor, bodies: Iterable[Actor], *, frame: int, elapsed: float) -
     fov = float(actor.attribute("fov"))
     pixels = np.empty((height, width, 4), dtype=np.uint8)
     pixels[:] = GROUND
-    per_metre = width / (2.0 * _HEIGHT * tan(radians(fov) / 2.0))
     for body in bodies:
-        _draw(pixels, actor, body, per_metre)
+        height_above = actor.at[2] - body.at[2] if actor.at[3] < _DOWN else _HEIGHT
+        if height_above > 0.0:
+            _draw(pixels, actor, body, width / (2.0 * height_above * tan(radians(fov) / 2.0)))
     return wire.image_message(
         frame=frame,
         elapsed=elapsed,

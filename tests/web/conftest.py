@@ -5,6 +5,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,15 +55,25 @@ def sampled(workspace: Workspace) -> str:
 @pytest.fixture
 def served(workspace: Workspace) -> Iterator[str]:
     """``host:port`` of a real server."""
+    with serving(workspace) as address:
+        yield address
+
+
+@contextmanager
+def serving(workspace: Workspace, **options: Any) -> Iterator[str]:
+    """``host:port`` of a real server with options of the application."""
     bound = socket.create_server(("127.0.0.1", 0))
-    config = uvicorn.Config(create_app(workspace), log_level="warning", ws="websockets-sansio")
+    app = create_app(workspace, **options)
+    config = uvicorn.Config(app, log_level="warning", ws="websockets-sansio")
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]})
     thread.start()
     wait_for(lambda: server.started)
-    yield f"127.0.0.1:{bound.getsockname()[1]}"
-    server.should_exit = True
-    thread.join(timeout=20)
+    try:
+        yield f"127.0.0.1:{bound.getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join(timeout=20)
     assert not thread.is_alive()
 
 

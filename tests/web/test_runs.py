@@ -18,6 +18,7 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
+from odscen.carla.client import Address
 from odscen.catalog.store import Workspace
 from odscen.errors import SimulationError
 from odscen.frames import SumoPose, sumo_to_xodr
@@ -268,7 +269,7 @@ def test_runs_of_one_scenario_are_found_after_a_restart_too(
     finished(client, other)
     second = start(client, sampled)
     finished(client, second)
-    again = runs.Runs(workspace)
+    again = runs.Runs(workspace, Address())
     try:
         assert [row.run for row in again.rows(scenario=sampled)] == [first, second]
         assert [row.run for row in again.rows(scenario=f"{sampled}-1")] == [other]

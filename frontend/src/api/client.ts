@@ -85,5 +85,6 @@ export const api = {
     `${BASE}/scenarios/${enc(name)}/download?form=${form}`,
   uploadScenario: (file: File) => upload<ScenarioState>("/scenarios/upload", file),
   /** At real speed: a person watches. */
-  startRun: (scenario: string) => send<{ run: string }>("POST", "/runs", { scenario, speed: 1 }),
+  startRun: (scenario: string, inCarla = false) =>
+    send<{ run: string }>("POST", "/runs", { scenario, speed: 1, carla: inCarla }),
 };

@@ -14,6 +14,8 @@ export interface RunInfo {
   error?: ApiErrorBody | string | null;
   /** Seconds since 1970; null until its results are written. */
   finished?: number | null;
+  /** Whether CARLA shows it too, and its camera can be watched. */
+  carla?: boolean;
 }
 
 export type Summary = Record<string, unknown>;

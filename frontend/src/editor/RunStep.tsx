@@ -1,6 +1,8 @@
 import { Button, Group, NumberInput, SegmentedControl, Text } from "@mantine/core";
+import { useState } from "react";
 
 import type { Edit, ScenarioDocument } from "../api/types";
+import { CarlaChoice } from "../carla/CarlaChoice";
 import { IconPlay } from "../ui/icons";
 
 const CONTROLS = [{ value: "fixed", label: "By the clock" }, { value: "actuated", label: "By the traffic" }];
@@ -8,8 +10,9 @@ const CONTROLS = [{ value: "fixed", label: "By the clock" }, { value: "actuated"
 /** How long it lasts, how the lights work, and the start. */
 export function RunStep({ document, lights, blocked, empty, busy, onEdit, onRun }: {
   document: ScenarioDocument; lights: boolean; blocked: boolean; empty: boolean; busy: boolean;
-  onEdit: (edit: Edit) => void; onRun: () => void;
+  onEdit: (edit: Edit) => void; onRun: (inCarla: boolean) => void;
 }) {
+  const [inCarla, setInCarla] = useState(false);
   const { simulation: { duration }, seed, signals: { control } } = document;
   return (
     <>
@@ -28,9 +31,10 @@ export function RunStep({ document, lights, blocked, empty, busy, onEdit, onRun 
             ? "Every light keeps its own times." : "A green lasts longer while vehicles still come."}</Text>
         </div>
       )}
+      <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
       {empty && <Text size="sm">Nobody is in the scenario yet. Place somebody in “Road users” first.</Text>}
       {blocked && <Text size="sm" c="red">Solve the problems listed below first.</Text>}
-      <Button size="md" leftSection={<IconPlay />} loading={busy} disabled={blocked || empty} onClick={onRun}>Run</Button>
+      <Button size="md" leftSection={<IconPlay />} loading={busy} disabled={blocked || empty} onClick={() => onRun(inCarla)}>Run</Button>
     </>
   );
 }

@@ -52,13 +52,13 @@ export function useWays(name: string, one: Actor | Flow | null, roiKey: string, 
 }
 
 /** Starts a run and leads to it. */
-export function useStarter(name: string): { busy: boolean; start: () => void } {
+export function useStarter(name: string): { busy: boolean; start: (inCarla: boolean) => void } {
   const [busy, setBusy] = useState(false);
   return {
     busy,
-    start: () => {
+    start: (inCarla) => {
       setBusy(true);
-      api.startRun(name).then(
+      api.startRun(name, inCarla).then(
         ({ run }) => go({ view: "run", scenario: name, run }),
         (error: unknown) => { setBusy(false); tellError(error); },
       );

@@ -2,7 +2,8 @@ import { Alert, Button, Group, Text, Title } from "@mantine/core";
 import { useState } from "react";
 
 import { api } from "../api/client";
-import { type RunInfo, runs } from "../api/runs";
+import { carla } from "../api/carla";
+import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/route";
 import { Comparison } from "./Comparison";
@@ -32,6 +33,7 @@ export function Result({ info, scenario, onBack }: { info: RunInfo; scenario: st
       <Group mt="md" mb="lg" gap="xs">
         <Button onClick={onBack}>Back to the editor</Button>
         {info.summary && !failed && <Button variant="default" component="a" href={runs.reportUrl(info.run)} target="_blank" rel="noreferrer">Full report</Button>}
+        {compared(info.summary) && <Button variant="default" component="a" href={carla.comparisonUrl(info.run)} target="_blank" rel="noreferrer">Compared with CARLA</Button>}
         <Button variant="default" loading={busy} onClick={again}>Run again</Button>
       </Group>
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
@@ -39,12 +41,17 @@ export function Result({ info, scenario, onBack }: { info: RunInfo; scenario: st
   );
 }
 
+const compared = (summary: Summary | null | undefined): boolean =>
+  typeof summary?.files === "object" && summary.files !== null && "parity" in summary.files;
+
 function Failure({ info }: { info: RunInfo }) {
   const words = typeof info.error === "string" ? info.error : info.error?.message;
   return (
     <>
       <Alert color="red" mt="sm" title="The simulation could not go on">
-        Your scenario is as it was, and other runs go on. Try to run it again; if it breaks off at the same time, remove the road users that came last.
+        Your scenario is as it was, and other runs go on. {info.carla
+          ? "See below what is wrong with CARLA, or run it without."
+          : "Try to run it again; if it breaks off at the same time, remove the road users that came last."}
       </Alert>
       <details className="words" style={{ marginTop: 12 }}>
         <summary>What the simulator said</summary>

@@ -4,6 +4,7 @@ import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import type { Category } from "../api/types";
+import { CameraPanel } from "../carla/CameraPanel";
 import { MapCanvas, type MapHandle } from "../map/MapCanvas";
 import { go } from "../ui/route";
 import { EarlierRuns } from "./EarlierRuns";
@@ -103,6 +104,7 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
             : <div className="empty"><Loader aria-label="Loading the map" /></div>}
         </div>
         <aside className="run-side" aria-label="About the run">
+          {info.carla && mode === "live" && <CameraPanel run={run} over={ended} />}
           <Tabs className="run-tabs" value={shownTab} onChange={(value) => setTab(value as Tab)} keepMounted={false}>
             <Tabs.List>
               {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.errors import CarlaError, InputError, MissingDependencyError
+from odscen.errors import CarlaError, CarlaReleaseError, InputError, MissingDependencyError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,7 +90,7 @@ def connect(address: Address) -> Connection:
             f"the CARLA server at {address} is release {theirs}, the package carla is {mine}: "
             f"start a server of release {mine}"
         )
-        raise CarlaError(problem)
+        raise CarlaReleaseError(problem)
     return Connection(package, client)
 
 

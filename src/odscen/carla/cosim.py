@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +13,15 @@ import numpy as np
 
 from odscen import workflow
 from odscen.carla.blueprints import choose_blueprints, size_differences
+from odscen.carla.camera import first_view, watch_from_above
 from odscen.carla.client import Address
 from odscen.carla.ego import ExternalEgo
 from odscen.carla.environment import vehicle_lights, weather_parameters
 from odscen.carla.maps import ensure_map
 from odscen.carla.mirror import Mirror
 from odscen.carla.nearby import Nearby
+from odscen.carla.pictures import Wish
+from odscen.carla.recorder import StateRecorder
 from odscen.carla.server import Server
 from odscen.carla.signals import Heads
 from odscen.catalog.assets import shipped_assets
@@ -33,7 +36,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
+    from odscen.carla.camera import Camera
     from odscen.catalog.store import Workspace
+    from odscen.results.records import Plan
     from odscen.sumo.in_step import Step
     from odscen.sumo.progress import OnProgress, Place
     from odscen.sumo.runner import PreparedRun, RunResult
@@ -61,6 +66,14 @@ class CosimOptions:
         Whether the ego is driven in CARLA, by whoever owns the actor with the role ``hero``.
     load_map
         Whether the server may be told to load the scenario's map.
+    parity
+        Whether both worlds are taken down and compared.
+    pictures
+        Files that a camera from above is to write.
+    on_picture
+        Called with each of its pictures as JPEG, in a thread of its own.
+    on_step
+        Called with each step when it has been shown; false ends the run.
     """
 
     address: Address = field(default_factory=Address)
@@ -68,6 +81,15 @@ class CosimOptions:
     nearby: Nearby = field(default_factory=Nearby)
     external_ego: bool = False
     load_map: bool = True
+    parity: bool = True
+    pictures: Wish = field(default_factory=Wish)
+    on_picture: Callable[[bytes], None] | None = None
+    on_step: Callable[[Step], bool] | None = None
+
+    def check(self) -> None:
+        """Refuse pictures that cannot be made before anything is begun."""
+        if self.pictures.any or self.on_picture:
+            self.pictures.check()
 
     def ticks(self, step_length: float) -> int:
         """How many ticks a step of SUMO's is.
@@ -152,6 +174,7 @@ def cosim(
     CarlaError
         If the server is not there or does not fit; nothing has run then.
     """
+    options.check()
     scenario = workflow.read_scenario(path)
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     with in_file(str(path)):
@@ -166,13 +189,15 @@ def cosim(
         until=until,
         step_length=step_length,
         weather=weather,
+        slice_length=None,
     )
     ticks = options.ticks(prepared.plan.step_length)
     sky = weather_parameters(scenario.environment, assets)
     report = CosimReport(str(options.address))
     with (
-        _interrupts() as interrupted,
+        interrupts() as interrupted,
         Server(options.address) as server,
+        ExitStack() as stack,
     ):
         xodr = entry.path("xodr").read_text(encoding="utf-8")
         report.map = ensure_map(server, entry.name, xodr, load=options.load_map)
@@ -198,9 +223,22 @@ def cosim(
             placed=ego.row if ego else None,
         )
         show.stop = in_step.stop
+        recorder = StateRecorder(prepared.plan, blueprints, shapes) if options.parity else None
+        if recorder is not None:
+            show.witnesses.append(lambda step: show.record(step, recorder))
+        if options.pictures.any or options.on_picture:
+            view = first_view(prepared.plan, options.pictures)
+            camera = stack.enter_context(
+                watch_from_above(server, view, options.pictures, options.on_picture)
+            )
+            show.witnesses.append(lambda step: _follow_ego(camera, prepared.plan, step))
+        if options.on_step is not None:
+            show.on_shown = options.on_step
 
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
             write_report(folder, summary, drawing=loaded.drawing)
+            if recorder is not None:
+                recorder.write(folder, loaded.drawing)
 
         result = run_prepared(
             prepared,
@@ -226,6 +264,11 @@ def _external_ego(
     return ExternalEgo.take(server, prepared.plan, row, blueprints[row])
 
 
+def _follow_ego(camera: Camera, plan: Plan, step: Step) -> None:
+    for k in np.flatnonzero(np.array([plan.actors[row].ego for row in step.index.tolist()])):
+        camera.follow(float(step.x[k]), float(step.y[k]), float(step.z[k]))
+
+
 class _Show:
     """What is done after each step of SUMO's."""
 
@@ -240,6 +283,8 @@ class _Show:
         interrupted: threading.Event,
     ) -> None:
         self.stop: Callable[[], None] = lambda: None
+        self.witnesses: list[Callable[[Step], None]] = []
+        self.on_shown: Callable[[Step], bool] = lambda _step: True
         self._server = server
         self._mirror = mirror
         self._heads = heads
@@ -262,11 +307,26 @@ class _Show:
             return None
         try:
             self._show(step)
+            for witness in self.witnesses:
+                witness(step)
+            if not self.on_shown(step):
+                self.stop()
+                return None
             return self._ego.driven(step) if self._ego else None
         except CarlaError as error:
             self._report.error = str(error)
             self.stop()
             return None
+
+    def record(self, step: Step, recorder: StateRecorder) -> None:
+        """Let a recorder take down a step that has just been shown."""
+        shown = self._server.light_states()
+        pairs = {
+            signal: (state, shown[self._joined[signal]])
+            for signal, state in self._states.items()
+            if signal in self._joined
+        }
+        recorder.take(step, self._server.world.get_snapshot(), self._mirror.actors, pairs)
 
     def conclude(self) -> None:
         """Fill in the rest of the report."""
@@ -315,7 +375,7 @@ class _Show:
 
 
 @contextmanager
-def _interrupts() -> Iterator[threading.Event]:
+def interrupts() -> Iterator[threading.Event]:
     """Let Ctrl-C and SIGTERM end a run between two steps; a second Ctrl-C ends it at once.
 
     Everything is still given back then. Outside the main thread nothing can be caught.

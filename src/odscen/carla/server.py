@@ -137,6 +137,56 @@ class Server:
             self._lights[actor].set_state(state)
         self._world.freeze_all_traffic_lights(frozen)
 
+    # ------------------------------------------------------------------------------- for others
+    @property
+    def package(self) -> Any:
+        """The package ``carla``, for values of its types."""
+        return self._carla
+
+    @property
+    def client(self) -> Any:
+        """The ``carla.Client``; its calls raise plain ``RuntimeError``."""
+        return self._client
+
+    @property
+    def world(self) -> Any:
+        """The ``carla.World``; its calls raise plain ``RuntimeError``."""
+        return self._world
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Actors that have been made and not yet been taken away."""
+        return tuple(sorted(self._own))
+
+    def inherit(self, actors: Sequence[int]) -> None:
+        """Take over from a process that has died: its actors, and a world that waits for ticks.
+
+        At the end they are gone, and the world's time goes on by itself.
+        """
+        self._own |= set(actors)
+        self._settings.synchronous_mode = False
+        self._settings.fixed_delta_seconds = None
+
+    def spawn(self, commands: Sequence[Any]) -> list[int | str]:
+        """Make actors in one call; the id of each, or why there is none. No tick is made."""
+        if not commands:
+            return []
+        with self._answering():
+            answers = [reply.error or int(reply.actor_id) for reply in self._apply(commands)]
+        self._own |= {answer for answer in answers if isinstance(answer, int)}
+        return answers
+
+    def send(self, commands: Sequence[Any]) -> None:
+        """Give commands in one call; no tick is made."""
+        if commands:
+            with self._answering():
+                self._apply(commands)
+
+    def destroy(self, actors: Sequence[int]) -> None:
+        """Destroy actors of ours in one call; those that are gone already do not matter."""
+        with self._answering():
+            self._destroy(actors)
+
     # ------------------------------------------------------------------------------- the map
     @property
     def map_name(self) -> str:
@@ -201,7 +251,7 @@ class Server:
         """Bounding boxes of blueprints, from one of each made aloft and taken away again."""
         wanted = sorted(set(names))
         commands = [
-            self._spawn_command(name, ROLE + "measure", (_APART * number, 0.0, _ALOFT))
+            self.spawn_command(name, ROLE + "measure", (_APART * number, 0.0, _ALOFT))
             for number, name in enumerate(wanted)
         ]
         shapes: dict[str, Shape] = {}
@@ -244,7 +294,7 @@ class Server:
             If the server refuses it.
         """
         with self._answering():
-            command = self._spawn_command(blueprint, role_name, at[:3], pitch=at.pitch, yaw=at.yaw)
+            command = self.spawn_command(blueprint, role_name, at[:3], pitch=at.pitch, yaw=at.yaw)
             answer = self._apply([command])[0]
             if answer.error:
                 msg = f"the CARLA server at {self.address} refused the {role_name}: {answer.error}"
@@ -286,6 +336,10 @@ class Server:
             self._world.freeze_all_traffic_lights(True)
             return {str(light.get_opendrive_id()): light.id for light in lights}
 
+    def light_states(self) -> dict[int, str]:
+        """State of each light taken, in the newest state of the server, by actor."""
+        return {number: str(light.get_state()) for number, light in self._lights.items()}
+
     # ------------------------------------------------------------------------------- ticks
     def apply(self, batch: Batch) -> list[int | str]:
         """Do all of a batch, in one call but for lights that change, and make the tick.
@@ -323,10 +377,10 @@ class Server:
             self.interruptions += 1
         self.waited += time.perf_counter() - start
 
-    def _apply(self, commands: list[Any]) -> list[Any]:
+    def _apply(self, commands: Sequence[Any]) -> list[Any]:
         self._unsure = True
         start = time.perf_counter()
-        responses = list(self._client.apply_batch_sync(commands, False))
+        responses = list(self._client.apply_batch_sync(list(commands), False))
         self.waited += time.perf_counter() - start
         self._unsure = False
         return responses
@@ -344,7 +398,7 @@ class Server:
         commands = [command.DestroyActor(actor) for actor in batch.destroy]
         for spawn in batch.spawn:
             x, y, z, pitch, yaw = spawn.at
-            made = self._spawn_command(
+            made = self.spawn_command(
                 spawn.blueprint, spawn.role_name, (x, y, z + spawn.lift), pitch=pitch, yaw=yaw
             )
             future, place = command.FutureActor, self._transform(spawn.at)
@@ -373,7 +427,7 @@ class Server:
         carla = self._carla
         return carla.Transform(carla.Location(x, y, z), carla.Rotation(pitch, yaw, 0.0))
 
-    def _spawn_command(
+    def spawn_command(
         self,
         name: str,
         role_name: str,
@@ -382,6 +436,7 @@ class Server:
         pitch: float = 0.0,
         yaw: float = 0.0,
     ) -> Any:
+        """Command that makes an actor of a blueprint; metres and degrees, CARLA's frame."""
         carla = self._carla
         blueprint = self._library.find(name)
         if blueprint.has_attribute("role_name"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -13,6 +13,7 @@ from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, prin
 
 if TYPE_CHECKING:
     from odscen.carla.cosim import CosimReport
+    from odscen.carla.native_run import NativeOptions
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunResult
 
@@ -65,6 +66,28 @@ def cosim(
     timeout: Annotated[
         float, typer.Option(min=0.5, help="Seconds that the server may take to answer.")
     ] = 10.0,
+    native: Annotated[
+        bool,
+        typer.Option(
+            "--native", help="Let CARLA's Traffic Manager and walkers drive, without SUMO."
+        ),
+    ] = False,
+    physics: Annotated[
+        bool,
+        typer.Option("--physics/--no-physics", help="Whether vehicles have physics with --native."),
+    ] = True,
+    frames: Annotated[
+        Path | None, typer.Option(help="Folder for pictures from above, as PNG files.")
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(help="Film from above: a file ending in .mp4, .mkv or .webm.")
+    ] = None,
+    picture_rate: Annotated[
+        float, typer.Option(min=0.1, max=60, help="Pictures per simulated second.")
+    ] = 10.0,
+    parity: Annotated[
+        bool, typer.Option("--parity/--no-parity", help="Compare both worlds, step by step.")
+    ] = True,
     weather: Annotated[
         bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
     ] = True,
@@ -78,7 +101,9 @@ def cosim(
     from odscen.carla.client import Address
     from odscen.carla.cosim import CosimOptions
     from odscen.carla.cosim import cosim as run_cosim
+    from odscen.carla.native_run import NativeOptions
     from odscen.carla.nearby import Nearby
+    from odscen.carla.pictures import Wish
     from odscen.catalog.store import Workspace
 
     options = CosimOptions(
@@ -87,7 +112,26 @@ def cosim(
         nearby=Nearby(radius, most),
         external_ego=ego is Ego.EXTERNAL,
         load_map=load_map,
+        parity=parity,
+        pictures=Wish(frames, video, picture_rate),
     )
+    if native:
+        _run_native(
+            scenario,
+            NativeOptions(
+                address=options.address,
+                tick=tick,
+                load_map=load_map,
+                physics=physics,
+                pictures=options.pictures,
+            ),
+            out=out,
+            seed=seed,
+            until=until,
+            weather=weather,
+            workspace=workspace,
+            as_json=as_json,
+        )
     with progress("mirroring") as step:
 
         def follow(message: Progress) -> None:
@@ -106,6 +150,51 @@ def cosim(
         )
     _show(result, report, as_json=as_json)
     raise typer.Exit(_exit_code(result, report))
+
+
+def _run_native(
+    scenario: Path,
+    options: NativeOptions,
+    *,
+    out: Path | None,
+    seed: int | None,
+    until: float | None,
+    weather: bool,
+    workspace: Path | None,
+    as_json: bool,
+) -> NoReturn:
+    from odscen.carla.cosim import INTERRUPTED
+    from odscen.carla.native_run import run_native
+    from odscen.catalog.store import Workspace
+
+    with progress("driving in CARLA") as step:
+        result, report = run_native(
+            Workspace.open(workspace),
+            scenario,
+            options,
+            out=out,
+            seed=seed,
+            until=until,
+            weather=weather,
+            progress=lambda message: step(
+                f"{message.time:.0f} s, {message.running} on the road", message.share
+            ),
+        )
+    if as_json:
+        print_json({**result.to_dict(), "carla": asdict(report)})
+    else:
+        keys = ("planned", "inserted", "arrived", "running")
+        counts = result.summary["actors"]
+        row = (result.folder.name, result.status, *(counts[key] for key in keys))
+        print_table("", ("run", "status", *keys), [row])
+    for words in (*report.notes, result.summary["error"]):
+        if words:
+            log(words)
+    if report.interrupted:
+        log("Interrupted; what CARLA did so far is kept.")
+    log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
+    failed = result.status == "failed"
+    raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
 
 
 def _exit_code(result: RunResult, report: CosimReport) -> int:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from odscen.catalog.markup import Markup, element, join
 from odscen.regression.words import lines, reason, where
-from odscen.results.report import page
-from odscen.results.report_tables import report_section, table
+from odscen.results.report import html_page
+from odscen.results.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -39,9 +39,12 @@ def suite_page(result: SuiteResult) -> str:
         "each scenario is run once per seed, the number that decides all chance. It passes if "
         "every run meets what is expected of it and the means are within tolerance of the baseline."
     )
-    body = [head, report_section("Scenarios", table(heads, rows), explained=explained, ident="all")]
+    body = [
+        head,
+        report_section("Scenarios", html_table(heads, rows), explained=explained, ident="all"),
+    ]
     body += [_case_section(case) for case in result.cases if lines(case)]
-    return page(f"{result.suite.name} - regression test", join(body))
+    return html_page(f"{result.suite.name} - regression test", join(body))
 
 
 def _case_row(case: CaseResult) -> Markup:
@@ -71,7 +74,7 @@ def _case_section(case: CaseResult) -> Markup:
     return report_section(
         case.case.name,
         element("ul", *(element("li", line) for line in told)),
-        table(heads, rows, label=f"Figures of {case.case.name}") if rows else None,
+        html_table(heads, rows, label=f"Figures of {case.case.name}") if rows else None,
         explained=explained,
         ident=f"case-{case.case.name}",
     )
@@ -109,7 +112,7 @@ def comparison_page(result: RunComparison) -> str:
         "is clear, one that holds zero may be chance."
     )
     figures = [row for row in result.rows if row.key.kind == "run"]
-    body = [head, report_section("Key figures", table(heads, _rows(figures)),
+    body = [head, report_section("Key figures", html_table(heads, _rows(figures)),
                                  explained=explained, ident="figures")]  # fmt: skip
     if result.places:
         explained = (
@@ -117,9 +120,9 @@ def comparison_page(result: RunComparison) -> str:
             "large changes where many vehicles pass come first."
         )
         body.append(report_section("Where it changed most",
-                                   table(heads, _rows(result.places), label="Places"),
+                                   html_table(heads, _rows(result.places), label="Places"),
                                    explained=explained, ident="places"))  # fmt: skip
-    return page(f"{title} - comparison", join(body))
+    return html_page(f"{title} - comparison", join(body))
 
 
 def _side(name: str, seeds: Iterable[int]) -> str:

@@ -94,11 +94,11 @@ def render_report(
         actor_table(actors, travel(traces)),
         _foot(summary),
     ]
-    return page(f"{title} - run report", join([part for part in body if part]))
+    return html_page(f"{title} - run report", join([part for part in body if part]))
 
 
-def page(title: str, body: Markup) -> str:
-    """Page with the report's style and script around ``body``, which needs nothing else."""
+def html_page(title: str, body: Markup) -> str:
+    """Whole page with our style and script around ``body``; it forbids itself everything else."""
     style, script = _asset("report.css"), _asset("report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"

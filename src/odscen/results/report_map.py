@@ -75,7 +75,7 @@ def run_map(
     """
     paths = thinned_paths(traces)
     spawns = np.array([(actor.x, actor.y) for actor in plan.actors]).reshape(-1, 2)
-    bounds = _view(paths.xy, spawns, drawing)
+    bounds = fitted_view(np.concatenate([paths.xy, spawns]), drawing)
     if bounds is None:
         return None
     extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
@@ -99,7 +99,7 @@ def run_map(
         "svg",
         element("title", "Map of the run: the ways of all actors"),
         *layers,
-        _scale_bar(bounds),
+        scale_bar(bounds),
         viewBox=" ".join(map(str, cm + size)),
         class_="run-map",
         role="img",
@@ -122,29 +122,29 @@ def _controls() -> list[Markup]:
 
 def _legends(paths: Paths) -> list[Markup]:
     present = [key for key in CATEGORIES if key in set(paths.categories)]
-    ways = [_swatch(f"c-{key}", CATEGORIES[key]) for key in present]
+    ways = [swatch(f"c-{key}", CATEGORIES[key]) for key in present]
     signs = [
-        _swatch("spawn", "start"),
-        _swatch("goal", "end of the way"),
-        _swatch("incident", "teleport or collision"),
+        swatch("spawn", "start"),
+        swatch("goal", "end of the way"),
+        swatch("incident", "teleport or collision"),
     ]
     steps = ["0", *(number(step, 0) for step in SPEED_STEPS_KMH)]
     names = [f"{a} to {b} km/h" for a, b in itertools.pairwise(steps)]
     names.append(f"over {steps[-1]} km/h")
-    speeds = [_swatch(f"v{i}", name) for i, name in enumerate(names)]
+    speeds = [swatch(f"v{i}", name) for i, name in enumerate(names)]
     return [
         element("div", *ways, *signs, class_="legend for-ways"),
         element("div", *speeds, class_="legend for-speeds"),
     ]
 
 
-def _swatch(style: str, label: str) -> Markup:
+def swatch(style: str, label: str) -> Markup:
+    """Entry of a legend; ``style`` is the class that gives its colour."""
     return element("span", element("i", class_=f"swatch {style}"), label)
 
 
-def _view(xy: FloatArray, spawns: FloatArray, drawing: MapDrawing | None) -> Bounds | None:
+def fitted_view(everything: FloatArray, drawing: MapDrawing | None) -> Bounds | None:
     """Bounds of the traffic with a margin, of a shape fit for a page; the map's if it is idle."""
-    everything = np.concatenate([xy, spawns])
     if len(everything) == 0:
         return None if drawing is None else drawing.bounds
     low, high = everything.min(axis=0), everything.max(axis=0)
@@ -217,7 +217,8 @@ def _dots(places: FloatArray) -> str:
     return "".join(f"M{x} {y}h0" for x, y in whole)
 
 
-def _scale_bar(bounds: Bounds) -> Markup:
+def scale_bar(bounds: Bounds) -> Markup:
+    """Bar with its length, in the lower left corner of a map."""
     wide = bounds[2] - bounds[0]
     length = round_length(wide / 5.0)
     x, y = bounds[0] + wide * 0.02, -bounds[1] - wide * 0.02

@@ -54,10 +54,10 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
     return element("section", element("h2", heading), *children, note, id=ident)
 
 
-def table(
+def html_table(
     heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
 ) -> Markup:
-    """Table that scrolls inside its place; ``rows`` are ``tr`` elements, ``label`` names it."""
+    """Table that scrolls where there is no room; ``rows`` are ``tr`` elements, ``label`` names it."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
     content = element("table", head, element("tbody", *rows), **attributes)
     return element(
@@ -83,8 +83,8 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
         "each line was asked for when the run was started; the value is what the run gave. Names "
         "like arrived compare the share of all planned actors."
     )
-    shown = table(("Expectation", "Value", "Verdict"), rows)
-    return report_section("Expectations", shown, explained=explained, ident="expectations")
+    table = html_table(("Expectation", "Value", "Verdict"), rows)
+    return report_section("Expectations", table, explained=explained, ident="expectations")
 
 
 def event_list(
@@ -166,8 +166,8 @@ def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
         "press a heading to sort by it, once more to turn the order round. Times count from the "
         "start of the simulation; an empty field means that it never came to that."
     )
-    shown = table(_COLUMNS, rows, id="actors-table")
-    return report_section("Actors", control, more, shown, explained=explained, ident="actors")
+    table = html_table(_COLUMNS, rows, id="actors-table")
+    return report_section("Actors", control, more, table, explained=explained, ident="actors")
 
 
 def _actor_row(actor: ActorOutcome, travel: ActorTravel) -> Markup:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.catalog.markup import Markup, element, join, number
-from odscen.results.report_tables import report_section, table
+from odscen.results.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ def trouble_section(found: Sequence[Trouble]) -> Markup | None:
         "another signal plan, a lane that does not lead on for a look at the map, a full start "
         "for less traffic there."
     )
-    places = table(heads, rows)
+    places = html_table(heads, rows)
     return report_section(
         "Where traffic got stuck", places, more, explained=explained, ident="stuck"
     )

@@ -12,7 +12,16 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING, Any
 
-from odscen.sumo.progress import Command, Frame, Incidents, Lights, Pace, Progress, encode
+from odscen.sumo.progress import (
+    Command,
+    Frame,
+    Incidents,
+    Lights,
+    Pace,
+    Progress,
+    Shot,
+    encode,
+)
 
 if TYPE_CHECKING:
     import subprocess
@@ -32,6 +41,7 @@ class Picture:
 @dataclass(slots=True)
 class _Seen:
     picture: Picture = field(default_factory=Picture)
+    shot: Picture = field(default_factory=Picture)
     lights: dict[str, str] = field(default_factory=dict)
     incidents: list[dict[str, Any]] = field(default_factory=list)
     progress: Progress | None = None
@@ -60,6 +70,11 @@ class Live:
     def picture(self) -> Picture:
         """The newest frame."""
         return self._seen.picture
+
+    @property
+    def shot(self) -> Picture:
+        """The newest picture of a camera, as JPEG; only mirrored runs have any."""
+        return self._seen.shot
 
     @property
     def lights(self) -> dict[str, str]:
@@ -133,6 +148,8 @@ class Live:
             if isinstance(message, Frame):
                 seen.picture = Picture(seen.picture.number + 1, payload)
                 self._asked = False
+            elif isinstance(message, Shot):
+                seen.shot = Picture(seen.shot.number + 1, payload)
             elif isinstance(message, Lights):
                 seen.lights = {**seen.lights, **message.states}
             elif isinstance(message, Incidents):

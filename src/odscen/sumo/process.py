@@ -18,6 +18,7 @@ from odscen.sumo.progress import (
     Frame,
     Place,
     Progress,
+    Shot,
     State,
     decode,
     encode,
@@ -144,7 +145,7 @@ def _follow(
     last: Done | Failed | None = None
     if live is not None:
         live.attach(process)
-    for message, payload in _messages(process):
+    for message, payload in messages(process):
         if live is not None:
             live.take(message, payload)
         if isinstance(message, Progress) and progress is not None:
@@ -154,7 +155,7 @@ def _follow(
     return last
 
 
-def _messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]]:
+def messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]]:
     """Yield what the worker says, each message with the bytes that belong to it."""
     if process.stdout is None:
         return
@@ -162,7 +163,7 @@ def _messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes
         message = decode(line)
         if message is None or isinstance(message, Command | Place):
             continue
-        size = message.size if isinstance(message, Frame | State) else 0
+        size = message.size if isinstance(message, Frame | State | Shot) else 0
         yield message, process.stdout.read(size)
 
 

@@ -143,7 +143,14 @@ class Place:
     speed: float
 
 
-Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace | Lockstep | State
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A camera's picture of a mirrored run; ``size`` bytes of JPEG follow the line."""
+
+    size: int
+
+
+Message = Progress | Done | Failed | Frame | Lights | Incidents | Pace | Lockstep | State | Shot
 OnProgress = Callable[[Progress], None]
 
 _KINDS: dict[str, type[Message | Command | Place]] = {
@@ -156,6 +163,7 @@ _KINDS: dict[str, type[Message | Command | Place]] = {
     "pace": Pace,
     "lockstep": Lockstep,
     "state": State,
+    "shot": Shot,
     "place": Place,
     "command": Command,
 }

@@ -204,6 +204,8 @@ def found_files(folder: Path) -> dict[str, str]:
         "events": layout.EVENTS_FILE,
         "actors": layout.ACTORS_FILE,
         "report": layout.REPORT_FILE,
+        "parity": layout.PARITY_FILE,
+        "parity_figures": layout.PARITY_FIGURES_FILE,
         "log": layout.LOG_FILE,
     }
     found = {key: name for key, name in names.items() if (folder / name).exists()}

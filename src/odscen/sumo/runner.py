@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.results.expectations import Expectation
-    from odscen.sumo.process import Companion
+    from odscen.sumo.process import Companion, Ended
     from odscen.sumo.progress import OnProgress, Progress
 
 __all__ = ["PreparedRun", "RunJob", "RunResult", "run_many", "run_prepared", "write_sumo_files"]
@@ -50,6 +50,7 @@ def run_prepared(
     finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
     live: Companion | None = None,
     tell: Callable[[str], None] | None = None,
+    simulate: Callable[[Path], Ended] | None = None,
 ) -> RunResult:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -68,6 +69,8 @@ def run_prepared(
         Makes it a run that can be watched and steered, or that goes in step with another.
     tell
         Called with what the user should know before a long run.
+    simulate
+        Runs what is in a folder and writes the results there, instead of SUMO's worker.
 
     Raises
     ------
@@ -94,7 +97,10 @@ def run_prepared(
     try:
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
-            ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+            if simulate is None:
+                ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+            else:
+                ended = simulate(folder)
             if ended.done is None:
                 drop_torn_trajectories(folder)
             summary = make_summary(prepared, folder, ended, expectations)

@@ -77,8 +77,9 @@ class Snapshots:
         rows = np.concatenate(
             [self._rows(session.vehicle_poses()), self._rows(session.person_poses())]
         )
-        header = np.array([step, time, len(rows), real_time_factor, arrived], dtype="<f4")
-        return header.tobytes() + rows.tobytes()
+        return frame_bytes(
+            rows, step=step, time=time, real_time_factor=real_time_factor, arrived=arrived
+        )
 
     def _rows(self, poses: Poses) -> np.ndarray:
         index = np.array([self._row.get(name, -1) for name in poses.ids], dtype=np.int64)
@@ -89,14 +90,39 @@ class Snapshots:
             length=self._length[index],
             net_offset=self._offset,
         )
-        rows = np.empty((len(index), COLUMNS), dtype="<f4")
-        rows[:, 0] = index
-        rows[:, 1] = pose.x - self._origin[0]
-        rows[:, 2] = pose.y - self._origin[1]
-        rows[:, 3] = pose.hdg
-        rows[:, 4] = poses.speed[known]
-        rows[:, 5] = _flags(poses.signals[known])
-        return rows
+        centres = np.asarray(pose.x), np.asarray(pose.y), np.asarray(pose.hdg)
+        return frame_rows(
+            index, *centres, poses.speed[known], poses.signals[known], origin=self._origin
+        )
+
+
+def frame_rows(
+    index: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    hdg: np.ndarray,
+    speed: np.ndarray,
+    signals: np.ndarray,
+    *,
+    origin: tuple[float, float],
+) -> np.ndarray:
+    """Rows of a frame, shape ``(N, COLUMNS)``; ``signals`` are SUMO's bits, see :class:`Signal`."""
+    rows = np.empty((len(index), COLUMNS), dtype="<f4")
+    rows[:, 0] = index
+    rows[:, 1] = x - origin[0]
+    rows[:, 2] = y - origin[1]
+    rows[:, 3] = hdg
+    rows[:, 4] = speed
+    rows[:, 5] = _flags(signals)
+    return rows
+
+
+def frame_bytes(
+    rows: np.ndarray, *, step: int, time: float, real_time_factor: float, arrived: int
+) -> bytes:
+    """Bytes of a frame: header and rows."""
+    header = np.array([step, time, len(rows), real_time_factor, arrived], dtype="<f4")
+    return header.tobytes() + rows.tobytes()
 
 
 def _flags(signals: np.ndarray) -> np.ndarray:

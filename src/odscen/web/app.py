@@ -12,7 +12,8 @@ from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from odscen import __version__
-from odscen.web import map_routes, run_routes, scenario_routes
+from odscen.carla.client import Address
+from odscen.web import carla_routes, map_routes, run_routes, scenario_routes
 from odscen.web.errors import RESPONSES, add_error_handlers, error_response
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
@@ -45,6 +46,7 @@ def create_app(
     hosts: Collection[str] | None = LOOPBACK,
     max_upload: int = MAX_UPLOAD,
     static: Path = STATIC,
+    carla: Address = Address(),  # noqa: B008 - immutable
 ) -> FastAPI:
     """Make the server's application.
 
@@ -60,8 +62,10 @@ def create_app(
         Bytes of a request, at most.
     static
         Folder of the built front end.
+    carla
+        Where the CARLA server is that runs can be shown on, if there is one.
     """
-    shared = Services.of(workspace)
+    shared = Services.of(workspace, carla)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -85,7 +89,7 @@ def create_app(
         """Say that the server is there."""
         return Health(version=__version__, workspace=str(shared.workspace.root))
 
-    for routes in (map_routes, scenario_routes, run_routes):
+    for routes in (map_routes, scenario_routes, run_routes, carla_routes):
         app.include_router(routes.router)
 
     @app.get("/api", include_in_schema=False)

@@ -233,6 +233,7 @@ class NewRun(Body):
 
     ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
     simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
+    With ``carla`` it is shown on the CARLA server too, step by step.
     """
 
     scenario: Name
@@ -241,6 +242,15 @@ class NewRun(Body):
     step_length: Annotated[float, Field(ge=0.01, le=1)] | None = None
     speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
     paused: bool = False
+    carla: bool = False
+
+
+class CarlaInfo(Answer):
+    """Whether the CARLA server can be used, and what to do about it, in words."""
+
+    state: Literal["connected", "absent", "wrong_version"]
+    address: str
+    message: str
 
 
 class RunStarted(Answer):
@@ -271,7 +281,8 @@ class RunProgress(Answer):
 class RunInfo(Answer):
     """A run, going on or finished; ``summary`` is that of ``summary.json``.
 
-    ``finished`` is when its results were written, in seconds since 1970.
+    ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
+    shown on a CARLA server, whose camera can then be watched.
     """
 
     run: str
@@ -283,6 +294,7 @@ class RunInfo(Answer):
     summary: dict[str, Any] | None = None
     error: str | None = None
     finished: float | None = None
+    carla: bool = False
 
 
 class RunCurve(Answer):

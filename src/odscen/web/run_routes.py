@@ -86,9 +86,13 @@ def control(run: str, wish: Control, shared: Shared) -> RunInfo:
 @router.get("/{run}/report.html", response_class=Response)
 def report(run: str, shared: Shared) -> Response:
     """Report of a completed run."""
-    path = _kept(shared, run, layout.REPORT_FILE)
+    return page_of_run(shared, run, layout.REPORT_FILE)
+
+
+def page_of_run(shared: Shared, run: str, name: str) -> Response:
+    """Answer with a page of a finished run that holds everything that it needs."""
     headers = {"Content-Security-Policy": _REPORT}
-    return FileResponse(path, media_type="text/html", headers=headers)
+    return FileResponse(_kept(shared, run, name), media_type="text/html", headers=headers)
 
 
 @router.get("/{run}/summary")

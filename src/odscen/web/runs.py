@@ -10,28 +10,33 @@ import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from odscen.carla.served import ServedJob, run_served
 from odscen.catalog.assets import shipped_assets
 from odscen.catalog.folders import discard
 from odscen.catalog.store import check_name
 from odscen.durations import clock
 from odscen.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
+from odscen.scenario.files import dumps
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo import layout
 from odscen.sumo.live import Live
 from odscen.sumo.long_runs import about
 from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.progress import Command, Pace
+from odscen.sumo.progress import Command, Failed, Pace
 from odscen.sumo.runner import run_prepared
+from odscen.sumo.snapshots import origin
 from odscen.sumo.status import going, read_status
 from odscen.web.messages import RunInfo, RunProgress, RunState
-from odscen.workflow import check_scenario, load_map
+from odscen.workflow import SUFFIX, check_scenario, load_map
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
+    from odscen.carla.client import Address
     from odscen.catalog.store import Workspace
     from odscen.results.records import Plan
     from odscen.scenario.document import Scenario
@@ -51,6 +56,8 @@ class Active:
     ----------
     plan
         What is to happen; ``None`` while it is prepared.
+    carla
+        Whether a CARLA server shows it too.
     """
 
     id: str
@@ -58,6 +65,7 @@ class Active:
     live: Live
     plan: Plan | None = None
     finishing: bool = False
+    carla: bool = False
     error: str | None = None
     ended: RunState | None = None
     future: Future[None] = field(default_factory=Future)
@@ -83,8 +91,9 @@ class Active:
 class Runs:
     """Runs in a workspace, going on and finished."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, carla: Address) -> None:
         self._workspace = workspace
+        self._carla = carla
         self._pool = ThreadPoolExecutor(max_workers=MOST, thread_name_prefix="run")
         self._lock = threading.Lock()
         self._active: dict[str, Active] = {}
@@ -97,15 +106,18 @@ class Runs:
         ScenarioError
             If the scenario has errors.
         ConflictError
-            If too many are going on.
+            If too many are going on, or CARLA shows another one.
         """
         refuse_errors(check_scenario(self._workspace, scenario))
         with self._lock:
             if sum(one.ended is None for one in self._active.values()) >= MOST:
                 msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
                 raise ConflictError(msg)
+            if wish.carla and any(one.carla and one.ended is None for one in self._active.values()):
+                msg = "CARLA shows another run already; stop that one, or wait for its end"
+                raise ConflictError(msg)
             pace = Pace(paused=wish.paused, speed=wish.speed)
-            active = Active(self._free_id(name), scenario, Live(pace))
+            active = Active(self._free_id(name), scenario, Live(pace), carla=wish.carla)
             self._active[active.id] = active
         active.future = self._pool.submit(self._run, active, wish)
         return active.id
@@ -153,6 +165,7 @@ class Runs:
             scenario=active.scenario.name,
             map=active.scenario.map.name,
             speed=active.live.pace.speed,
+            carla=active.carla,
             progress=None if progress is None else RunProgress(**asdict(progress)),
             summary=self._summary(run) if over else None,
             error=active.error,
@@ -267,6 +280,9 @@ class Runs:
         active.plan = prepared.plan
         active.live.wake()
 
+        if wish.carla:
+            return self._mirror(active, prepared.plan, wish)
+
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
             active.finishing = True
             write_report(folder, summary, drawing=loaded.drawing)
@@ -276,6 +292,30 @@ class Runs:
         if result.status == "failed":
             return "failed", str(result.summary["error"])
         return ("stopped" if result.summary["stopped"] else "completed"), None
+
+    def _mirror(self, active: Active, plan: Plan, wish: NewRun) -> tuple[RunState, str | None]:
+        """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
+        with TemporaryDirectory(prefix="odscen-") as folder:
+            file = Path(folder) / f"{active.id}{SUFFIX}"
+            file.write_text(dumps(active.scenario), encoding="utf-8")
+            last = run_served(
+                ServedJob(
+                    workspace=str(self._workspace.root),
+                    scenario=str(file),
+                    log=str(Path(folder) / "carla.log"),
+                    address=str(self._carla),
+                    step_length=plan.step_length,
+                    origin=origin(plan),
+                    seed=wish.seed,
+                    until=wish.until,
+                    paused=wish.paused,
+                    speed=wish.speed,
+                ),
+                active.live,
+            )
+        if isinstance(last, Failed):
+            return "failed", last.reason
+        return ("stopped" if last.stopped else "completed"), None
 
     def _free_id(self, name: str) -> str:
         for number in itertools.count(1):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import uvicorn
 
+from odscen.carla.client import Address
 from odscen.errors import WorkspaceError
 from odscen.web.app import create_app
 from odscen.web.security import LOOPBACK
@@ -30,6 +31,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8420,
     browser: bool = True,
+    carla: Address = Address(),  # noqa: B008 - immutable
     say: Callable[[str], None] = lambda _line: None,
 ) -> None:
     """Serve until interrupted.
@@ -42,6 +44,8 @@ def serve(
         0 for any that is free.
     browser
         Open the page in the user's browser.
+    carla
+        Where the CARLA server is that runs can be shown on, if there is one.
     say
         Called with lines for the user.
 
@@ -61,7 +65,7 @@ def serve(
     if token:
         say("It can be reached from other machines; whoever has this address may use it.")
     say(f"Workspace: {workspace.root}. Ctrl-C ends it.")
-    app = create_app(workspace, token=token, hosts=hosts)
+    app = create_app(workspace, token=token, hosts=hosts, carla=carla)
     config = uvicorn.Config(
         app,
         log_level="warning",

@@ -12,12 +12,14 @@ from starlette.requests import HTTPConnection
 
 from odscen.catalog.store import Workspace
 from odscen.scenario.region import Region
+from odscen.web.carla import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
 from odscen.web.runs import Runs
 from odscen.workflow import LoadedMap, load_map
 
 if TYPE_CHECKING:
+    from odscen.carla.client import Address
     from odscen.scenario.document import Scenario
 
 
@@ -35,12 +37,13 @@ class Services:
     drafts: Drafts
     jobs: Jobs
     runs: Runs
+    carla: CarlaServer
     search: threading.Lock = field(default_factory=threading.Lock)
 
     @classmethod
-    def of(cls, workspace: Workspace) -> Services:
-        """Make them for a workspace."""
-        return cls(workspace, Drafts(workspace), Jobs(), Runs(workspace))
+    def of(cls, workspace: Workspace, carla: Address) -> Services:
+        """Make them for a workspace and the address of a CARLA server, there or not."""
+        return cls(workspace, Drafts(workspace), Jobs(), Runs(workspace, carla), CarlaServer(carla))
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""

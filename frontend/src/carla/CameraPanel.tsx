@@ -1,0 +1,27 @@
+import "./carla.css";
+
+import { useState } from "react";
+
+import { carla } from "../api/carla";
+
+type Shown = "waiting" | "moving" | "ended";
+
+const WORD: Record<Shown, string> = {
+  waiting: "Waiting for the first picture …",
+  moving: "CARLA, from above",
+  ended: "CARLA, from above: the last picture",
+};
+
+/** The picture that CARLA's camera gives of a run while it goes on. */
+export function CameraPanel({ run, over }: { run: string; over: boolean }) {
+  const [state, setState] = useState<Shown>("waiting");
+  const shown = over && state === "moving" ? "ended" : state;
+  if (over && state === "waiting") return null;
+  return (
+    <figure className="camera">
+      <img src={carla.cameraUrl(run)} alt="The run in CARLA, seen from above" data-state={shown}
+        onLoad={() => setState("moving")} onError={() => setState("ended")} />
+      <figcaption>{WORD[shown]}</figcaption>
+    </figure>
+  );
+}

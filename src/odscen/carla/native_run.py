@@ -1,0 +1,313 @@
+"""A scenario driven by CARLA alone, from the document to a run folder like that of ``odscen run``.
+
+The folder has the same files, so that reports, replays and scripts work on it. Two things are not
+SUMO's: nobody is teleported, and collisions are not recorded.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen import workflow
+from odscen.carla.camera import first_view
+from odscen.carla.client import Address
+from odscen.carla.cosim import interrupts
+from odscen.carla.environment import weather_parameters
+from odscen.carla.native import native_actors
+from odscen.carla.native_worker import NativeJob, Note, Shot, Tick, work
+from odscen.carla.pictures import Wish
+from odscen.carla.server import Server
+from odscen.catalog.assets import shipped_assets
+from odscen.errors import CarlaError, in_file
+from odscen.frames import XodrPose, xodr_to_sumo
+from odscen.results.records import Event, EventKind, events_to_json
+from odscen.results.summary import actor_outcomes, actors_to_json
+from odscen.scenario.problems import refuse_errors
+from odscen.sumo import layout
+from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.process import Ended
+from odscen.sumo.progress import Done, Failed, Progress
+from odscen.sumo.runner import run_prepared
+
+if TYPE_CHECKING:
+    import threading
+    from collections.abc import Callable, Mapping
+    from multiprocessing.connection import Connection
+    from pathlib import Path
+    from typing import Any
+
+    from odscen.carla.native_worker import Told
+    from odscen.catalog.store import Workspace
+    from odscen.results.records import Plan
+    from odscen.sumo.progress import OnProgress
+    from odscen.sumo.runner import RunResult
+
+LOG_FILE = "carla.log"
+GRACE = 30.0
+"""Seconds that the worker has for giving the server back."""
+
+
+@dataclass(frozen=True, slots=True)
+class NativeOptions:
+    """How CARLA is to drive.
+
+    Attributes
+    ----------
+    address
+        Of the server.
+    tick
+        Simulated seconds of a tick; the scenario's step, but at most 0.05, if not given.
+    physics
+        Whether vehicles have their own physics; see :class:`odscen.carla.traffic.Traffic`.
+    on_picture
+        Called with each picture as JPEG.
+    """
+
+    address: Address = field(default_factory=Address)
+    tick: float | None = None
+    load_map: bool = True
+    physics: bool = True
+    pictures: Wish = field(default_factory=Wish)
+    on_picture: Callable[[bytes], None] | None = None
+
+
+@dataclass(slots=True)
+class NativeReport:
+    """What is to be known of a run besides its folder: notes in words, and whether it was ended."""
+
+    notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def run_native(
+    workspace: Workspace,
+    path: Path,
+    options: NativeOptions,
+    *,
+    out: Path | None = None,
+    seed: int | None = None,
+    until: float | None = None,
+    weather: bool = True,
+    progress: OnProgress | None = None,
+) -> tuple[RunResult, NativeReport]:
+    """Let CARLA's Traffic Manager and walkers run a scenario.
+
+    Ctrl-C ends it between two ticks, and what it did so far is kept.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario has errors.
+    MissingDependencyError
+        If pictures are wanted and cannot be made.
+    """
+    if options.pictures.any or options.on_picture:
+        options.pictures.check()
+    scenario = workflow.read_scenario(path)
+    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    with in_file(str(path)):
+        refuse_errors(workflow.check_scenario(workspace, scenario))
+    loaded, assets = workflow.load_map(entry), shipped_assets()
+    prepared = prepare(
+        scenario,
+        loaded.sumo,
+        entry.path("net"),
+        assets,
+        seed=seed,
+        until=until,
+        weather=weather,
+        slice_length=None,
+    )
+    plan = prepared.plan
+    report = NativeReport()
+
+    def simulate(folder: Path) -> Ended:
+        job = NativeJob(
+            address=options.address,
+            plan=plan,
+            actors=native_actors(scenario, loaded.sumo.graph, plan),
+            delta=options.tick or min(plan.step_length, 0.05),
+            map_name=entry.name,
+            xodr=entry.path("xodr").read_text(encoding="utf-8"),
+            log=folder / LOG_FILE,
+            view=first_view(plan, options.pictures),
+            weather=weather_parameters(scenario.environment, assets),
+            load_map=options.load_map,
+            physics=options.physics,
+            pictures=options.pictures,
+            watched=options.on_picture is not None,
+        )
+        with interrupts() as interrupted:
+            follower = _Follower(job, folder, report, progress, options.on_picture)
+            ended = follower.run(interrupted)
+            report.interrupted = interrupted.is_set()
+        return ended
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        write_report(folder, summary, drawing=loaded.drawing)
+
+    # SUMO has no part in this: no files of its own, and no routes that it could not find.
+    actors = tuple(replace(actor, problem=None) for actor in plan.actors)
+    prepared = replace(
+        prepared,
+        plan=replace(plan, actors=actors),
+        sumo_files={},
+        problems=(),
+        notes=(),
+        about={**prepared.about, "driven_by": "carla"},
+    )
+    result = run_prepared(
+        prepared,
+        (out or workspace.runs) / workflow.folder_name(path),
+        finish=finish,
+        simulate=simulate,
+    )
+    return result, report
+
+
+class _Follower:
+    """Starts the worker, takes down what it tells, and writes it when it has ended."""
+
+    def __init__(
+        self,
+        job: NativeJob,
+        folder: Path,
+        report: NativeReport,
+        progress: OnProgress | None,
+        on_picture: Callable[[bytes], None] | None,
+    ) -> None:
+        self._job = job
+        self._folder = folder
+        self._notes = report.notes
+        self._progress = progress
+        self._on_picture = on_picture
+        self._events: list[Event] = []
+        self._times: list[float] = []
+        self._rows: list[np.ndarray] = []
+        self._own: tuple[int, ...] = ()
+
+    def run(self, interrupted: threading.Event) -> Ended:
+        """Run the worker to its end, whatever that is; what it told until then is written."""
+        start = time.perf_counter()
+        context = multiprocessing.get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=work, args=(self._job, there), daemon=True)
+        process.start()
+        there.close()
+        try:
+            last = self._follow(here, interrupted)
+        finally:
+            here.close()  # the worker sees that, and gives the server back
+            process.join(GRACE)
+            if process.is_alive():
+                process.kill()
+                process.join()
+        if last is None and self._own:
+            self._clear_up()
+        self._write()
+        seconds = time.perf_counter() - start
+        if isinstance(last, Done):
+            return Ended(last, seconds, None)
+        if isinstance(last, Failed):
+            return Ended(None, seconds, last.reason)
+        return Ended(None, seconds, self._crash(process.exitcode or 0))
+
+    def _follow(self, pipe: Connection, interrupted: threading.Event) -> Done | Failed | None:
+        last: Done | Failed | None = None
+        asked = False
+        while True:
+            try:
+                told: Told = pipe.recv()
+            except (EOFError, ConnectionResetError):
+                return last
+            if interrupted.is_set() and not asked:
+                asked = True
+                with suppress(OSError):  # it has just ended
+                    pipe.send("stop")
+            if isinstance(told, Done | Failed):
+                last = told
+            elif isinstance(told, Note):
+                self._notes.append(told.words)
+            elif isinstance(told, Shot):
+                if self._on_picture is not None:
+                    self._on_picture(told.jpeg)
+            else:
+                self._take(told)
+
+    def _take(self, tick: Tick) -> None:
+        self._own = tick.own
+        self._events += tick.events
+        self._notes += tick.notes
+        self._times.append(tick.time)
+        self._rows.append(tick.rows)
+        if self._progress is not None:
+            plan = self._job.plan
+            count = [event.kind for event in self._events].count
+            departed, arrived = count(EventKind.DEPARTED), count(EventKind.ARRIVED)
+            planned = len(plan.actors)
+            self._progress(
+                Progress(tick.time, plan.until, tick.running, departed, arrived, planned)
+            )
+
+    def _clear_up(self) -> None:
+        """Take away what a worker that has died has left, if its server answers in time."""
+        deadline = time.monotonic() + GRACE
+        while self._job.address.listens() and time.monotonic() < deadline:
+            with suppress(CarlaError), Server(self._job.address) as server:
+                server.inherit(self._own)
+                return
+        self._notes.append(
+            f"the CARLA server at {self._job.address} did not answer any more: what was made "
+            "there, if it still runs, could not be taken back"
+        )
+
+    def _crash(self, code: int) -> str:
+        """Say what an exit code means: the Traffic Manager aborts when it meets an error."""
+        job = self._job
+        if code == -signal.SIGABRT:
+            return (
+                f"CARLA's Traffic Manager has given up: the server at {job.address} has "
+                f"gone away or has not answered for {job.address.timeout:g} s; see {LOG_FILE}"
+            )
+        return f"the process that drives CARLA ended with exit code {code}; see {LOG_FILE}"
+
+    def _write(self) -> None:
+        plan = self._job.plan
+        events = tuple(sorted(self._events, key=lambda event: event.time))
+        outcomes = actor_outcomes(plan, events)
+        folder = self._folder
+        (folder / layout.EVENTS_FILE).write_text(events_to_json(events), encoding="utf-8")
+        (folder / layout.ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
+        write_trajectories(plan, self._times, self._rows, folder / layout.TRAJECTORIES_FILE)
+
+
+def write_trajectories(plan: Plan, times: list[float], rows: list[np.ndarray], file: Path) -> None:
+    """Write states per tick in the columns and the frame that SUMO's own recording has."""
+    import polars as pl
+
+    table = np.concatenate([np.empty((0, 7)), *rows])
+    index = table[:, 0].astype(np.int64)
+    length = np.array([actor.length for actor in plan.actors])
+    _, x, y, z, hdg, pitch, speed = table.T
+    front = xodr_to_sumo(
+        XodrPose(x, y, z, hdg, pitch), length=length[index], net_offset=plan.net_offset
+    )
+    names = [actor.id for actor in plan.actors]
+    pl.DataFrame(
+        {
+            "timestep_time": np.repeat(np.array(times), [len(part) for part in rows]),
+            "vehicle_id": [names[row] for row in index],
+            "vehicle_x": np.asarray(front.x),
+            "vehicle_y": np.asarray(front.y),
+            "vehicle_z": np.asarray(front.z),
+            "vehicle_angle": np.asarray(front.angle_deg),
+            "vehicle_speed": speed,
+        }
+    ).write_parquet(file)
