@@ -61,7 +61,7 @@ def _install(prefix: list[str]) -> None:
 
 def main() -> int:
     """Make sure that there is one; 1 if there must be and is not."""
-    prefix = _may_install()
+    prefix = None if os.environ.get("ODSCEN_CHROMIUM") else _may_install()
     if not find() and prefix is not None:
         print("Installing Debian's Chromium for the tests in a browser ...", flush=True)
         _install(prefix)
