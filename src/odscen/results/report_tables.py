@@ -57,7 +57,7 @@ def report_section(heading: str, *children: Markup | None, explained: str, ident
 def html_table(
     heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
 ) -> Markup:
-    """Table that scrolls where there is no room; ``rows`` are ``tr`` elements, ``label`` names it."""
+    """Table that scrolls where there is no room; ``rows`` are ``tr``, ``label`` names it."""
     head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
     content = element("table", head, element("tbody", *rows), **attributes)
     return element(
