@@ -39,7 +39,8 @@ export function ActorForm({ actor, assets, onEdit }: {
       )}
       {!walks && <Checkbox label="This is my vehicle under test (ego)" checked={actor.ego}
         onChange={(event) => onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })} />}
-      {walks && <Checkbox label="Crosses the road anywhere" checked={actor.crosses_anywhere}
+      {/* No run acts on it yet: shown only where a document has it. */}
+      {walks && actor.crosses_anywhere && <Checkbox label="Crosses the road anywhere" checked={actor.crosses_anywhere}
         onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })} />}
       {walks && <Checkbox label="Ignores red lights" checked={actor.ignores_red}
         onChange={(event) => change({ ignores_red: event.currentTarget.checked })} />}
