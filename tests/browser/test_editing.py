@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage, settle
@@ -70,6 +70,20 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     with region.changing():
         region.map.click(region.graph.middle(before[-1]))
     assert region.document()["roi"] == before[:-1]
+
+
+def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) -> None:
+    held: list[Route] = []
+    editor.page.route("**/api/scenarios/*/roi", held.append)
+    with editor.changing():
+        editor.map.click(editor.graph.middle(editor.graph.junction()))
+    expect(editor.add_all).to_be_disabled()
+    editor.page.unroute_all()
+    for answer in held:
+        answer.continue_()
+    with editor.changing():
+        editor.add_all.click()
+    assert len(editor.document()["roi"]) == 5
 
 
 def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
