@@ -74,13 +74,17 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
 
 def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) -> None:
     held: list[Route] = []
-    editor.page.route("**/api/scenarios/*/roi", held.append)
+
+    def hold(asked: Route) -> None:
+        held.append(asked)
+
+    editor.page.route("**/api/scenarios/*/roi", hold)
     with editor.changing():
         editor.map.click(editor.graph.middle(editor.graph.junction()))
     expect(editor.add_all).to_be_disabled()
-    editor.page.unroute_all()
-    for answer in held:
-        answer.continue_()
+    editor.page.unroute("**/api/scenarios/*/roi", hold)
+    for asked in held:
+        asked.continue_()
     with editor.changing():
         editor.add_all.click()
     assert len(editor.document()["roi"]) == 5
