@@ -82,7 +82,6 @@ def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) ->
     with editor.changing():
         editor.map.click(editor.graph.middle(editor.graph.junction()))
     expect(editor.add_all).to_be_disabled()
-    editor.page.unroute("**/api/scenarios/*/roi", hold)
     for asked in held:
         asked.continue_()
     with editor.changing():
