@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage, settle
@@ -70,6 +70,23 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     with region.changing():
         region.map.click(region.graph.middle(before[-1]))
     assert region.document()["roi"] == before[:-1]
+
+
+def test_neighbours_are_not_offered_before_they_are_known(editor: OdscenPage) -> None:
+    held: list[Route] = []
+
+    def hold(asked: Route) -> None:
+        held.append(asked)
+
+    editor.page.route("**/api/scenarios/*/roi", hold)
+    with editor.changing():
+        editor.map.click(editor.graph.middle(editor.graph.junction()))
+    expect(editor.add_all).to_be_disabled()
+    for asked in held:
+        asked.continue_()
+    with editor.changing():
+        editor.add_all.click()
+    assert len(editor.document()["roi"]) == 5
 
 
 def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:

@@ -2,10 +2,10 @@ import { Button, Group, Text } from "@mantine/core";
 import { useCallback } from "react";
 
 import { api } from "../api/client";
-import type { Roi } from "../api/types";
 import { go } from "../ui/route";
 import { useLoaded } from "../ui/useLoaded";
 import { mapFacts } from "../ui/words";
+import type { Region } from "./asked";
 
 export function MapStep({ name, onShow }: { name: string; onShow: () => void }) {
   const load = useCallback(() => api.map(name), [name]);
@@ -22,7 +22,7 @@ export function MapStep({ name, onShow }: { name: string; onShow: () => void }) 
 }
 
 export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
-  segments: number; roi: Roi; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
+  segments: number; roi: Region; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
 }) {
   if (segments === 0) {
     return (
@@ -36,7 +36,7 @@ export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
     <>
       <Text size="sm">Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.</Text>
       <Group>
-        <Button size="compact-sm" variant="default" disabled={roi.candidates.length === 0} onClick={onAll}>Add all {roi.candidates.length} neighbours</Button>
+        <Button size="compact-sm" variant="default" disabled={!roi.current || roi.candidates.length === 0} onClick={onAll}>Add all {roi.candidates.length} neighbours</Button>
         <Button size="compact-sm" variant="subtle" onClick={onShow}>Show the region</Button>
       </Group>
       <Button onClick={onNext}>Next: weather and time</Button>

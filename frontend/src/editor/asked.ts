@@ -1,4 +1,4 @@
-import { useEffect, useState } from "react";
+import { useEffect, useMemo, useState } from "react";
 
 import { api } from "../api/client";
 import type { Actor, Flow, Roi } from "../api/types";
@@ -8,15 +8,20 @@ import { go } from "../ui/route";
 
 const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
 
+/** What was last said of the region, and whether that still is about the region as it is now. */
+export interface Region extends Roi {
+  current: boolean;
+}
+
 /** What may be added to the region and taken out of it; asked of the server, which knows the rule. */
-export function useRegion(name: string, roiKey: string): Roi {
-  const [roi, setRoi] = useState<Roi>(NO_ROI);
+export function useRegion(name: string, roiKey: string): Region {
+  const [{ roi, key }, setAnswer] = useState<{ roi: Roi; key: string | null }>({ roi: NO_ROI, key: null });
   useEffect(() => {
     let current = true;
-    api.roi(name).then((found) => { if (current) setRoi(found); }, tellError);
+    api.roi(name).then((found) => { if (current) setAnswer({ roi: found, key: roiKey }); }, tellError);
     return () => { current = false; };
   }, [name, roiKey]);
-  return roi;
+  return useMemo(() => ({ ...roi, current: key === roiKey }), [roi, key, roiKey]);
 }
 
 export interface Ways {
