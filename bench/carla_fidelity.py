@@ -1,7 +1,8 @@
 """Sampled scenarios on signalised maps, mirrored and held against SUMO's recording.
 
 ``python -m bench.carla_fidelity [COUNT [SECONDS]]``: 100 scenarios of 60 s if nothing is said. The
-judge is that of ``tests/carla/test_mirror_on_maps.py``; a run that fails it ends the bench.
+judge is that of ``tests/carla/test_mirror_on_maps.py``; runs that fail it are named, and the exit
+code is 1 then.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import collections
 import json
 import sys
 import tempfile
+import traceback
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,7 @@ def main() -> None:
     files += [folder / f"{name}.xodr" for name in SHARED] if folder else []
     off: dict[str, list[float]] = collections.defaultdict(list)
     categories: collections.Counter[str] = collections.Counter()
+    failed: list[str] = []
     with tempfile.TemporaryDirectory() as root:
         workspace = Workspace.open(Path(root))
         for number in range(int(count)):
@@ -40,7 +43,12 @@ def main() -> None:
                 workspace, map_name=xodr.stem, seed=number, fill=0.15, roi_segments=15
             )
             with tempfile.TemporaryDirectory() as out:
-                found = judge.check(workspace, path, xodr, Path(out))
+                try:
+                    found = judge.check(workspace, path, xodr, Path(out))
+                except AssertionError:
+                    traceback.print_exc()
+                    failed.append(path.name)
+                    continue
                 [plan] = Path(out).glob("*/plan.json")
                 actors = json.loads(plan.read_text())["actors"]
             categories.update(actor["category"] for actor in actors)
@@ -51,9 +59,11 @@ def main() -> None:
                 f"{number + 1:3d} {path.name}: {len(actors)} road users; worst {worst}", flush=True
             )
     print(f"{int(count)} scenarios of {seconds:g} s; {dict(categories)}")
+    print(f"failed: {', '.join(failed) or 'none'}")
     for name, values in off.items():
         median, high = np.percentile(values, [50, 99])
         print(f"{name}: {len(values):,}; {median:.5f}, 99 % {high:.5f}, worst {max(values):.5f}")
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":

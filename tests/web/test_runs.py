@@ -391,8 +391,8 @@ def test_a_client_that_never_reads_costs_the_others_nothing(served: str, sampled
             else:
                 last = json.loads(message)
     assert last["type"] == "end"
-    # Every step of a run of 40 steps a second, but for the odd one that a busy machine skips.
-    assert steps[-1] - steps[0] < 1.3 * len(steps)
+    # Every step of a run of 40 steps a second, but for those that a busy machine skips.
+    assert steps[-1] - steps[0] < 2 * len(steps)
     for socket in deaf:
         socket.socket.close()
     assert httpx2.get(f"{url}/health").status_code == 200

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from odscen import workflow
 from odscen.catalog.store import Workspace
-from odscen.scenario import edits
+from odscen.scenario import demand_edits, edits
 from odscen.scenario.files import dumps, loads, read_any
 from odscen.scenario.region import Region, name_of, place_of
 from odscen.web.app import create_app
@@ -45,6 +45,14 @@ ALL = (
     ("remove_flow", {"flow": "flow-1"}),
     ("remove_actors", {"actors": ["car-1", "big"]}),
     ("fill_roi", {"share": 0.3, "seed": 4}),
+    ("set_clock", {"clock": 25_200}),
+    ("set_zone", {"zone": "west", "segments": ["r1"]}),
+    ("set_zone", {"zone": "east", "segments": ["r2"]}),
+    ("set_profile", {"profile": "morning", "shares": [1, 3, 2]}),
+    ("set_matrix", {"matrix": "am", "trips": [["west", "east", 40]], "profile": "morning"}),
+    ("set_counts", {"counts": "survey", "rows": [["r1>j10001", 0, 900, 12]]}),
+    ("set_background", {"background": "some", "per_km": 2}),
+    ("remove_demand", {"part": "survey"}),
 )
 
 
@@ -98,8 +106,9 @@ def post_edit(client: TestClient, name: str, version: int, kind: str, /, **argum
 def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
     public = {
         name
-        for name, function in inspect.getmembers(edits, inspect.isfunction)
-        if not name.startswith("_") and function.__module__ == edits.__name__
+        for module in (edits, demand_edits)
+        for name, function in inspect.getmembers(module, inspect.isfunction)
+        if not name.startswith("_") and function.__module__ == module.__name__
     }
     assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments", "removable_segments"}
     assert {kind for kind, _ in ALL} == set(FUNCTIONS)
@@ -117,7 +126,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         answer = post_edit(client, new, state["version"], kind, **arguments)
         assert answer.status_code == 200, (kind, answer.text)
         known = {"graph": graph, "lights": loaded.lights, "usable": loaded.usable}
-        function = getattr(edits, kind)
+        function = getattr(edits, kind, None) or getattr(demand_edits, kind)
         wanted = inspect.signature(function).parameters
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
         assert answer.json()["version"] == state["version"] + 1

@@ -127,9 +127,18 @@ class Ground:
         step = np.hypot(*(self._xy[other] - self._xy[node]).T)
         usable = (self._lane[other] == self._lane[node]) & (step > 1e-6)
         share = np.where(usable, np.minimum(np.abs(ahead) / np.where(usable, step, 1.0), 1.0), 0.0)
-        slope = self._pitch[node] + share * (self._pitch[other] - self._pitch[node])
+        # The cubic that has the heights and slopes of both nodes: roads are cubics themselves.
+        sense = np.where(ahead >= 0, 1.0, -1.0)
+        rise, fall = np.tan(self._pitch[node]) * sense, np.tan(self._pitch[other]) * sense
+        climb = np.where(
+            usable, (self._z[other] - self._z[node]) / np.where(usable, step, 1.0), 0.0
+        )
+        bend, twist = 3 * climb - 2 * rise - fall, rise + fall - 2 * climb
+        cubic = self._z[node] + step * share * (rise + share * (bend + share * twist))
         along = self._z[node] + np.tan(self._pitch[node]) * ahead
-        z = np.where(usable, self._z[node] + share * (self._z[other] - self._z[node]), along)
+        z = np.where(usable, cubic, along)
+        steep = rise + share * (2 * bend + share * 3 * twist)
+        slope = np.arctan(np.where(usable, steep, rise) * sense)
         turn = hdg - self._hdg[node]
         return Lie(z, np.arctan(np.tan(slope) * np.cos(turn)))
 
