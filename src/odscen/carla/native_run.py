@@ -209,7 +209,7 @@ class _Follower:
             if process.is_alive():
                 process.kill()
                 process.join()
-        if last is None and self._own:
+        if last is None:
             self._clear_up()
         self._write()
         seconds = time.perf_counter() - start

@@ -161,9 +161,11 @@ class Server:
     def inherit(self, actors: Sequence[int]) -> None:
         """Take over from a process that has died: its actors, and a world that waits for ticks.
 
-        At the end they are gone, and the world's time goes on by itself.
+        At the end they are gone, with those of our names that it had no time to tell of, and the
+        world's time goes on by itself.
         """
         self._own |= set(actors)
+        self._unsure, self._before = True, set()
         self._settings.synchronous_mode = False
         self._settings.fixed_delta_seconds = None
 
