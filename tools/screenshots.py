@@ -1,7 +1,6 @@
 """Writes docs/images/page-*.png: every view of the page, light and dark.
 
-``python -m tools.screenshots [FOLDER]``. Colours are reduced to a palette, which hardly shows
-and makes the files a third as large.
+``python -m tools.screenshots [FOLDER]``.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class Camera:
         settle(self.user.page)
         raw = Image.open(io.BytesIO(self.user.page.screenshot())).convert("RGB")
         path = self.folder / f"page-{view}-{self.scheme}.png"
-        raw.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+        raw.save(path, optimize=True)
         size = path.stat().st_size
         if size > LARGEST:
             sys.exit(f"{path} has {size} bytes, more than {LARGEST}")

@@ -328,3 +328,5 @@ def settle(page: Page) -> None:
         """() => document.getAnimations().every(one =>
             one.playState !== "running" || one.effect?.getTiming().iterations === Infinity)"""
     )
+    # What the map shows of itself (scale, small map) follows it by a frame.
+    page.evaluate("() => new Promise(d => requestAnimationFrame(() => requestAnimationFrame(d)))")

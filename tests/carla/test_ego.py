@@ -156,6 +156,32 @@ def test_who_has_right_of_way_brakes_for_an_ego_that_ignores_it_or_the_crash_is_
     assert stopped or crashed
 
 
+def test_an_ego_that_runs_through_a_column_in_a_junction_collides_and_that_is_reported(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    ego = {
+        "id": "ego", "category": "car", "model": "vehicle.tesla.model3", "ego": True,
+        "spawn": "5.0.-1.20",
+    }  # fmt: skip
+    column = [
+        {
+            "id": f"major-{k}", "category": "car", "spawn": f"4.0.-1.{k}", "goal": "2.0.1.30",
+            "speed": 13.0,
+        }
+        for k in range(2, 36, 5)
+    ]  # fmt: skip
+    result, report, _, events = drive(
+        workspace, MAPS / "t_junction_signs.xodr", [ego, *column], [(0.0, 0.0), (4.0, 11.0)], tmp_path,
+        until=16.0,
+    )  # fmt: skip
+    assert (result.status, report.error) == ("completed", None)
+    crashes = [event for event in events if event["kind"] == "collision"]
+    parties = {name for event in crashes for name in (event["actor"], event["partner"])}
+    assert "ego" in parties
+    assert any(name.startswith("major-") for name in parties)
+    assert result.summary["actors"]["collided"] >= 2
+
+
 def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
     workspace: Workspace, tmp_path: Path
 ) -> None:
