@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from odscen.catalog.assets import shipped_assets
 from odscen.errors import InputError, WorkspaceError, in_file
 from odscen.scenario.checks import check
 from odscen.scenario.config import SamplingConfig, loads_config, overridden
@@ -120,7 +119,7 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
 def check_scenario(workspace: Workspace, scenario: Scenario) -> tuple[Problem, ...]:
     """Every problem of a scenario on its map, see :mod:`odscen.scenario.checks`."""
     loaded = load_map(workspace.map_for(scenario.map.name, scenario.map.sha256))
-    return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights)
+    return check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
 
 
 def read_config(path: Path | None) -> SamplingConfig:
@@ -244,7 +243,7 @@ def run(
                 scenario,
                 load_map(entry).sumo,
                 entry.path("net"),
-                shipped_assets(),
+                workspace.assets(),
                 seed=seed,
                 until=until,
                 step_length=step_length,
@@ -325,7 +324,7 @@ def export_sumo(workspace: Workspace, scenario: Scenario, out: Path, *, file: Pa
     with in_file(str(file)):
         refuse_errors(check_scenario(workspace, scenario))
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    prepared = prepare(scenario, load_map(entry).sumo, entry.path("net"), shipped_assets())
+    prepared = prepare(scenario, load_map(entry).sumo, entry.path("net"), workspace.assets())
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_sumo_files(prepared.sumo_files, prepared.net, out, link=False)

@@ -171,8 +171,8 @@ def test_an_ego_that_runs_through_a_column_in_a_junction_collides_and_that_is_re
         for k in range(2, 36, 5)
     ]  # fmt: skip
     result, report, _, events = drive(
-        workspace, MAPS / "t_junction_signs.xodr", [ego, *column], [(0.0, 0.0), (4.0, 11.0)], tmp_path,
-        until=16.0,
+        workspace, MAPS / "t_junction_signs.xodr", [ego, *column],
+        [(0.0, 0.0), (4.0, 11.0)], tmp_path, until=16.0,
     )  # fmt: skip
     assert (result.status, report.error) == ("completed", None)
     crashes = [event for event in events if event["kind"] == "collision"]

@@ -24,7 +24,6 @@ from odscen.carla.pictures import Wish
 from odscen.carla.recorder import StateRecorder
 from odscen.carla.server import Server
 from odscen.carla.signals import Heads
-from odscen.catalog.assets import shipped_assets
 from odscen.errors import CarlaError, InputError, in_file
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo.ground import Ground
@@ -179,7 +178,7 @@ def cosim(
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     with in_file(str(path)):
         refuse_errors(workflow.check_scenario(workspace, scenario))
-    loaded, assets = workflow.load_map(entry), shipped_assets()
+    loaded, assets = workflow.load_map(entry), workspace.assets()
     prepared = prepare(
         scenario,
         loaded.sumo,

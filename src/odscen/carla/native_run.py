@@ -24,7 +24,6 @@ from odscen.carla.native import native_actors
 from odscen.carla.native_worker import NativeJob, Note, Shot, Tick, work
 from odscen.carla.pictures import Wish
 from odscen.carla.server import Server
-from odscen.catalog.assets import shipped_assets
 from odscen.errors import CarlaError, in_file
 from odscen.frames import XodrPose, xodr_to_sumo
 from odscen.results.records import Event, EventKind, events_to_json
@@ -114,7 +113,7 @@ def run_native(
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     with in_file(str(path)):
         refuse_errors(workflow.check_scenario(workspace, scenario))
-    loaded, assets = workflow.load_map(entry), shipped_assets()
+    loaded, assets = workflow.load_map(entry), workspace.assets()
     prepared = prepare(
         scenario,
         loaded.sumo,
@@ -132,6 +131,7 @@ def run_native(
         job = NativeJob(
             address=options.address,
             plan=plan,
+            assets=assets,
             actors=native_actors(scenario, loaded.sumo.graph, plan),
             delta=options.tick or min(plan.step_length, 0.05),
             map_name=entry.name,

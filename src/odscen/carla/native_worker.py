@@ -21,7 +21,6 @@ from odscen.carla.maps import ensure_map
 from odscen.carla.pictures import Wish
 from odscen.carla.server import Server
 from odscen.carla.traffic import Traffic
-from odscen.catalog.assets import shipped_assets
 from odscen.errors import OdscenError
 from odscen.sumo.progress import Done, Failed
 from odscen.sumo.session import captured_output
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from odscen.carla.camera import Camera
     from odscen.carla.client import Address
     from odscen.carla.native import NativeActor
+    from odscen.catalog.assets import Assets
     from odscen.results.records import Event, Plan
 
 NO_NAVIGATION = (
@@ -67,6 +67,7 @@ class NativeJob:
 
     address: Address
     plan: Plan
+    assets: Assets
     actors: tuple[NativeActor, ...]
     delta: float
     map_name: str
@@ -151,7 +152,7 @@ def _run(job: NativeJob, tell: Callable[[Told], None], asked: Callable[[], bool]
         ensure_map(server, job.map_name, job.xodr, load=job.load_map)
         server.synchronize(job.delta)
         server.set_weather(job.weather)
-        names = choose_blueprints(job.plan.actors, shipped_assets(), server.library())
+        names = choose_blueprints(job.plan.actors, job.assets, server.library())
         traffic = Traffic(server, job.actors, names, seed=job.plan.seed, physics=job.physics)
         stack.callback(traffic.close)
         camera = None

@@ -28,6 +28,13 @@ GRACE = 15.0
 
 _ALOFT = 500.0
 """Metres above zero at which blueprints are measured."""
+_KIND = (
+    ("base_type", "as_str"),
+    ("special_type", "as_str"),
+    ("generation", "as_int"),
+    ("number_of_wheels", "as_int"),
+)
+"""Attributes of blueprints that say what they are, and how each is read."""
 _APART = 50.0
 """Metres between those that are."""
 _UNSET_DELTA = 1e-6
@@ -248,6 +255,19 @@ class Server:
         """Ids of all blueprints, sorted."""
         with self._answering():
             return sorted(blueprint.id for blueprint in self._library)
+
+    def describe(self, beginnings: tuple[str, ...]) -> dict[str, dict[str, str]]:
+        """What blueprints whose ids begin so say of their kind, by id."""
+        with self._answering():
+            return {
+                blueprint.id: {
+                    name: str(getattr(blueprint.get_attribute(name), read)())
+                    for name, read in _KIND
+                    if blueprint.has_attribute(name)
+                }
+                for blueprint in self._library
+                if blueprint.id.startswith(beginnings)
+            }
 
     def shapes(self, names: Sequence[str]) -> dict[str, Shape]:
         """Bounding boxes of blueprints, from one of each made aloft and taken away again."""

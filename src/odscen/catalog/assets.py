@@ -7,16 +7,17 @@ needs only another pair of such files (requirement R13).
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import asdict, dataclass
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.categories import Body, Category
-from odscen.errors import NotFoundError
+from odscen.errors import NotFoundError, WorkspaceError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 Age = Literal["adult", "child"]
 TimeOfDay = Literal["day", "sunset", "night"]
@@ -131,6 +132,42 @@ def shipped_assets() -> Assets:
         (data / "blueprints.json").read_text(encoding="utf-8"),
         (data / "weather.json").read_text(encoding="utf-8"),
     )
+
+
+BLUEPRINTS_FILE = "blueprints.json"
+
+
+def assets_in(folder: Path) -> Assets:
+    """The catalogue of a workspace: models that were fetched into its folder, else those shipped.
+
+    Raises
+    ------
+    WorkspaceError
+        If the file there cannot be read.
+    """
+    file = folder / BLUEPRINTS_FILE
+    if not file.is_file():
+        return shipped_assets()
+    return _fetched(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=4)
+def _fetched(file: Path, _changed: int) -> Assets:
+    shipped = shipped_assets()
+    try:
+        rows = json.loads(file.read_text(encoding="utf-8"))["blueprints"]
+        models = {row["id"]: _blueprint(row) for row in rows}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"{file}: not a catalogue of models ({error}); remove it or fetch it again"
+        raise WorkspaceError(msg) from error
+    return Assets(models, shipped.presets)
+
+
+def blueprint_row(model: Blueprint) -> dict[str, Any]:
+    """One model as a row of the file; the inverse of reading it."""
+    row = asdict(model)
+    length, width, height = row.pop("body")
+    return {**row, "length": length, "width": width, "height": height}
 
 
 def _blueprint(row: Mapping[str, Any]) -> Blueprint:

@@ -17,10 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from odscen.catalog.assets import assets_in
 from odscen.catalog.folders import discard, new_folder
 from odscen.errors import InputError, NotFoundError, WorkspaceError, in_file
 
 if TYPE_CHECKING:
+    from odscen.catalog.assets import Assets
     from odscen.catalog.drawing import MapDrawing
     from odscen.catalog.statistics import MapStatistics
     from odscen.convert.lane_table import LaneTable
@@ -123,7 +125,7 @@ class MapEntry:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A folder with ``maps/``, ``scenarios/`` and ``runs/``."""
+    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``assets/``."""
 
     root: Path
 
@@ -153,6 +155,15 @@ class Workspace:
     def scenarios(self) -> Path:
         """Folder that scenarios are written to by default."""
         return self.root / "scenarios"
+
+    @property
+    def assets_folder(self) -> Path:
+        """Folder of models that were fetched from a simulator."""
+        return self.root / "assets"
+
+    def assets(self) -> Assets:
+        """Models and weather: those fetched into this workspace, else those that ship."""
+        return assets_in(self.assets_folder)
 
     @property
     def runs(self) -> Path:

@@ -11,7 +11,6 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
-from odscen.catalog.assets import shipped_assets
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import check_name, name_from_file
 from odscen.categories import DEFAULT_BODY
@@ -150,9 +149,9 @@ def show_job(job: str, shared: Shared) -> JobInfo:
 
 
 @router.get("/assets")
-def assets() -> AssetsInfo:
+def assets(shared: Shared) -> AssetsInfo:
     """Categories, models and weather presets that a scenario can use."""
-    shipped = shipped_assets()
+    known = shared.workspace.assets()
     return AssetsInfo(
         categories=[
             CategoryInfo(category=category, **body._asdict())
@@ -166,7 +165,7 @@ def assets() -> AssetsInfo:
                 age=one.age,
                 **one.body._asdict(),
             )
-            for one in shipped.blueprints.values()
+            for one in known.blueprints.values()
         ],
         weather=[
             WeatherInfo(
@@ -175,7 +174,7 @@ def assets() -> AssetsInfo:
                 time_of_day=one.time_of_day,
                 parameters=dict(one.parameters),
             )
-            for one in shipped.presets.values()
+            for one in known.presets.values()
         ],
     )
 

@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from odscen.carla.served import ServedJob, run_served
-from odscen.catalog.assets import shipped_assets
 from odscen.catalog.folders import discard
 from odscen.catalog.store import check_name
 from odscen.durations import clock
@@ -272,7 +271,7 @@ class Runs:
             scenario,
             loaded.sumo,
             entry.path("net"),
-            shipped_assets(),
+            self._workspace.assets(),
             seed=wish.seed,
             until=wish.until,
             step_length=wish.step_length,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
-from odscen.catalog.assets import shipped_assets
 from odscen.catalog.store import check_name, name_from_file
 from odscen.errors import InputError, NotFoundError
 from odscen.scenario.checks import check
@@ -203,7 +202,9 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
         return (Problem("error", "map_missing", "map", str(error)),)
     with shared.search:
         region = region_of(loaded, scenario.roi)
-        return check(scenario, loaded.sumo.graph, shipped_assets(), loaded.lights, region=region)
+        return check(
+            scenario, loaded.sumo.graph, shared.workspace.assets(), loaded.lights, region=region
+        )
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:
