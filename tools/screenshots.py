@@ -66,6 +66,11 @@ def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path)
         expect(user.maps).to_have_count(len(shipped_maps()))
         user.page.wait_for_load_state("networkidle")  # the cards' pictures
         camera.take("catalogue")
+        user.page.get_by_role("button", name=f"How it was taken over: {MAP}").click()
+        expect(user.page.get_by_role("dialog")).to_be_visible()
+        user.page.wait_for_load_state("networkidle")
+        camera.take("conversion")
+        user.page.keyboard.press("Escape")
         user.open_editor(scenario)
         for step in ("Region", "Weather and time"):
             user.step(step).click()
@@ -89,6 +94,12 @@ def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path)
         expect(user.result).to_contain_text("finished", timeout=60_000)
         expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
         camera.take("result")
+        user.page.get_by_role("tab", name="Charts").click()
+        expect(user.page.get_by_role("img").first).to_be_visible()
+        user.page.wait_for_load_state("networkidle")
+        camera.take("charts")
+        user.page.get_by_role("tab", name="Runs").click()
+        camera.take("runs")
 
 
 if __name__ == "__main__":

@@ -94,7 +94,9 @@ def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
     expect(region.problems).to_have_count(0)
     region.names.first.click()
     with region.changing():
-        region.page.get_by_label("Crosses the road anywhere").click()
+        late = region.page.get_by_label("Starts after")
+        late.fill("80000")  # long after the end of the run
+        late.press("Enter")
     expect(region.problems).to_have_count(1)
     region.page.keyboard.press("Escape")
     region.map.area.press("0")
