@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import time
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
-from odscen.carla.batch import Place
+from odscen.carla.batch import Batch, Place
 from odscen.carla.blueprints import Shape
 from odscen.carla.client import answering, connect
 from odscen.carla.mirror import ROLE
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from types import TracebackType
 
-    from odscen.carla.batch import Batch
+    from odscen.carla.batch import Spawn
     from odscen.carla.client import Address
 
 LOAD_TIMEOUT = 120.0
@@ -28,6 +29,8 @@ GRACE = 15.0
 
 _ALOFT = 500.0
 """Metres above zero at which blueprints are measured."""
+FREE_AIR = 12.0
+"""Metres above the road where a body can be made that its place has no room for."""
 _KIND = (
     ("base_type", "as_str"),
     ("special_type", "as_str"),
@@ -383,9 +386,21 @@ class Server:
                 response.error or int(response.actor_id)
                 for response in responses[first : first + len(batch.spawn)]
             ]
+            self._try_in_free_air(batch.spawn, answers)
             self._own |= {answer for answer in answers if isinstance(answer, int)}
             self.tick()
         return answers
+
+    def _try_in_free_air(self, spawns: Sequence[Spawn], answers: list[int | str]) -> None:
+        """Make those that were refused high above: they are set to their place before the tick.
+
+        A server refuses a body that touches another one, as wide models beside each other do.
+        """
+        refused = [n for n, answer in enumerate(answers) if isinstance(answer, str)]
+        if refused:
+            higher = Batch(spawn=tuple(replace(spawns[n], lift=FREE_AIR) for n in refused))
+            for n, response in zip(refused, self._apply(self._commands(higher)), strict=True):
+                answers[n] = response.error or int(response.actor_id)
 
     def tick(self) -> None:
         """Make a tick. A stream that was cut comes back by itself: one more tick shows it."""

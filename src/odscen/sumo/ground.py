@@ -30,6 +30,9 @@ _REACH = 15.0
 _STOREY = 2.0
 """Metres of height by which a node may differ from what the lane says, plus a steep slope's."""
 _STEEP = 0.3
+_ASTRAY = 6.0
+"""Metres that a node of the other graph costs: a long vehicle that turns sweeps over the kerb, and
+does not stand on it."""
 
 
 class Lie(NamedTuple):
@@ -61,6 +64,7 @@ class Ground:
         self._pitch = np.concatenate([lanes.pitch, walk_pitch])
         self._tree = cKDTree(self._xy) if len(self._z) else None
         self._heights = _lane_heights(graph, table)
+        self._walk = np.arange(len(self._z)) >= len(lanes.x)
         self._flat = bool(np.ptp(self._z) < 1e-9) if len(self._z) else True
 
     def height(self, lane: str, pos: float) -> float | None:
@@ -70,7 +74,14 @@ class Ground:
             return None
         return float(np.interp(pos, *known))
 
-    def lie(self, x: FloatArray, y: FloatArray, hdg: FloatArray, near_z: FloatArray) -> Lie:
+    def lie(
+        self,
+        x: FloatArray,
+        y: FloatArray,
+        hdg: FloatArray,
+        near_z: FloatArray,
+        walks: NDArray[np.bool_],
+    ) -> Lie:
         """Ground at places; shape ``(N,)`` each.
 
         Parameters
@@ -79,6 +90,8 @@ class Ground:
             OpenDRIVE frame.
         near_z
             About how high; NaN if that is unknown.
+        walks
+            Who is on foot.
         """
         if self._flat or self._tree is None:
             z = self._z[0] if len(self._z) else 0.0
@@ -94,6 +107,7 @@ class Ground:
         elsewhere = off > _STOREY + _STEEP * np.where(known, far, 0.0)
         cost = np.where(known, far + np.where(elsewhere, 1e3 + off, 0.0), np.inf)
         cost += _turned(hdg[:, None], self._hdg[node])
+        cost += np.where(self._walk[node] != walks[:, None], _ASTRAY, 0.0)
         best = np.argmin(cost, axis=1)
         own = node[np.arange(len(x)), best]
         lie = self._between(own, x, y, hdg)
@@ -104,12 +118,17 @@ class Ground:
         )
 
     def centres(
-        self, front: SumoPose, length: FloatArray, net_offset: tuple[float, float], z: FloatArray
+        self,
+        front: SumoPose,
+        length: FloatArray,
+        net_offset: tuple[float, float],
+        z: FloatArray,
+        walks: NDArray[np.bool_],
     ) -> XodrPose:
         """Body centres of road users of whom SUMO knows the front; ``z`` is about how high."""
         level = sumo_to_xodr(front, length=length, net_offset=net_offset)
         arrays = [np.asarray(part, dtype=np.float64) for part in level[:4]]
-        lie = self.lie(arrays[0], arrays[1], arrays[3], z)
+        lie = self.lie(arrays[0], arrays[1], arrays[3], z, walks)
         pose = sumo_to_xodr(
             SumoPose(front.x, front.y, 0.0, front.angle_deg, lie.pitch),
             length=length,

@@ -8,6 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from odscen.categories import Category
 from odscen.frames import SumoPose
 from odscen.sumo.lockstep import COLUMNS
 from odscen.sumo.progress import Command, Lockstep, Place, State, encode
@@ -92,6 +93,7 @@ class InStep:
         self._placed = placed
         self._lengths = np.array([actor.length for actor in plan.actors])
         self._z = np.array([actor.z for actor in plan.actors])
+        self._walks = np.array([actor.category == Category.PEDESTRIAN for actor in plan.actors])
         self._lanes: list[str] = []
         self._lights: dict[str, str] = {}
         self._stdin: IO[bytes] | None = None
@@ -158,6 +160,7 @@ class InStep:
             self._lengths[index],
             self._plan.net_offset,
             near,
+            self._walks[index],
         )
         x, y, z, hdg, pitch = (np.asarray(part, dtype=np.float64) for part in pose)
         self._z[index] = z
