@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SHARE = 0.06
 """Of the time of a run in a hurry that frames may take."""
-LEAST_PAUSE = 1 / 30
+LEAST_PAUSE = 1 / 12
 """Wall seconds between two frames of a run in a hurry."""
 _WINDOW = 0.5
 """Wall seconds that the real-time factor is measured over."""
