@@ -43,8 +43,8 @@ def conflict_table(rows: Iterable[Mapping[str, object]]) -> pl.DataFrame:
     ----------
     rows
         With ``begin``, ``end`` (s), ``one``, ``other`` (ids), ``kind`` (following, merging,
-        crossing or walking), ``x``, ``y`` (m, OpenDRIVE frame), ``ttc`` (s), ``drac`` (m/s^2), ``pet`` (s);
-        ``None`` where there is no such measure.
+        crossing or walking), ``x``, ``y`` (m, OpenDRIVE frame), ``ttc`` (s), ``drac`` (m/s^2),
+        ``pet`` (s); ``None`` where there is no such measure.
 
     Returns
     -------
