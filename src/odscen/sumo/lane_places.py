@@ -64,7 +64,7 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
     }
     parts = dict(_parts(sumo_map, junctions))
     chains = list(_chains(net))
-    parts |= _inside(chains, parts, junctions, sumo_map)
+    parts |= _inside(chains, parts, junctions, net)
     ways = list(_ways(chains, parts, junctions))
     control = _controls(sumo_map)
     movements = {way.movement: way.junction for way in ways}
@@ -115,41 +115,31 @@ def _chains(net: RoadNet) -> Iterator[_Chain]:
             yield _Chain(source, (net.lanes[link.via], *onwards[:-1]), onwards[-1])
 
 
-def _inside(
-    chains: Sequence[_Chain], parts: _Parts, junctions: set[str], sumo_map: SumoMap
-) -> _Parts:
+def _inside(chains: Sequence[_Chain], parts: _Parts, junctions: set[str], net: RoadNet) -> _Parts:
     """Places of lanes inside of SUMO junctions that have no node, or only nodes of roads.
 
     They are in the junction that their way crosses; if it has no nodes at all, in another one that
-    the SUMO junction stands for, unless the segments before and behind touch: then they go on
-    along the road.
+    the SUMO junction stands for, as of a road that goes on past a side road.
     """
-    net, segments = sumo_map.net, sumo_map.graph.segments
-    touching = {
-        frozenset((str(segments.ids[one]), str(segments.ids[other])))
-        for one, other in segments.adjacency.tolist()
-    }
 
     def crossed(lane: NetLane) -> str | None:
         own = parts[lane.id][0].segment if lane.id in parts else None
         return own if own in junctions else None
 
     at_node: dict[str, str] = {}
-    for chain in chains:
-        for lane in chain.inside:
-            if (own := crossed(lane)) is not None:
-                at_node.setdefault(net.ends[lane.edge][0], own)
+    for source, inside, _ in chains:
+        for own in filter(None, map(crossed, inside)):
+            at_node.setdefault(net.ends[source.edge][1], own)
     found: _Parts = {}
-    for source, inside, target in chains:
-        if source.id not in parts or target.id not in parts:
-            continue
-        before, behind = parts[source.id][-1].segment, parts[target.id][0].segment
+    for source, inside, _ in chains:
         first = next(filter(None, map(crossed, inside)), None)
-        along = before == behind or frozenset((before, behind)) in touching
+        other = first or at_node.get(net.ends[source.edge][1])
         for lane in inside:
             if crossed(lane) is None and (first is not None or lane.id not in parts):
-                other = before if along else at_node.get(net.ends[lane.edge][0], before)
-                found[lane.id] = (_Part(first or other, 1.0),)
+                if other is not None:
+                    found[lane.id] = (_Part(other, 1.0),)
+                elif source.id in parts:
+                    found[lane.id] = (_Part(parts[source.id][-1].segment, 1.0),)
     return found
 
 
