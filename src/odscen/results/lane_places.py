@@ -30,9 +30,9 @@ class LanePlaces:
         lane that lies in the segment, and ``entry``: whether one comes into the segment by it.
     ways
         One row for each lane that leads to a junction or through it: ``lane``, ``junction``,
-        ``approach`` (the last edge before the junction), and inside of the junction also ``source`` (the
-        lane of that edge that one comes from), ``via`` (the first lane inside) and ``movement``;
-        null on the way to it.
+        ``approach`` (the last edge before the junction), and inside of the junction also
+        ``source`` (the lane of that edge that one comes from), ``via`` (the first lane inside) and
+        ``movement``; null on the way to it.
     segments
         ``segment`` and ``length`` along the road; junctions are not among them.
     junctions
