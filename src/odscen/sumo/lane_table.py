@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 _MOST_TRAVEL_TIME = 99_999.0
-"""Seconds; SUMO tells 100,000 at most, and then not what it was."""
+"""Seconds; SUMO tells 100,000 at most, and then not what it was; none where all stood."""
 _COUNTS = ("entered", "left", "departed", "arrived")
 
 
@@ -82,9 +82,14 @@ def lane_table(
         schema={"lane": pl.String, "present": pl.Int64},
     ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
+    # Where nearly nobody moved there is no travel time, and SUMO's density has an upper bound; all
+    # stood for the whole interval then, a whole number of vehicles.
+    at_least = col("density") * col("length") / 1000.0
+    still = pl.when(col("entered") + col("left") + col("departed") + col("arrived") == 0)
+    standing = still.then((at_least - 1e-3).ceil()).otherwise(at_least) * _period()
     fronts = (
-        pl.when(col("traveltime") >= _MOST_TRAVEL_TIME)
-        .then(pl.min_horizontal(sampled, col("density") * col("length") / 1000.0 * _period()))
+        pl.when(col("traveltime").fill_null(_MOST_TRAVEL_TIME) >= _MOST_TRAVEL_TIME)
+        .then(pl.min_horizontal(sampled, standing))
         .otherwise(col("traveltime") * col("distance") / col("length"))
     )
     loss = pl.when(moved > 0.0).then(
