@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError, WorkspaceError, in_file
+from odscen.results.expectations import needs_criticality
 from odscen.scenario.checks import check
 from odscen.scenario.config import SamplingConfig, loads_config, overridden
 from odscen.scenario.files import dumps, read_any
@@ -26,6 +27,7 @@ from odscen.scenario.sampling import choose_map, sample_scenario
 from odscen.sumo import long_runs
 from odscen.sumo.layout import NET_FILE
 from odscen.sumo.prepare import SLICE, prepare, write_report
+from odscen.sumo.recording import Recording
 from odscen.sumo.runner import RunJob, run_many, write_sumo_files
 from odscen.sumo.signals import scenario_lights
 from odscen.sumo.sumo_map import SumoMap
@@ -43,7 +45,6 @@ if TYPE_CHECKING:
     from odscen.scenario.signals import Light
     from odscen.scenario.supply import Usable
     from odscen.sumo.progress import Progress
-    from odscen.sumo.recording import Recording
     from odscen.sumo.runner import RunResult
 
 SUFFIX = ".scenario.json"
@@ -217,7 +218,8 @@ def run(
     processes
         How many run at a time.
     recording, meso, slice_length
-        See :func:`odscen.sumo.prepare.prepare`.
+        See :func:`odscen.sumo.prepare.prepare`. Criticality is recorded where an expectation asks
+        for it.
     tell
         Called with what the user should know before a long run.
 
@@ -226,6 +228,9 @@ def run(
     ScenarioError
         If a scenario has errors; none is run then.
     """
+    recording = recording or Recording()
+    if needs_criticality(expectations):
+        recording = replace(recording, criticality=True)
     jobs = []
     names: set[str] = set()
     for path in paths:

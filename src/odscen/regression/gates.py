@@ -23,9 +23,10 @@ from odscen.regression.baseline import (
 )
 from odscen.regression.measure import measure, place_index
 from odscen.regression.verdict import hold_against
-from odscen.results.expectations import evaluate
+from odscen.results.expectations import evaluate, needs_criticality
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.recording import Recording
 from odscen.sumo.runner import RunJob, run_many
 from odscen.workflow import check_scenario, load_map, read_scenario
 
@@ -257,6 +258,7 @@ def _preparer(loaded: _Loaded, seed: int) -> Callable[[], Any]:
         seed=seed,
         until=loaded.case.until,
         step_length=loaded.case.step_length,
+        recording=Recording(criticality=needs_criticality(loaded.case.expectations)),
     )
 
 

@@ -27,6 +27,9 @@ SEEN_TTC, SEEN_DRAC, SEEN_PET = 3.0, 3.0, 3.0
 SERIOUS_TTC, SERIOUS_DRAC, SERIOUS_PET = 1.5, 3.35, 1.0
 """What makes a conflict serious: seconds or less, m/s^2 or more, seconds or less."""
 
+CONFLICT_FIGURES = ("min_ttc", "max_drac", "min_pet", "pedestrian_min_pet", "serious_conflicts")
+"""Figures of a run in which criticality was measured."""
+
 BODY = 0.25
 """Metres around the centre of somebody on foot that belong to them."""
 

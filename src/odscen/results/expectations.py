@@ -17,11 +17,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
+from odscen.results.conflicts import CONFLICT_FIGURES
 from odscen.results.run_traffic import TRAFFIC_FIGURES
 from odscen.results.units import in_unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 COUNTS = (
     "planned",
@@ -51,6 +52,7 @@ FIGURES = (
     "pedestrian_mean_delay",
     "pedestrian_mean_waiting_time",
     *TRAFFIC_FIGURES,
+    *CONFLICT_FIGURES,
 )
 NAMES = ("sim_seconds", *COUNTS, *FIGURES)
 
@@ -128,6 +130,11 @@ def parse_expectation(text: str) -> Expectation:
         bound=bound,
         share=name in COUNTS and (percent or written_as_share),
     )
+
+
+def needs_criticality(expectations: Iterable[Expectation]) -> bool:
+    """Whether one of them is about how close road users came, which is not measured by itself."""
+    return any(expectation.name in CONFLICT_FIGURES for expectation in expectations)
 
 
 def evaluate(

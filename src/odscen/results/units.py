@@ -26,6 +26,7 @@ _WORDS = (
     ("delay", "s"),
     ("ttc", "s"),
     ("pet", "s"),
+    ("drac", "m/s2"),
     *((gas, "g") for gas in ("co2", "co", "hc", "nox", "pmx", "fuel")),
 )
 """A figure is named after what it measures: the first word found in its name decides, unless its
@@ -33,6 +34,7 @@ whole name is among ``_NAMES``."""
 
 _CONVERSIONS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "min": 60.0, "h": 3600.0},
+    "m/s2": {"m/s2": 1.0},
     "m": {"m": 1.0, "cm": 0.01, "km": 1000.0},
     "m/s": {"m/s": 1.0, "km/h": 1.0 / 3.6},
     "km": {"km": 1.0, "m": 0.001},

@@ -14,10 +14,12 @@ from odscen.sumo.layout import (
     REGION_FILE,
     ROUTES_FILE,
     SIGNALS_FILE,
+    SSM_FILE,
     TRAJECTORIES_FILE,
     TRIPINFO_FILE,
 )
 from odscen.sumo.recording import REGION_ID, Recording
+from odscen.sumo.ssm import OPTIONS
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
@@ -100,6 +102,8 @@ def sumo_config(settings: RunSettings) -> str:
             "xml-validation": "never",
         },
     }
+    if recording.criticality:
+        sections["ssm_device"] = {**OPTIONS, "device.ssm.file": SSM_FILE}
     if settings.meso:
         sections["mesoscopic"] = {
             "mesosim": "true",

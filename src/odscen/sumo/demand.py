@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
+from odscen.categories import Category
 from odscen.sumo.driving import number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from odscen.sumo.driving import Driver
     from odscen.sumo.people import RoadUser
@@ -22,9 +23,15 @@ class Demand:
     Everybody who departs at 0 is inserted unconditionally: the scenario has checked that bodies do
     not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of a dense
     standing crowd. Those who come later wait until SUMO finds room.
+
+    Parameters
+    ----------
+    vehicle_parameters
+        Of every vType of vehicles: key and value.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, vehicle_parameters: Sequence[tuple[str, str]] = ()) -> None:
+        self._parameters = vehicle_parameters
         self._types: dict[tuple[tuple[str, str], ...], str] = {}
         self._counts: dict[str, int] = {}
         self._lines: list[tuple[float, str, list[str]]] = []
@@ -71,13 +78,24 @@ class Demand:
     def to_xml(self) -> str:
         """Text of ``routes.rou.xml``."""
         head = [
-            f'    <vType id="{name}"{_xml(attributes)}/>'
+            line
             for attributes, name in self._types.items()
+            for line in self._type_lines(name, attributes)
         ]
         body = [line for _, _, lines in sorted(self._lines) for line in lines]
         return "\n".join(
             ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>", *head, *body, "</routes>", ""]
         )
+
+    def _type_lines(self, name: str, attributes: tuple[tuple[str, str], ...]) -> list[str]:
+        start = f'    <vType id="{name}"{_xml(attributes)}'
+        if not self._parameters or name.startswith(f"{Category.PEDESTRIAN}."):
+            return [f"{start}/>"]
+        inside = [
+            f"        <param{_xml([('key', key), ('value', value)])}/>"
+            for key, value in self._parameters
+        ]
+        return [f"{start}>", *inside, "    </vType>"]
 
     def _type(self, category: str, driver: Driver) -> str:
         """Name of the vType with these attributes: category and a running number."""

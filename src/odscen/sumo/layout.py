@@ -30,10 +30,15 @@ TRIPS_FILE = "trips.parquet"
 TRIPS_FOLDER = "trips"
 TRIPINFO_FILE = "tripinfo.xml"
 """SUMO's own; what is in it goes into the trips."""
+SSM_FILE = "ssm.xml"
+"""SUMO's own; what is in it goes into the conflicts."""
+CONFLICTS_FILE = "conflicts.parquet"
+CONFLICTS_FOLDER = "conflicts"
 RECORDED = {
     TRAJECTORIES_FILE: TRAJECTORIES_FOLDER,
     LANES_FILE: LANES_FOLDER,
     TRIPS_FILE: TRIPS_FOLDER,
+    CONFLICTS_FILE: CONFLICTS_FOLDER,
 }
 """What is recorded: the file of a run in one piece, the folder of one in slices."""
 EVENTS_FILE = "events.json"

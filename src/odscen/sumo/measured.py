@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.results.conflicts import conflict_figures
 from odscen.results.lane_places import LanePlaces
 from odscen.results.queues import queue_lengths
 from odscen.results.run_traffic import traffic_of_run
@@ -11,7 +12,7 @@ from odscen.results.traffic import traffic_figures
 from odscen.results.traffic_files import figures_json, write_tables
 from odscen.results.traffic_sums import intervals
 from odscen.sumo import layout
-from odscen.sumo.recorded import read_lanes, read_trips, trajectory_files
+from odscen.sumo.recorded import read_conflicts, read_lanes, read_trips, trajectory_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,6 +50,9 @@ def write_figures(run: Path, *, end: float) -> dict[str, float | None]:
     """Write ``figures.json`` and the tables of a run, and return the figures of the whole run."""
     figures = read_figures(run, end=end)
     of_run = traffic_of_run(figures, read_trips(run))
+    conflicts = read_conflicts(run)
+    if conflicts is not None:
+        of_run |= conflict_figures(conflicts)
     if figures is not None:
         text = figures_json(figures, of_run)
         (run / layout.FIGURES_FILE).write_text(text, encoding="utf-8")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from odscen.categories import DEFAULT_BODY, Body
-from odscen.errors import ScenarioError
+from odscen.errors import InputError, ScenarioError
 from odscen.lanegraph.paths import Router
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.results.records import Plan, PlannedActor
@@ -38,6 +38,7 @@ from odscen.sumo.people import RoadUser, demand_users, road_users
 from odscen.sumo.recording import Recording, region_xml
 from odscen.sumo.routes import NoRouteError, Route, RoutePlanner
 from odscen.sumo.signals import scenario_lights, signals_xml
+from odscen.sumo.ssm import VEHICLE_PARAMETER
 from odscen.sumo.usable import usable_places
 from odscen.sumo.walks import Walk, WalkPlanner
 from odscen.sumo.weather import NO_EFFECT, weather_effect
@@ -118,8 +119,13 @@ def realize(
     ScenarioError
         With every actor and flow whose spawn or goal is not usable, or with every timing of a
         traffic light that is not possible.
+    InputError
+        If criticality is to be measured in meso.
     """
     recording = recording or Recording()
+    if meso and recording.criticality:
+        msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"
+        raise InputError(msg)
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map.lights)))
     if seed is not None:
         scenario = scenario.model_copy(update={"seed": seed})
@@ -129,7 +135,8 @@ def realize(
     users, unmet = everybody(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if weather else NO_EFFECT
-    writer = _Writer(sumo_map, region, assets, scenario.seed, effect)
+    demand = Demand((VEHICLE_PARAMETER,) if recording.criticality else ())
+    writer = _Writer(sumo_map, region, assets, scenario.seed, effect, demand)
     planned = writer.add(users)
     plan = Plan(
         scenario=scenario.name,
@@ -210,9 +217,10 @@ class _Writer:
         assets: Assets | None,
         seed: int,
         effect: WeatherEffect,
+        demand: Demand,
     ) -> None:
         graph = sumo_map.graph
-        self.demand = Demand()
+        self.demand = demand
         self.problems: list[str] = []
         self.notes: list[str] = []
         self._graph = graph

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.sumo.layout import LANES_FILE, RECORDED, TRAJECTORIES_FILE, TRIPS_FILE
+from odscen.sumo.layout import CONFLICTS_FILE, LANES_FILE, RECORDED, TRAJECTORIES_FILE, TRIPS_FILE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -91,6 +91,16 @@ def read_trips(run: Path) -> pl.DataFrame | None:
     ``None`` if nothing was recorded, or nobody was there.
     """
     return _read(run, TRIPS_FILE)
+
+
+def read_conflicts(run: Path) -> pl.DataFrame | None:
+    """Read who came close to whom, see :func:`odscen.results.conflicts.conflict_table`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded.
+    """
+    return _read(run, CONFLICTS_FILE)
 
 
 def _read(run: Path, file: str) -> pl.DataFrame | None:

@@ -1,4 +1,4 @@
-"""What is recorded: trajectories (how often, where, and which columns), and emissions.
+"""What is recorded: trajectories (how often, where, and which columns), emissions, conflicts.
 
 Trajectories as text, for the command line: ``none``, or ``key=value`` with commas between:
 ``every=1s``, ``region=XMIN:YMIN:XMAX:YMAX`` (metres, OpenDRIVE frame), ``columns=lane+pos``.
@@ -35,6 +35,9 @@ class Recording:
         Of :data:`OPTIONAL`, beside :data:`NEEDED`.
     emissions
         Whether lanes tell what was emitted on them; without trajectories too.
+    criticality
+        Whether vehicles watch how close they come to each other, and to people on foot if there
+        are trajectories of every step.
     """
 
     trajectories: bool = True
@@ -42,6 +45,7 @@ class Recording:
     region: tuple[float, float, float, float] | None = None
     columns: tuple[str, ...] = ("lane",)
     emissions: bool = True
+    criticality: bool = False
 
     def attributes(self, *, elevation: bool) -> tuple[str, ...]:
         """SUMO's names of the columns, in its order."""

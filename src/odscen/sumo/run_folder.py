@@ -189,7 +189,7 @@ def drop_torn_records(folder: Path) -> None:
 
     A killed run leaves them, and nothing can read them.
     """
-    for name in (layout.LANES_FILE, layout.EMISSIONS_FILE, layout.TRIPINFO_FILE):
+    for name in (layout.LANES_FILE, layout.EMISSIONS_FILE, layout.TRIPINFO_FILE, layout.SSM_FILE):
         (folder / name).unlink(missing_ok=True)
     file = folder / layout.TRAJECTORIES_FILE
     if not file.is_file():
@@ -218,6 +218,8 @@ def found_files(folder: Path) -> dict[str, str]:
         "lane_parts": layout.LANES_FOLDER,
         "trips": layout.TRIPS_FILE,
         "trip_parts": layout.TRIPS_FOLDER,
+        "conflicts": layout.CONFLICTS_FILE,
+        "conflict_parts": layout.CONFLICTS_FOLDER,
         "lane_places": layout.LANE_PLACES_FILE,
         "figures": layout.FIGURES_FILE,
         "figure_tables": layout.FIGURES_FOLDER,

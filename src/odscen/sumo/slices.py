@@ -27,6 +27,7 @@ from odscen.sumo.checkpoint import (
     read_checkpoint,
     slice_folder,
 )
+from odscen.sumo.conflict_files import tidy_conflicts
 from odscen.sumo.outputs import outputs_to, tidy_outputs
 from odscen.sumo.parts import check_room, tidy_part
 from odscen.sumo.progress import Done
@@ -122,6 +123,7 @@ class _Slice:
             check_state(part / STATE_FILE)
         tidy_part(part / layout.TRAJECTORIES_FILE)
         tidy_outputs(part, lengths, present=before.lanes if before else {}, last=last)
+        tidy_conflicts(part, self._plan)
         seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)
         checkpoint = Checkpoint(
             number=self._number,

@@ -36,7 +36,7 @@ _KINDS = {
 _MEASURES = {"minTTC": "ttc", "maxDRAC": "drac", "PET": "pet"}
 
 
-def read_conflicts(
+def logged_conflicts(
     file: Path, *, net_offset: tuple[float, float] = (0.0, 0.0)
 ) -> Iterator[dict[str, object]]:
     """Rows for :func:`odscen.results.conflicts.conflict_table` from the device's log.

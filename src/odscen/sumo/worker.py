@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from odscen.errors import OdscenError
 from odscen.results.records import Plan, event_line, events_text
 from odscen.results.summary import actor_outcomes, actors_to_json
+from odscen.sumo.conflict_files import tidy_conflicts
 from odscen.sumo.layout import ACTORS_FILE, CONFIG_FILE, EVENTS_FILE, LOG_FILE, SUMO_FOLDER
 from odscen.sumo.lockstep import LockstepWatch
 from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_by_id
@@ -94,6 +95,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
         now = stepper.run(session, plan.until)
         lengths = session.lane_lengths()
     tidy_outputs(folder, lengths, present={}, last=True)
+    tidy_conflicts(folder, plan)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
 
 
