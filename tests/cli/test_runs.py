@@ -79,6 +79,17 @@ def test_a_failed_expectation_is_exit_code_1(workspace, scenario, tmp_path):
     assert "did you mean arrived" in done.err
 
 
+def test_an_expectation_of_criticality_has_it_measured(workspace, scenario, tmp_path):
+    w = ("--out", tmp_path, "--json", "--workspace", workspace)
+    done = odscen("run", scenario, "--expect", "min_ttc >= 0.1 s", "--expect", "min_pet<0", *w)
+    assert done.code == 1
+    (ttc, pet) = done.json["expectations"]
+    assert ttc["passed"]
+    assert ttc["value"] == done.json["figures"]["min_ttc"]
+    assert not pet["passed"]
+    assert Path(done.json["files"]["conflicts"]).is_file()
+
+
 def test_several_scenarios_give_one_table(workspace, tmp_path):
     w = ("--workspace", workspace)
     odscen("generate", "--map", "t_junction_signs", "--count", 3, "--out", tmp_path / "s", *w)

@@ -7,9 +7,10 @@ import pytest
 from lxml import etree
 
 from odscen.categories import Body, Category
-from odscen.errors import ScenarioError
+from odscen.errors import InputError, ScenarioError
 from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario, Simulation
 from odscen.sumo.realize import Realization, realize
+from odscen.sumo.recording import Recording
 from tests.graphs import SHA256
 from tests.sumo.toys import sumo_map
 
@@ -115,6 +116,22 @@ def test_a_model_without_exhaust_emits_as_one() -> None:
         "HBEFA4/PC_BEV",
         "HBEFA4/PC_petrol_Euro-4",
     ]
+
+
+def test_vehicles_and_nobody_else_watch_how_close_they_come() -> None:
+    actors = (
+        Actor(id="a", category=Category.CAR, spawn="1.0.-2.10"),
+        Actor(id="p", category=Category.PEDESTRIAN, spawn="ped.1.0.-3.10"),
+    )
+    realized = realize(scenario(actors=actors), sumo_map(), recording=Recording(criticality=True))
+    watching = {kind.get("id"): len(kind) for kind in routes(realized).iterfind("vType")}
+    assert watching == {"car.0": 1, "pedestrian.0": 0}
+    assert "device.ssm.file" in realized.files["scenario.sumocfg"]
+
+
+def test_criticality_is_refused_where_there_are_only_queues() -> None:
+    with pytest.raises(InputError, match="meso"):
+        realize(scenario(), sumo_map(), recording=Recording(criticality=True), meso=True)
 
 
 def test_equal_types_are_written_once() -> None:
