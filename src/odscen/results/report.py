@@ -26,6 +26,7 @@ from odscen.results.report_tables import (
     report_section,
 )
 from odscen.results.report_trouble import trouble_section
+from odscen.results.report_words import duration
 from odscen.results.summary import actor_counts, key_figures
 from odscen.results.traces import bin_width, speed_over_time, tidy, travel
 
@@ -126,17 +127,6 @@ def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
     last = traces["time"].max()
     recorded = float(last) if isinstance(last, int | float) else 0.0
     return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
-
-
-def duration(seconds: float | None) -> str:
-    """``"4 min 05 s"``; empty for ``None``."""
-    if seconds is None or not np.isfinite(seconds):
-        return ""
-    if seconds < 60.0:
-        return f"{number(seconds, 1)} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s"
 
 
 def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
