@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -61,10 +62,10 @@ class Corridor:
         return float(self.starts[-1])
 
 
-def busiest_way(movements: pl.DataFrame, graph: MapGraph) -> tuple[str, ...] | None:
-    """Segments of the way on which most vehicles pass most junctions.
+def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | None:
+    """Corridor on which most vehicles pass most junctions; ``None`` if nobody passed any.
 
-    From each of the busiest turns it goes on, forwards and backwards, with the busiest turn that
+    From each of the busiest turns a way goes on, forwards and backwards, with the busiest turn that
     joins it. Of all ways found, the one with the largest sum of vehicles over its junctions.
 
     Parameters
@@ -72,22 +73,20 @@ def busiest_way(movements: pl.DataFrame, graph: MapGraph) -> tuple[str, ...] | N
     movements
         With ``movement`` (``r1>j10>r2``) and ``vehicles``, over the whole run.
     """
-    passed = {
-        tuple(str(name).split(">")): int(vehicles)
-        for name, vehicles in movements.select("movement", "vehicles").iter_rows()
-    }
-    turns = {turn: count for turn, count in passed.items() if len(turn) == 3 and count > 0}
+    passed = movements.select("movement", "vehicles").iter_rows()
+    turns = {tuple(str(name).split(">")): int(vehicles) for name, vehicles in passed if vehicles}
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
     for one, others in onwards.items():
         for other in others:
             before[other].add(one)
-    best: tuple[int, tuple[str, ...]] | None = None
-    for turn in sorted(turns, key=lambda turn: (-turns[turn], turn))[:_TRIED]:
-        way, total = _grown(turn, turns, onwards, before)
-        if best is None or (total, way) > best:
-            best = total, way
-    return None if best is None else best[1]
+    busiest = sorted(turns, key=lambda turn: (-turns[turn], turn))[:_TRIED]
+    ways = {_grown(turn, turns, onwards, before) for turn in busiest}
+    for _, way in sorted(ways, key=lambda found: (-found[0], found[1])):
+        # Turns that join need not do so lane by lane.
+        with suppress(InputError):
+            return corridor_along(graph, way)
+    return None
 
 
 def _grown(
@@ -95,8 +94,8 @@ def _grown(
     turns: dict[tuple[str, ...], int],
     onwards: dict[str, set[str]],
     before: dict[str, set[str]],
-) -> tuple[tuple[str, ...], int]:
-    """Way through ``turn`` with the vehicles of all its turns."""
+) -> tuple[int, tuple[str, ...]]:
+    """Way through ``turn``, after the vehicles of all its turns."""
     way, total, junctions = list(turn), turns[turn], 1
     least = _STEADY * turns[turn]
     for forwards in (True, False):
@@ -120,7 +119,7 @@ def _grown(
             if len(near) != 1:
                 break
             way = [*way, *near] if forwards else [*near, *way]
-    return tuple(way), total
+    return total, tuple(way)
 
 
 def way_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
