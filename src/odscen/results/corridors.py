@@ -119,7 +119,9 @@ def _grown(
             if len(near) != 1:
                 break
             way = [*way, *near] if forwards else [*near, *way]
-    return total, tuple(way)
+    # Road that led to no further junction is left out but for its first segment.
+    inside = [place for place, name in enumerate(way) if name[0] == "j"]
+    return total, tuple(way[max(inside[0] - 1, 0) : inside[-1] + 2])
 
 
 def way_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
