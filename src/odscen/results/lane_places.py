@@ -100,9 +100,7 @@ def _schemas() -> dict[str, dict[str, type[pl.DataType]]]:
             "share": pl.Float64,
             "entry": pl.Boolean,
         },
-        "ways": {
-            name: pl.String for name in ("lane", "junction", "edge", "source", "via", "movement")
-        },
+        "ways": dict.fromkeys(("lane", "junction", "edge", "source", "via", "movement"), pl.String),
         "segments": {"segment": pl.String, "length": pl.Float64},
         "junctions": place,
         "movements": {"movement": pl.String, **place},

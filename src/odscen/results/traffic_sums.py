@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -28,12 +29,12 @@ def intervals(lanes: pl.DataFrame, end: float) -> pl.DataFrame:
     seen = [(0.0, 0.0), *lanes.select(INTERVAL).unique().sort("begin").rows(), (end, end)]
     period = max((last - first for first, last in seen), default=0.0) or end
     found = []
-    for (first, last), (following, _) in pairwise(seen):
-        if last > first:
-            found.append((first, last))
-        while following - last > 1e-6:
-            first, last = last, min(last + period, following)
-            found.append((first, last))
+    for (begin, last), (following, _) in pairwise(seen):
+        if last > begin:
+            found.append((begin, last))
+        empty = math.ceil((following - last) / period - 1e-6)
+        edges = [min(last + k * period, following) for k in range(empty + 1)]
+        found += pairwise(edges)
     return pl.DataFrame(found, schema=dict.fromkeys(INTERVAL, pl.Float64), orient="row")
 
 
@@ -50,7 +51,7 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     import polars as pl
 
     found = lanes.group_by(INTERVAL).agg(_sum("departed", "arrived", *TRAFFIC, *LOST))
-    length = places.lanes.unique("lane")["length"].sum()
+    length = float(places.lanes.unique("lane")["length"].sum())
     under_way = (pl.col("departed") - pl.col("arrived")).cum_sum().shift(1, fill_value=0)
     return _on_clock(clock, found, INTERVAL).with_columns(
         (under_way + pl.col("departed")).alias("vehicles"), pl.lit(length / 1000.0).alias("length")

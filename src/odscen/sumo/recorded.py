@@ -1,10 +1,10 @@
-"""The trajectories in a run folder: one file of a run in one piece, parts of a run in slices."""
+"""What is recorded in a run folder: one file of a run in one piece, parts of a run in slices."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.sumo.layout import TRAJECTORIES_FILE, TRAJECTORIES_FOLDER
+from odscen.sumo.layout import LANES_FILE, RECORDED, TRAJECTORIES_FILE, TRIPS_FILE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,14 +21,24 @@ class Recorded(NamedTuple):
     every: int = 1
 
 
-def trajectory_files(run: Path) -> list[Path]:
-    """Parquet files of a run, in order of time; empty if none were recorded, or nobody was there.
+def recorded_files(run: Path, file: str) -> list[Path]:
+    """Parquet files of one thing that a run records, in order of time; empty if there are none.
 
     Those of a run in slices are alike and read as one table: ``polars.scan_parquet(files)``, DuckDB
     ``'RUN/trajectories/*.parquet'``.
+
+    Parameters
+    ----------
+    file
+        Of :data:`odscen.sumo.layout.RECORDED`: its name in the folder of a run in one piece.
     """
-    one = run / TRAJECTORIES_FILE
-    return [one] if one.is_file() else sorted((run / TRAJECTORIES_FOLDER).glob("part-*.parquet"))
+    one = run / file
+    return [one] if one.is_file() else sorted((run / RECORDED[file]).glob("part-*.parquet"))
+
+
+def trajectory_files(run: Path) -> list[Path]:
+    """Parquet files of the trajectories; empty if none were recorded, or nobody was there."""
+    return recorded_files(run, TRAJECTORIES_FILE)
 
 
 def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
@@ -57,3 +67,34 @@ def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
     kept = times.gather_every(every)
     rows = table.join(kept.to_frame().lazy(), on=_TIME, how="semi", maintain_order="left")
     return Recorded(rows.collect(engine="streaming"), every)
+
+
+def read_lanes(run: Path) -> pl.DataFrame | None:
+    """Read what was measured on each lane and interval, sorted by ``begin`` and ``lane``.
+
+    Columns as in :mod:`odscen.sumo.lane_table`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded, or no vehicle was there.
+    """
+    return _read(run, LANES_FILE)
+
+
+def read_trips(run: Path) -> pl.DataFrame | None:
+    """Read the trips of vehicles and persons in order of arrival, the unfinished last.
+
+    Columns as in :mod:`odscen.sumo.trip_table`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded, or nobody was there.
+    """
+    return _read(run, TRIPS_FILE)
+
+
+def _read(run: Path, file: str) -> pl.DataFrame | None:
+    import polars as pl
+
+    files = recorded_files(run, file)
+    return pl.read_parquet(files) if files else None
