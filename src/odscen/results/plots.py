@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _WIDTH, _HEIGHT = 760.0, 270.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 14.0, 30.0, 40.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 20.0, 30.0, 40.0
 _HOURS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0)
 _SIXTIETHS = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 60.0)
 
@@ -84,10 +84,12 @@ class Axis(NamedTuple):
     name: str
 
 
-def value_axis(top: float, name: str) -> Axis:
-    """Axis from zero to a round number not below ``top``."""
+def value_axis(top: float, name: str, *, tight: bool = False) -> Axis:
+    """Axis from zero to a round number not below ``top``; to ``top`` itself if ``tight``."""
     ticks = nice_ticks(0.0, top if top > 0 else 1.0)
-    return Axis(0.0, ticks[-1], [(value, _tick_text(value)) for value in ticks], name)
+    high = top if tight and top > 0 else ticks[-1]
+    shown = [(value, _tick_text(value)) for value in ticks if value <= high]
+    return Axis(0.0, high, shown, name)
 
 
 def time_axis(end: float) -> Axis:
@@ -147,7 +149,7 @@ def line_chart(
         element("path", d=_line_data(frame, time, line.y), class_=f"line {line.style}")
         for line in series
     ]
-    return chart(frame, parts, description=description, legend=_legend(series))
+    return chart(frame, parts, description=description, keys=_legend(series))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,7 +192,7 @@ def dot_chart(
         ]
         parts.append(element("g", *circles, class_=f"dots {dots.style}"))
     entries = [(dots.style, dots.label) for dots in groups]
-    return chart(frame, parts, description=description, legend=legend(entries))
+    return chart(frame, parts, description=description, keys=legend(entries))
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,9 +214,9 @@ class Frame:
 
 
 def chart(
-    frame: Frame, parts: Sequence[Markup], *, description: str, legend: Markup | None = None
+    frame: Frame, parts: Sequence[Markup], *, description: str, keys: Markup | None = None
 ) -> Markup:
-    """Axes, what lies between them, and the legend below."""
+    """Axes, what lies between them, and a legend below."""
     drawn = [element("title", description)]
     drawn += [_grid_line(frame, *tick) for tick in frame.y_axis.ticks]
     drawn += [_x_tick(frame, *tick) for tick in frame.x_axis.ticks]
@@ -226,7 +228,7 @@ def chart(
     )
     view = f"0 0 {number(_WIDTH)} {number(frame.height)}"
     svg = element("svg", *drawn, viewBox=view, role="img", class_="chart")
-    return element("div", svg, legend, class_="chart-box")
+    return element("div", svg, keys, class_="chart-box")
 
 
 def legend(entries: Sequence[tuple[str, str]]) -> Markup:

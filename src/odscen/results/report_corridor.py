@@ -87,31 +87,34 @@ def corridor_section(traces: CorridorTraces | str) -> Markup:
 
 def _diagram(traces: CorridorTraces) -> Markup:
     frame = Frame(
-        clock_axis(traces.begin, traces.end), value_axis(traces.length, "metres along the way"),
+        clock_axis(traces.begin, traces.end),
+        value_axis(traces.length, "metres along the way", tight=True),
         height=460.0,
-    )  # fmt: skip
+    )
     left, right = (float(frame.x(value)) for value in (traces.begin, traces.end))
-    parts = []
+    bands: list[Markup] = []
+    names: list[Markup] = []
     labels: list[float] = []
     for name, begin, end in traces.junctions:
         low, high = float(frame.y(begin)), float(frame.y(end))
-        parts.append(element("rect", x=left, y=high, width=right - left,
-                             height=max(low - high, 1.0), class_="junction-band"))  # fmt: skip
+        bands.append(element("rect", x=left, y=high, width=right - left,
+                             height=max(low - high, 1.0), class_="band-of"))  # fmt: skip
         middle = (low + high) / 2 + 4.0
         if all(abs(middle - other) > 14.0 for other in labels):
             labels.append(middle)
-            parts.append(text_at(right - 4, middle, name, class_="on-band", text_anchor="end"))
-    parts[:0] = []
-    for style, data in zip(("moving", "standing"), _lines(frame, traces), strict=True):
-        parts.append(element("path", d=data, transform="scale(0.1)", class_=f"trace {style}"))
-    # Names lie over the lines.
-    parts.sort(key=lambda part: "on-band" in part)
+            names.append(text_at(right - 4, middle, name, class_="over", text_anchor="end"))
+    driven = [
+        element("path", d=data, transform="scale(0.1)", class_=f"trace {style}")
+        for style, data in zip(("moving", "standing"), _lines(frame, traces), strict=True)
+    ]
     words = [("c-moving", "a vehicle that drives"), ("c-standing", "one that stands or crawls"),
              ("c-band", "junction")]  # fmt: skip
     return chart(
-        frame, parts, legend=legend(words),
+        frame,
+        [*bands, *driven, *names],
         description="Places of vehicles along the corridor over time; red where they stand",
-    )  # fmt: skip
+        keys=legend(words),
+    )
 
 
 def _lines(frame: Frame, traces: CorridorTraces) -> tuple[str, str]:

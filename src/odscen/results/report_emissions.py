@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.markup import Markup, element, number
 from odscen.results.plots import Series, line_chart
+from odscen.results.report_figures import Card, card_grid
 from odscen.results.report_flow import column, middles
 from odscen.results.report_tables import html_table, report_section
 from odscen.results.traffic import over_run
@@ -29,7 +30,7 @@ SUBSTANCES = {
 
 _CHARTS = (
     ("kg an hour", 1000.0, ("co2", "fuel"), "Carbon dioxide and fuel over time"),
-    ("g an hour", 1.0, ("nox", "co", "hc", "pmx"), "Pollutants over time"),
+    ("g an hour", 1.0, ("nox", "hc", "pmx"), "Pollutants over time"),
 )
 
 
@@ -39,12 +40,13 @@ def emission_section(figures: TrafficFigures) -> Markup | None:
     if network.is_empty() or not (network["co2"].sum() or 0.0):
         return None
     total = over_run(network).row(0, named=True)
-    cards = [
-        element("div", element("strong", _mass(total[name])), element("span", words), class_="card")
-        for name, (words, _) in SUBSTANCES.items()
-        if total[name] is not None
+    parts = [
+        card_grid(
+            Card(words, _mass(total[name]))
+            for name, (words, _) in SUBSTANCES.items()
+            if total[name] is not None
+        )
     ]
-    parts = [element("div", *cards, class_="cards")]
     if network.height > 1:
         parts += _charts(network)
     parts += [element("h3", "Where most of it arises"), _places(figures, total["co2"])]
@@ -66,6 +68,7 @@ def _charts(network: pl.DataFrame) -> list[Markup]:
             for name in names
             if name in network.columns and network[name].is_not_null().any()
         ]
+        charts.append(element("h3", text))
         charts.append(line_chart(time, series, y_label=label, description=text, height=210.0,
                        end=float(network["end"][-1])))
     return charts
@@ -77,7 +80,7 @@ def _places(figures: TrafficFigures, total: float) -> Markup:
     tables = [
         over_run(table).select(
             pl.lit(kind).alias("kind"), pl.col(place).alias("place"),
-            "vehicles", "co2", "fuel", "nox", "pmx",
+            "vehicles", pl.col("co2", "fuel", "nox", "pmx").cast(pl.Float64),
         )  # fmt: skip
         for kind, place, table in (
             ("road", "segment", figures.segments),

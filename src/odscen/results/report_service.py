@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 LEVELS = {
     "A": "A: free",
     "B": "B: good",
-    "C": "C: steady",
-    "D": "D: dense",
-    "E": "E: full",
-    "F": "F: overloaded",
+    "C": "C: fair",
+    "D": "D: slow",
+    "E": "E: bad",
+    "F": "F: very bad",
 }
 """Levels of service with the words of the legends."""
 
@@ -56,8 +56,8 @@ def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Mark
     if not parts:
         return None
     explained = (
-        "the level is a grade, from A (hardly anybody waits) to F (more traffic than the place can "
-        "carry). A junction has it from the time that a vehicle loses there on average, a road "
+        "the level is a grade, from A (hardly anybody is held up) to F (more traffic than the place "
+        "can carry, or hardly any getting on). A junction has it from the time that a vehicle loses there on average, a road "
         "from how much slower than free it is driven. The strip shows the level over the whole run, "
         "from left to right. A queue is the number of vehicles that stand. Places are named as in "
         f"the editor; those with fewer than {FEW} vehicles are not listed."
@@ -81,7 +81,7 @@ def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -
     if place == "junction":
         heads.append("Control")
     heads += ["Level", "Delay, s", "Mean queue", "Longest queue", "Vehicles"]
-    heads += ["Over time", "Worst time"]
+    heads += ["Over time", "Worst from"]
     if place == "movement":
         heads.remove("Longest queue")
     rows = []
@@ -113,14 +113,14 @@ def _worst_time(times: pl.DataFrame) -> str:
     if known.is_empty():
         return "-"
     row = known.sort(["delay", "begin"], descending=[True, False]).row(0, named=True)
-    return f"{stretch(row['begin'], row['end'])}, {number(row['delay'], 0)} s"
+    return f"{stretch(row['begin'], row['end']).split(' to ')[0]}, {number(row['delay'], 0)} s"
 
 
 def level_badge(level: str | None) -> Markup:
     """The letter on its colour."""
     if level is None:
         return Markup("-")
-    return element("span", level, class_=f"badge los-{level.lower()}")
+    return element("span", element("b", level), class_=f"badge los-{level.lower()}")
 
 
 def level_strip(times: pl.DataFrame) -> Markup:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.catalog.markup import Markup, element, number
+from odscen.catalog.markup import Markup, number
 from odscen.results.plots import Series, line_chart
+from odscen.results.report_figures import Card, card_grid
 from odscen.results.report_tables import report_section
 from odscen.results.report_words import duration
 from odscen.results.traces import bin_width, speed_over_time
@@ -43,17 +44,17 @@ def walking_section(
         return None
     arrived = sum(actor.status == "arrived" for actor in walkers)
     speed = figures.get(_PREFIX + "mean_speed")
-    cards = [
-        ("people on foot", f"{len(walkers):,}", f"{arrived:,} reached their goal"),
-        ("mean time on the way", duration(figures.get(_PREFIX + "mean_travel_time")) or "-", ""),
-        ("waited on average", duration(figures.get(_PREFIX + "mean_waiting_time")) or "-",
-         "stood, mostly at crossings"),
-        ("lost on average", duration(figures.get(_PREFIX + "mean_delay")) or "-",
-         "against walking freely"),
-        ("mean walking speed", "-" if speed is None else f"{number(speed, 2)} m/s",
-         "waiting included"),
-    ]  # fmt: skip
-    parts: list[Markup | None] = [cards_of(cards)]
+    cards = [Card("people on foot", f"{len(walkers):,}", f"{arrived:,} reached their goal")]
+    for name, words, note in (
+        ("mean_travel_time", "mean time on the way", "of those who arrived"),
+        ("mean_waiting_time", "stood on average", "mostly at crossings"),
+        ("mean_delay", "lost on average", "against walking freely"),
+    ):
+        if (seconds := figures.get(_PREFIX + name)) is not None:
+            cards.append(Card(words, duration(seconds), note))
+    if (speed := figures.get(_PREFIX + "mean_speed")) is not None:
+        cards.append(Card("mean walking speed", f"{number(speed, 2)} m/s", "waiting included"))
+    parts: list[Markup | None] = [card_grid(cards)]
     on_foot = traces.filter(traces["category"] == "pedestrian")
     if not on_foot.is_empty():
         curve = speed_over_time(on_foot, end=end, width=bin_width(end, bins=60))
@@ -71,18 +72,3 @@ def walking_section(
         "waiting asks for a crossing, or for more green for those who walk."
     )
     return report_section("People on foot", *parts, explained=explained, ident="walking")
-
-
-def cards_of(figures: Sequence[tuple[str, str, str]], *, bad: frozenset[str] = frozenset()) -> Markup:
-    """Figures as cards: name, value, and a note or nothing; ``bad`` names those in red."""
-    cards = [
-        element(
-            "div",
-            element("strong", value),
-            element("span", name),
-            element("small", note) if note else None,
-            class_="card bad" if name in bad else "card",
-        )
-        for name, value, note in figures
-    ]
-    return element("div", *cards, class_="cards")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 WINDOWS = (3600.0, 1800.0, 900.0, 600.0, 300.0)
 """Seconds that a diagram may show, the longest first."""
 
-MOST = 500
+MOST = 900
 """Vehicles in a diagram; with more of them a shorter window is chosen."""
 
 _GRAIN = 300.0
@@ -44,7 +44,7 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
     files = trajectory_files(run)
     if not files:
         return NONE_RECORDED
-    places, lanes = sumo_map.lane_places, sumo_map.graph.lanes
+    places = sumo_map.lane_places
     known = places.lane[corridor.nodes] >= 0
     nodes, along = corridor.nodes[known], corridor.along[known]
     row_of = {places.lanes[row]: row for row in np.unique(places.lane[nodes]).tolist()}
