@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -11,12 +12,16 @@ import sumo
 
 from odscen.results.records import Plan, PlannedActor
 from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.measures import measures_xml
 from odscen.sumo.runner import PreparedRun
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
 
 LENGTH = 4.5
 """Of every car in these tests, metres."""
+SLICE, UNTIL = 60.0, 200.0
+ROWS = ("A0B0 B0C0 C0C1", "A1B1 B1C1", "C2B2 B2A2 A2A1", "C0C1 C1C2", "B2B1 B1B0 B0A0")
+WALKS = ("A0B0 B0C0", "C1B1 B1A1", "B2B1 B1B0")
 
 Prepare = Callable[..., PreparedRun]
 
@@ -52,10 +57,14 @@ def prepare(grid: Path) -> Prepare:
             scenario="grid", seed=7, until=until, step_length=0.5, net_offset=(0.0, 0.0),
             actors=tuple(actors),
         )  # fmt: skip
-        settings = RunSettings(until=until, step_length=0.5, seed=7)
+        settings = RunSettings(until=until, step_length=0.5, seed=7, measures=True)
         return PreparedRun(
             plan=plan,
-            sumo_files={"routes.rou.xml": text, "scenario.sumocfg": sumo_config(settings)},
+            sumo_files={
+                "measures.add.xml": measures_xml(10.0, emissions=True),
+                "routes.rou.xml": text,
+                "scenario.sumocfg": sumo_config(settings),
+            },
             net=grid,
             scenario_json="{}",
         )
@@ -63,10 +72,46 @@ def prepare(grid: Path) -> Prepare:
     return prepared
 
 
+@pytest.fixture(scope="session")
+def long(grid: Path) -> PreparedRun:
+    """Cars whose drivers dawdle at random, and walkers, over 200 s in slices of 60 s."""
+    chance = random.Random(3)
+    departs = sorted(round(chance.uniform(0.0, 150.0), 2) for _ in range(90))
+    lines, actors = ["<routes>", TYPES], []
+    for index, depart in enumerate(departs):
+        walker = index % 5 == 0
+        name = f"{'walker' if walker else 'car'}{index}"
+        actors.append(
+            PlannedActor(
+                id=name, category="pedestrian" if walker else "car", spawn="1.0.-1.0", goal=None,
+                depart=depart, length=0.4 if walker else 4.5, width=0.5, x=0.0, y=0.0, z=0.0,
+                hdg=0.0, free_flow_time=40.0,
+            )
+        )  # fmt: skip
+        if walker:
+            lines.append(
+                f'<person id="{name}" type="walker" depart="{depart}" departPos="5">'
+                f'<walk edges="{WALKS[index % 3]}"/></person>'
+            )
+        else:
+            lines.append(
+                f'<vehicle id="{name}" type="car" depart="{depart}" departLane="1">'
+                f'<route edges="{ROWS[index % 5]}"/></vehicle>'
+            )
+    settings = RunSettings(until=UNTIL, step_length=0.5, seed=7, measures=True)
+    files = {
+        "measures.add.xml": measures_xml(30.0, emissions=True),
+        "routes.rou.xml": "\n".join([*lines, "</routes>", ""]),
+        "scenario.sumocfg": sumo_config(settings),
+    }
+    plan = Plan("grid", 7, UNTIL, 0.5, (0.0, 0.0), tuple(actors), slice_length=SLICE)
+    return PreparedRun(plan, files, grid, scenario_json="{}")
+
+
 TYPES = """\
 <vType id="car" length="4.5" width="1.8" speedFactor="0.95" speedDev="0"/>
 <vType id="walker" vClass="pedestrian" length="0.4" width="0.5" speedFactor="1" speedDev="0"
- maxSpeed="1.3"/>"""
+ maxSpeed="1.3" desiredMaxSpeed="1.3"/>"""
 WALK = """\
 <person id="walker" type="walker" depart="0" departPos="30"><walk edges="A0B0 B0C0" arrivalPos="20"
  departPosLat="0.5"/></person>"""

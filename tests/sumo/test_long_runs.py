@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import random
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -11,56 +10,17 @@ import pytest
 
 from odscen.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
 from odscen.results.expectations import parse_expectation
-from odscen.results.records import EventKind, Plan, PlannedActor, events_from_json
+from odscen.results.records import EventKind, events_from_json
 from odscen.results.summary import actors_from_json
 from odscen.sumo import checkpoint, forecast, process, status
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.layout import RECORDED
 from odscen.sumo.live import Live
 from odscen.sumo.long_runs import resume
 from odscen.sumo.parts import check_room
 from odscen.sumo.progress import Command, Pace, Progress
-from odscen.sumo.recorded import read_trajectories, trajectory_files
+from odscen.sumo.recorded import read_trajectories, recorded_files, trajectory_files
 from odscen.sumo.runner import PreparedRun, run_prepared
-from tests.sumo.conftest import TYPES
-
-SLICE, UNTIL = 60.0, 200.0
-ROWS = ("A0B0 B0C0 C0C1", "A1B1 B1C1", "C2B2 B2A2 A2A1", "C0C1 C1C2", "B2B1 B1B0 B0A0")
-WALKS = ("A0B0 B0C0", "C1B1 B1A1", "B2B1 B1B0")
-
-
-@pytest.fixture(scope="module")
-def long(grid: Path) -> PreparedRun:
-    """Cars whose drivers dawdle at random, and walkers, over 200 s in slices of 60 s."""
-    chance = random.Random(3)
-    departs = sorted(round(chance.uniform(0.0, 150.0), 2) for _ in range(90))
-    lines, actors = ["<routes>", TYPES], []
-    for index, depart in enumerate(departs):
-        walker = index % 5 == 0
-        name = f"{'walker' if walker else 'car'}{index}"
-        actors.append(
-            PlannedActor(
-                id=name, category="pedestrian" if walker else "car", spawn="1.0.-1.0", goal=None,
-                depart=depart, length=0.4 if walker else 4.5, width=0.5, x=0.0, y=0.0, z=0.0,
-                hdg=0.0, free_flow_time=40.0,
-            )
-        )  # fmt: skip
-        if walker:
-            lines.append(
-                f'<person id="{name}" type="walker" depart="{depart}" departPos="5">'
-                f'<walk edges="{WALKS[index % 3]}"/></person>'
-            )
-        else:
-            lines.append(
-                f'<vehicle id="{name}" type="car" depart="{depart}" departLane="1">'
-                f'<route edges="{ROWS[index % 5]}"/></vehicle>'
-            )
-    settings = RunSettings(until=UNTIL, step_length=0.5, seed=7)
-    files = {
-        "routes.rou.xml": "\n".join([*lines, "</routes>", ""]),
-        "scenario.sumocfg": sumo_config(settings),
-    }
-    plan = Plan("grid", 7, UNTIL, 0.5, (0.0, 0.0), tuple(actors), slice_length=SLICE)
-    return PreparedRun(plan, files, grid, scenario_json="{}")
+from tests.sumo.conftest import SLICE, TYPES, UNTIL
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +32,8 @@ def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 def results(run: Path) -> dict[str, bytes]:
-    files = [run / "actors.json", run / "events.json", *trajectory_files(run)]
+    recorded = [file for name in RECORDED for file in recorded_files(run, name)]
+    files = [run / "actors.json", run / "events.json", *recorded]
     return {str(file.relative_to(run)): file.read_bytes() for file in files}
 
 
@@ -97,8 +58,8 @@ def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]
     left = {path.name for path in result.folder.iterdir()}
     assert left == {
-        "actors.json", "events.json", "plan.json", "scenario.json", "summary.json", "sumo",
-        "sumo.log", "trajectories",
+        "actors.json", "events.json", "lanes", "plan.json", "scenario.json", "summary.json", "sumo",
+        "sumo.log", "trajectories", "trips",
     }  # fmt: skip
     assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
 

@@ -41,11 +41,14 @@ FIGURES = (
     "p95_travel_time",
     "mean_speed",
     "mean_delay",
+    "mean_waiting_time",
+    "mean_stops",
     "pedestrian_mean_travel_time",
     "pedestrian_median_travel_time",
     "pedestrian_p95_travel_time",
     "pedestrian_mean_speed",
     "pedestrian_mean_delay",
+    "pedestrian_mean_waiting_time",
 )
 NAMES = ("sim_seconds", *COUNTS, *FIGURES)
 

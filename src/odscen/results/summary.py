@@ -1,6 +1,6 @@
-"""From plan and events to what became of each actor, and the figures of a run.
+"""From plan, events and trips to what became of each actor, and the figures of a run.
 
-Everything here is a pure function of the plan and the events; wall-clock figures are added by the
+Everything here is a pure function of plan, events and trips; wall-clock figures are added by the
 runner to ``summary.json`` only, so that all other files of a run are the same bytes for the same
 seed.
 """
@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from odscen.errors import InputError
 from odscen.results.records import (
@@ -31,6 +32,17 @@ ActorStatus = Literal["arrived", "running", "waiting"]
 """``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
 
 
+class Trip(NamedTuple):
+    """What SUMO has measured on the way of an actor: seconds, and how many halts.
+
+    ``time_loss`` is ``None`` for a person who has not arrived, ``stops`` for every person.
+    """
+
+    time_loss: float | None
+    waiting_time: float | None
+    stops: int | None
+
+
 @dataclass(frozen=True, slots=True)
 class ActorOutcome:
     """What was planned for an actor and what became of it; seconds, metres, m/s.
@@ -46,11 +58,18 @@ class ActorOutcome:
     travel_time
         From appearing to arriving.
     delay
-        Travel time beyond the time that the way takes undisturbed, including getting up to speed.
+        Of an actor that arrived: its ``time_loss``.
     mean_speed
         Route length over travel time.
     problem
         Why the SUMO network had no way for it, if so; it is then ``waiting``.
+    time_loss
+        Seconds lost by driving, or walking, below the speed that it wished for; also while it was
+        getting up to that speed.
+    waiting_time
+        Seconds that it stood, below 0.1 m/s.
+    stops
+        How many times a vehicle came to a halt.
     """
 
     id: str
@@ -75,6 +94,9 @@ class ActorOutcome:
     collisions: int
     emergency_stops: int
     problem: str | None = None
+    time_loss: float | None = None
+    waiting_time: float | None = None
+    stops: int | None = None
 
 
 @dataclass(slots=True)
@@ -101,25 +123,38 @@ class _Fate:
                 self.emergency_stops += 1
 
 
-def actor_outcomes(plan: Plan, events: Iterable[Event]) -> tuple[ActorOutcome, ...]:
-    """One outcome per planned actor, in the plan's order; events are taken one by one."""
+_NO_TRIPS: Mapping[str, Trip] = MappingProxyType({})
+_NO_TRIP = Trip(None, None, None)
+
+
+def actor_outcomes(
+    plan: Plan, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS
+) -> tuple[ActorOutcome, ...]:
+    """One outcome per planned actor, in the plan's order; events are taken one by one.
+
+    Parameters
+    ----------
+    trips
+        By id; whoever has none has no delay, waiting time and stops.
+    """
     fates: defaultdict[str, _Fate] = defaultdict(_Fate)
     for event in events:
         fates[event.actor].hear(event)
         if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
             fates[str(event.partner)].hear(event)
     nothing = _Fate()
-    return tuple(_outcome(actor, fates.get(actor.id, nothing)) for actor in plan.actors)
+    return tuple(
+        _outcome(actor, fates.get(actor.id, nothing), trips.get(actor.id, _NO_TRIP))
+        for actor in plan.actors
+    )
 
 
-def _outcome(actor: PlannedActor, fate: _Fate) -> ActorOutcome:
+def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
     departure, arrival = fate.departure, fate.arrival
     status: ActorStatus = "arrived" if arrival else "running" if departure else "waiting"
     inserted = departure.time if departure else None
     travel_time = arrival.travel_time if arrival else None
-    delay = mean_speed = None
-    if travel_time is not None and actor.free_flow_time is not None:
-        delay = travel_time - actor.free_flow_time
+    mean_speed = None
     if travel_time and actor.route_length is not None:
         mean_speed = actor.route_length / travel_time
     return ActorOutcome(
@@ -138,13 +173,16 @@ def _outcome(actor: PlannedActor, fate: _Fate) -> ActorOutcome:
         arrived=arrival.time if arrival else None,
         travel_time=travel_time,
         free_flow_time=actor.free_flow_time,
-        delay=delay,
+        delay=trip.time_loss if arrival else None,
         route_length=actor.route_length,
         mean_speed=mean_speed,
         teleports=fate.teleports,
         collisions=fate.collisions,
         emergency_stops=fate.emergency_stops,
         problem=actor.problem,
+        time_loss=trip.time_loss,
+        waiting_time=trip.waiting_time,
+        stops=trip.stops,
     )
 
 
@@ -209,6 +247,7 @@ def key_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
     figures.update(
         {f"pedestrian_{name}": value for name, value in _travel_figures(pedestrians).items()}
     )
+    figures["mean_stops"] = _mean([o.stops for o in vehicles if o.status == "arrived"])
     return rounded(figures)
 
 
@@ -226,6 +265,7 @@ def _travel_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]
         "p95_travel_time": _percentile(times, 0.95),
         "mean_speed": sum(length for length, _ in moved) / seconds if seconds else None,
         "mean_delay": _mean([o.delay for o in outcomes]),
+        "mean_waiting_time": _mean([o.waiting_time for o in outcomes if o.status == "arrived"]),
     }
 
 

@@ -12,11 +12,11 @@ import json
 import os
 import shutil
 import zlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import SimulationError
-from odscen.sumo.layout import SLICES_FOLDER, TRAJECTORIES_FILE, TRAJECTORIES_FOLDER
+from odscen.sumo.layout import RECORDED, SLICES_FOLDER
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,6 +55,8 @@ class Checkpoint:
         How many vehicles and persons were on the road.
     present
         Ids of all vehicles and persons that the state holds, as far as SUMO tells.
+    lanes
+        How many vehicles the state holds on each lane.
     recorder
         What it remembers, see :meth:`odscen.sumo.recorder.Recorder.state`.
     files
@@ -73,6 +75,7 @@ class Checkpoint:
     present: list[str]
     recorder: dict[str, Any]
     files: dict[str, list[int]]
+    lanes: dict[str, int] = field(default_factory=dict)
 
 
 def slice_folder(run: Path, number: int) -> Path:
@@ -94,9 +97,9 @@ def clear_parts(run: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def trajectories_part(run: Path, number: int) -> Path:
-    """Where the trajectories of a complete slice are."""
-    return run / TRAJECTORIES_FOLDER / f"part-{number:04d}.parquet"
+def recorded_part(run: Path, file: str, number: int) -> Path:
+    """Where the part of a complete slice is, of one of :data:`odscen.sumo.layout.RECORDED`."""
+    return run / RECORDED[file] / f"part-{number:04d}.parquet"
 
 
 def complete(run: Path, part: Path, checkpoint: Checkpoint) -> None:
@@ -121,13 +124,14 @@ def complete(run: Path, part: Path, checkpoint: Checkpoint) -> None:
 
 
 def settle(run: Path, number: int) -> None:
-    """Show the trajectories of a complete slice, if that has not been done."""
-    inside = slice_folder(run, number) / TRAJECTORIES_FILE
-    if inside.is_file():
-        target = trajectories_part(run, number)
-        target.parent.mkdir(exist_ok=True)
-        inside.replace(target)
-        _to_disk(target.parent)
+    """Show what a complete slice has recorded, if that has not been done."""
+    for file in RECORDED:
+        inside = slice_folder(run, number) / file
+        if inside.is_file():
+            target = recorded_part(run, file, number)
+            target.parent.mkdir(exist_ok=True)
+            inside.replace(target)
+            _to_disk(target.parent)
 
 
 def read_checkpoint(run: Path, number: int) -> Checkpoint:
@@ -177,7 +181,8 @@ def survey(run: Path) -> tuple[int, list[str]]:
         whole = number
     for number in range(whole + 1, last + 1):
         shutil.rmtree(slice_folder(run, number))
-        trajectories_part(run, number).unlink(missing_ok=True)
+        for file in RECORDED:
+            recorded_part(run, file, number).unlink(missing_ok=True)
     return whole, problems
 
 
@@ -190,8 +195,9 @@ def check(run: Path, checkpoint: Checkpoint) -> None:
         If one is not as it was written.
     """
     for name, (size, crc) in checkpoint.files.items():
-        inside = slice_folder(run, checkpoint.number) / name
-        path = trajectories_part(run, checkpoint.number) if name == TRAJECTORIES_FILE else inside
+        number = checkpoint.number
+        inside = slice_folder(run, number) / name
+        path = recorded_part(run, name, number) if name in RECORDED else inside
         if not path.is_file():
             msg = f"{path.name} is missing"
             raise SimulationError(msg)

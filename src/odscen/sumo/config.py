@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
 from odscen.sumo.layout import (
+    MEASURES_FILE,
     NET_FILE,
     REGION_FILE,
     ROUTES_FILE,
     SIGNALS_FILE,
     TRAJECTORIES_FILE,
+    TRIPINFO_FILE,
 )
 from odscen.sumo.recording import REGION_ID, Recording
 
@@ -43,7 +45,9 @@ class RunSettings:
     signals
         Whether there are programs of traffic lights beside the network's own.
     recording
-        What of the trajectories is recorded.
+        What is recorded.
+    measures
+        Whether ``measures.add.xml`` is there, which makes SUMO measure lanes.
     meso
         Queues on road sections instead of single vehicles that follow each other: for scale.
     """
@@ -55,6 +59,7 @@ class RunSettings:
     elevation: bool = False
     signals: bool = False
     recording: Recording = field(default_factory=Recording)
+    measures: bool = False
     meso: bool = False
 
 
@@ -65,6 +70,8 @@ def sumo_config(settings: RunSettings) -> str:
     additional = [SIGNALS_FILE] if settings.signals else []
     if recording.region is not None:
         additional.append(REGION_FILE)
+    if settings.measures:
+        additional.append(MEASURES_FILE)
     if additional:
         inputs["additional-files"] = ",".join(additional)
     sections: dict[str, dict[str, str]] = {
@@ -113,8 +120,13 @@ def sumo_config(settings: RunSettings) -> str:
 
 def _outputs(settings: RunSettings) -> dict[str, str]:
     recording = settings.recording
+    trips = {
+        "tripinfo-output": TRIPINFO_FILE,
+        "tripinfo-output.write-unfinished": "true",
+        "precision": "4",
+    }
     if not recording.trajectories:
-        return {"precision": "4"}
+        return trips
     outputs = {
         "fcd-output": TRAJECTORIES_FILE,
         "fcd-output.attributes": ",".join(recording.attributes(elevation=settings.elevation)),
@@ -124,4 +136,4 @@ def _outputs(settings: RunSettings) -> dict[str, str]:
         outputs["device.fcd.period"] = f"{recording.every:g}"
     if recording.region is not None:
         outputs["fcd-output.filter-shapes"] = REGION_ID
-    return {**outputs, "precision": "4"}
+    return {**outputs, **trips}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from odscen.results.records import Plan, events_from_json
@@ -58,11 +57,8 @@ def prepare(
         Of the scenario's map; made once by :meth:`odscen.sumo.sumo_map.SumoMap.of` for many runs.
     net
         The map's ``net.net.xml``.
-    assets, seed, until, step_length, weather, recording, meso
-        See :func:`odscen.sumo.realize.realize`.
-    slice_length
-        Seconds; a run that is longer goes in slices of this length and can be resumed. ``None`` for
-        one piece, however long.
+    assets, seed, until, step_length, weather, recording, meso, slice_length
+        See :func:`odscen.sumo.realize.realize`. A run in slices can be resumed.
 
     Raises
     ------
@@ -79,11 +75,9 @@ def prepare(
         weather=weather,
         recording=recording,
         meso=meso,
+        slice_length=slice_length,
     )
     plan = realization.plan
-    if slice_length is not None and plan.until > slice_length:
-        steps = max(1, round(slice_length / plan.step_length))
-        plan = replace(plan, slice_length=steps * plan.step_length)
     return PreparedRun(
         plan=plan,
         sumo_files=realization.files,

@@ -25,7 +25,14 @@ from odscen.scenario.signals import signal_problems
 from odscen.sumo.config import RunSettings, sumo_config
 from odscen.sumo.demand import Demand
 from odscen.sumo.driving import KINDS, draw_factor, driver
-from odscen.sumo.layout import CONFIG_FILE, REGION_FILE, ROUTES_FILE, SIGNALS_FILE
+from odscen.sumo.layout import (
+    CONFIG_FILE,
+    MEASURES_FILE,
+    REGION_FILE,
+    ROUTES_FILE,
+    SIGNALS_FILE,
+)
+from odscen.sumo.measures import interval_of, measures_xml
 from odscen.sumo.paths import each_path
 from odscen.sumo.people import RoadUser, demand_users, road_users
 from odscen.sumo.recording import Recording, region_xml
@@ -83,6 +90,7 @@ def realize(
     weather: bool = True,
     recording: Recording | None = None,
     meso: bool = False,
+    slice_length: float | None = None,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -96,9 +104,11 @@ def realize(
     weather
         Whether weather acts on driving; the scenario can also switch it off itself.
     recording
-        What of the trajectories is recorded; everything if not given.
+        What is recorded; everything if not given.
     meso
         Queues on road sections instead of single vehicles that follow each other.
+    slice_length
+        Seconds; a longer run goes in slices of this length. ``None`` for one piece, however long.
 
     Raises
     ------
@@ -126,6 +136,7 @@ def realize(
         net_offset=sumo_map.net_offset,
         actors=planned,
         elevation=sumo_map.elevation,
+        slice_length=slices_of(until, slice_length, step_length),
         trajectories=recording.trajectories,
     )
     signals = signals_xml(scenario.signals, sumo_map.lights)
@@ -136,14 +147,27 @@ def realize(
         elevation=sumo_map.elevation,
         signals=signals is not None,
         recording=recording,
+        measures=True,
         meso=meso,
     )
-    files = {ROUTES_FILE: writer.demand.to_xml(), CONFIG_FILE: sumo_config(settings)}
+    interval = interval_of(until, plan.slice_length)
+    files = {
+        ROUTES_FILE: writer.demand.to_xml(),
+        CONFIG_FILE: sumo_config(settings),
+        MEASURES_FILE: measures_xml(interval, emissions=recording.emissions),
+    }
     if signals is not None:
         files[SIGNALS_FILE] = signals
     if recording.region is not None:
         files[REGION_FILE] = region_xml(recording.region, sumo_map.net_offset)
     return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+
+
+def slices_of(until: float, length: float | None, step_length: float) -> float | None:
+    """Seconds of the slices of a run: whole steps; ``None`` if it goes in one piece."""
+    if length is None or until <= length:
+        return None
+    return max(1, round(length / step_length)) * step_length
 
 
 def everybody(

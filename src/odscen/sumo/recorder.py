@@ -106,9 +106,8 @@ class Recorder:
         self._stops(time, lists.emergency_stops, session)
         self._collisions(time, session.collisions())
         self.events += self._jams.look(session, time)
-        # The end of the step is when they left the road.
         for name in (*lists.arrived, *lists.arrived_persons):
-            self._arrive(session.time, name)
+            self._arrive(time, name)
 
     def _depart(self, time: float, name: str, front: Front | None) -> None:
         if name in self._departures:  # back on the road after a teleport is no second departure

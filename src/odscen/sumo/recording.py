@@ -1,7 +1,7 @@
-"""What of the trajectories is recorded: how often, where, and which columns.
+"""What is recorded: trajectories (how often, where, and which columns), and emissions.
 
-As text, for the command line: ``none``, or ``key=value`` with commas between: ``every=1s``,
-``region=XMIN:YMIN:XMAX:YMAX`` (metres, OpenDRIVE frame), ``columns=lane+pos``.
+Trajectories as text, for the command line: ``none``, or ``key=value`` with commas between:
+``every=1s``, ``region=XMIN:YMIN:XMAX:YMAX`` (metres, OpenDRIVE frame), ``columns=lane+pos``.
 """
 
 from __future__ import annotations
@@ -21,24 +21,27 @@ REGION_ID = "odscen.recorded"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What of the trajectories is recorded.
+    """What is recorded.
 
     Attributes
     ----------
     trajectories
-        Whether any are.
+        Whether there are any.
     every
         Seconds between two records; ``None`` for every step.
     region
         Least x, least y, greatest x, greatest y; metres, OpenDRIVE frame.
     columns
         Of :data:`OPTIONAL`, beside :data:`NEEDED`.
+    emissions
+        Whether lanes tell what was emitted on them; without trajectories too.
     """
 
     trajectories: bool = True
     every: float | None = None
     region: tuple[float, float, float, float] | None = None
     columns: tuple[str, ...] = ("lane",)
+    emissions: bool = True
 
     def attributes(self, *, elevation: bool) -> tuple[str, ...]:
         """SUMO's names of the columns, in its order."""

@@ -177,8 +177,13 @@ def make_summary(
     return summary
 
 
-def drop_torn_trajectories(folder: Path) -> None:
-    """Remove a Parquet file without its end: a killed run leaves one, and nothing can read it."""
+def drop_torn_records(folder: Path) -> None:
+    """Remove Parquet files without their end, and what SUMO wrote that was not made into tables.
+
+    A killed run leaves them, and nothing can read them.
+    """
+    for name in (layout.LANES_FILE, layout.EMISSIONS_FILE, layout.TRIPINFO_FILE):
+        (folder / name).unlink(missing_ok=True)
     file = folder / layout.TRAJECTORIES_FILE
     if not file.is_file():
         return
@@ -198,9 +203,14 @@ def found_files(folder: Path) -> dict[str, str]:
         "net": f"{sumo}/{layout.NET_FILE}",
         "routes": f"{sumo}/{layout.ROUTES_FILE}",
         "signals": f"{sumo}/{layout.SIGNALS_FILE}",
+        "measures": f"{sumo}/{layout.MEASURES_FILE}",
         "config": f"{sumo}/{layout.CONFIG_FILE}",
         "trajectories": layout.TRAJECTORIES_FILE,
         "trajectory_parts": layout.TRAJECTORIES_FOLDER,
+        "lanes": layout.LANES_FILE,
+        "lane_parts": layout.LANES_FOLDER,
+        "trips": layout.TRIPS_FILE,
+        "trip_parts": layout.TRIPS_FOLDER,
         "events": layout.EVENTS_FILE,
         "actors": layout.ACTORS_FILE,
         "report": layout.REPORT_FILE,

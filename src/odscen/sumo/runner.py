@@ -22,7 +22,7 @@ from odscen.sumo.process import run_worker
 from odscen.sumo.run_folder import (
     PreparedRun,
     RunResult,
-    drop_torn_trajectories,
+    drop_torn_records,
     found_files,
     make_summary,
     write_run_folder,
@@ -102,7 +102,7 @@ def run_prepared(
             else:
                 ended = simulate(folder)
             if ended.done is None:
-                drop_torn_trajectories(folder)
+                drop_torn_records(folder)
             summary = make_summary(prepared, folder, ended, expectations)
             if finish is not None and ended.done is not None:
                 finish(folder, summary)

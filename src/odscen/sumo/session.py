@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import Counter
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
@@ -256,6 +257,22 @@ class Session:
     def _admits(self, lane: str, kind: str) -> bool:
         allowed = self._sumo.lane.getAllowed(lane)
         return not allowed or kind in allowed
+
+    def lane_lengths(self) -> dict[str, float]:
+        """Length of each lane that vehicles may use, also those inside junctions; metres."""
+        lane = self._sumo.lane
+        on_foot = ("pedestrian",)
+        return {
+            name: lane.getLength(name)
+            for name in lane.getIDList()
+            if tuple(lane.getAllowed(name)) != on_foot
+        }
+
+    def vehicles_by_lane(self) -> dict[str, int]:
+        """How many vehicles have their front on each lane, of those that have any."""
+        lane = self._sumo.vehicle.getLaneID
+        counts = Counter(lane(name) for name in self._sumo.vehicle.getIDList())
+        return {name: counts[name] for name in sorted(counts) if name}
 
     def light_states(self) -> dict[str, str]:
         """State of each traffic light, a letter per link."""

@@ -27,6 +27,7 @@ from odscen.sumo.checkpoint import (
     read_checkpoint,
     slice_folder,
 )
+from odscen.sumo.outputs import outputs_to, tidy_outputs
 from odscen.sumo.parts import check_room, tidy_part
 from odscen.sumo.progress import Done
 from odscen.sumo.route_slices import RouteSlices
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from odscen.sumo.session import Session
     from odscen.sumo.stepping import Stepper
 
-_CONTENTS = (STATE_FILE, EVENTS_LINES, layout.TRAJECTORIES_FILE)
+_CONTENTS = (STATE_FILE, EVENTS_LINES, *layout.RECORDED)
 _SAVING = (
     "--save-state.rng", "true",
     "--save-state.transportables", "true",
@@ -111,13 +112,16 @@ class _Slice:
             last = self._is_last(session, stepper, now, more=more)
             present = session.present()
             running = session.running()
+            lanes, lengths = session.vehicles_by_lane(), session.lane_lengths()
             if not last:
-                session.save(part / STATE_FILE)
+                # SUMO puts a state where it puts outputs, relative to the folder that it is given.
+                session.save(self._run / layout.SUMO_FOLDER / STATE_FILE)
         routes.unlink()
         self._write_events(part, stepper)
         if not last:
             check_state(part / STATE_FILE)
         tidy_part(part / layout.TRAJECTORIES_FILE)
+        tidy_outputs(part, lengths, present=before.lanes if before else {}, last=last)
         seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)
         checkpoint = Checkpoint(
             number=self._number,
@@ -131,6 +135,7 @@ class _Slice:
             running=running,
             present=sorted(present),
             recorder=stepper.recorder.state(),
+            lanes=lanes,
             files=fingerprints(part, _CONTENTS),
         )
         complete(self._run, part, checkpoint)
@@ -140,8 +145,7 @@ class _Slice:
         sumo = self._run / layout.SUMO_FOLDER
         arguments = ["--configuration-file", str(sumo / layout.CONFIG_FILE)]
         arguments += ["--route-files", str(part / layout.ROUTES_FILE), *_SAVING]
-        if self._plan.trajectories:
-            arguments += ["--fcd-output", str(part / layout.TRAJECTORIES_FILE)]
+        arguments += outputs_to(part, sumo)
         if self._before is not None:
             state = slice_folder(self._run, self._before.number) / STATE_FILE
             arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]

@@ -20,15 +20,9 @@ from typing import TYPE_CHECKING
 from odscen.errors import OdscenError
 from odscen.results.records import Plan, event_line, events_text
 from odscen.results.summary import actor_outcomes, actors_to_json
-from odscen.sumo.layout import (
-    ACTORS_FILE,
-    CONFIG_FILE,
-    EVENTS_FILE,
-    LOG_FILE,
-    SUMO_FOLDER,
-    TRAJECTORIES_FILE,
-)
+from odscen.sumo.layout import ACTORS_FILE, CONFIG_FILE, EVENTS_FILE, LOG_FILE, SUMO_FOLDER
 from odscen.sumo.lockstep import LockstepWatch
+from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_by_id
 from odscen.sumo.progress import Done, Failed, Lockstep, Message, Pace, decode, encode
 from odscen.sumo.session import captured_output, open_session
 from odscen.sumo.slices import event_lines, recorded_events, run_slices
@@ -87,18 +81,19 @@ def simulate(
         lines, events = event_lines(folder), recorded_events(folder)
     with (folder / EVENTS_FILE).open("w", encoding="utf-8") as out:
         out.writelines(events_text(lines))
-    outcomes = actor_outcomes(plan, events)
+    outcomes = actor_outcomes(plan, events, trips_by_id(folder))
     (folder / ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
     return done
 
 
 def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
     start = time.perf_counter()
-    arguments = ["--configuration-file", str(folder / SUMO_FOLDER / CONFIG_FILE)]
-    if plan.trajectories:
-        arguments += ["--fcd-output", str(folder / TRAJECTORIES_FILE)]
+    sumo = folder / SUMO_FOLDER
+    arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
     with open_session(arguments) as session:
         now = stepper.run(session, plan.until)
+        lengths = session.lane_lengths()
+    tidy_outputs(folder, lengths, present={}, last=True)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
 
 

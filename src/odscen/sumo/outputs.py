@@ -1,0 +1,84 @@
+"""What SUMO writes while it runs, put into a folder and made into the tables that we keep.
+
+The configuration names all of it, so that plain ``sumo -c`` records the same beside it.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from odscen.errors import SimulationError
+from odscen.results.summary import Trip
+from odscen.sumo.lane_table import lane_table
+from odscen.sumo.layout import (
+    EMISSIONS_FILE,
+    LANES_FILE,
+    TRIPINFO_FILE,
+    TRIPS_FILE,
+)
+from odscen.sumo.recorded import read_trips
+from odscen.sumo.trip_table import trip_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+def outputs_to(folder: Path, sumo: Path) -> list[str]:
+    """Arguments by which everything that SUMO writes goes to ``folder``, under its own name.
+
+    Parameters
+    ----------
+    sumo
+        Folder of the configuration, which names of outputs are relative to.
+    """
+    return ["--output-prefix", f"{os.path.relpath(folder, sumo)}/"]
+
+
+def tidy_outputs(
+    folder: Path, lengths: Mapping[str, float], *, present: Mapping[str, int], last: bool
+) -> None:
+    """Replace SUMO's lane data, emissions and tripinfo by ``lanes.parquet`` and ``trips.parquet``.
+
+    Parameters
+    ----------
+    lengths, present
+        As of :func:`odscen.sumo.lane_table.lane_table`.
+    last
+        Whether the run has ended, so that trips without an arrival are trips.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO has not written them to their end.
+    """
+    from lxml import etree
+    from polars.exceptions import PolarsError
+
+    lanes, emissions = folder / LANES_FILE, folder / EMISSIONS_FILE
+    tripinfo = folder / TRIPINFO_FILE
+    try:
+        if lanes.is_file():
+            rows = lane_table(lanes, emissions if emissions.is_file() else None, lengths, present)
+            lanes.unlink()
+            if rows.height:
+                rows.write_parquet(lanes)
+            emissions.unlink(missing_ok=True)
+        if tripinfo.is_file():
+            trips = trip_table(tripinfo, unfinished=last)
+            if trips.height:
+                trips.write_parquet(folder / TRIPS_FILE)
+            tripinfo.unlink()
+    except (etree.XMLSyntaxError, PolarsError) as error:
+        msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
+        raise SimulationError(msg) from error
+
+
+def trips_by_id(run: Path) -> dict[str, Trip]:
+    """What the trips say of each actor; empty if none were recorded."""
+    table = read_trips(run)
+    if table is None:
+        return {}
+    columns = table.select("id", "time_loss", "waiting_time", "waiting_count")
+    return {name: Trip(*values) for name, *values in columns.iter_rows()}
