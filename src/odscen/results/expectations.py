@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
+from odscen.results.run_traffic import TRAFFIC_FIGURES
 from odscen.results.units import in_unit_of
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ FIGURES = (
     "pedestrian_mean_speed",
     "pedestrian_mean_delay",
     "pedestrian_mean_waiting_time",
+    *TRAFFIC_FIGURES,
 )
 NAMES = ("sim_seconds", *COUNTS, *FIGURES)
 

@@ -30,9 +30,9 @@ class LanePlaces:
         lane that lies in the segment, and ``entry``: whether one comes into the segment by it.
     ways
         One row for each lane that leads to a junction or through it: ``lane``, ``junction``,
-        ``edge`` (last one before the junction), and inside of the junction also ``source`` (the
-        lane of that edge that one comes from), ``via`` (the first lane inside) and ``movement``;
-        null on the way to it.
+        ``approach`` (the last edge before the junction), and inside of the junction also
+        ``source`` (the lane of that edge that one comes from), ``via`` (the first lane inside) and
+        ``movement``; null on the way to it.
     segments
         ``segment`` and ``length`` along the road; junctions are not among them.
     junctions
@@ -100,7 +100,9 @@ def _schemas() -> dict[str, dict[str, type[pl.DataType]]]:
             "share": pl.Float64,
             "entry": pl.Boolean,
         },
-        "ways": dict.fromkeys(("lane", "junction", "edge", "source", "via", "movement"), pl.String),
+        "ways": dict.fromkeys(
+            ("lane", "junction", "approach", "source", "via", "movement"), pl.String
+        ),
         "segments": {"segment": pl.String, "length": pl.Float64},
         "junctions": place,
         "movements": {"movement": pl.String, **place},

@@ -26,7 +26,8 @@ delay and waiting of a movement
     Vehicles that use one lane share its delay alike, as in a lane group of the HCM: that of the
     last edge by lane, that of the edges before it all together.
 
-Places and levels of service are defined in :mod:`odscen.results.lane_places` and
+A junction or movement that nobody got into, though somebody stood all the time, has no delay per
+vehicle and level F. Places are defined in :mod:`odscen.results.lane_places`, levels of service in
 :mod:`odscen.results.level_of_service`.
 """
 
@@ -159,7 +160,9 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
         standing=col("standing_seconds") / seconds,
     )
     if "junction" in sums.columns:
-        rates = rates.with_columns(level=junction_level(col("delay"), col("control")))
+        stuck = (col("vehicles") == 0) & (col("standing") >= 1.0)
+        level = junction_level(col("delay"), col("control"))
+        rates = rates.with_columns(level=pl.when(stuck).then(pl.lit("F")).otherwise(level))
         if "movement" not in sums.columns:
             rates = rates.with_columns(throughput="vehicles")
     elif "segment" in sums.columns:

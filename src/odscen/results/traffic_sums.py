@@ -101,7 +101,7 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
     rows = lanes.join(places.ways, on="lane")
     ways = (
         rows.filter(pl.col("via").is_not_null())
-        .group_by("movement", "edge", "source", "via", *INTERVAL)
+        .group_by("movement", "approach", "source", "via", *INTERVAL)
         .agg(
             pl.col("entered").filter(pl.col("lane") == pl.col("via")).sum().alias("through"),
             _came_in().sum().alias("vehicles"),
@@ -111,7 +111,7 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
     from_lane = ways.group_by(pl.col("source").alias("lane"), *INTERVAL).agg(
         pl.col("through").sum().alias("of_lane")
     )
-    from_edge = ways.group_by("edge", *INTERVAL).agg(pl.col("through").sum().alias("of_edge"))
+    from_edge = ways.group_by("approach", *INTERVAL).agg(pl.col("through").sum().alias("of_edge"))
     before = rows.filter(pl.col("via").is_null()).join(
         from_lane.filter(pl.col("of_lane") > 0), on=("lane", *INTERVAL), how="left"
     )
@@ -122,14 +122,14 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
     )
     by_edge = (
         before.filter(pl.col("of_lane").is_null())
-        .group_by("edge", *INTERVAL)
+        .group_by("approach", *INTERVAL)
         .agg(_sum(*LOST))
-        .join(from_edge.filter(pl.col("of_edge") > 0), on=("edge", *INTERVAL))
-        .select("edge", *INTERVAL, *(pl.col(name) / pl.col("of_edge") for name in LOST))
+        .join(from_edge.filter(pl.col("of_edge") > 0), on=("approach", *INTERVAL))
+        .select("approach", *INTERVAL, *(pl.col(name) / pl.col("of_edge") for name in LOST))
     )
     found = (
         ways.join(by_lane, on=("source", *INTERVAL), how="left", suffix="_of_lane")
-        .join(by_edge, on=("edge", *INTERVAL), how="left", suffix="_of_edge")
+        .join(by_edge, on=("approach", *INTERVAL), how="left", suffix="_of_edge")
         .with_columns(
             pl.col(name)
             + pl.col("through")

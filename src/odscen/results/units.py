@@ -6,6 +6,15 @@ import difflib
 
 from odscen.errors import InputError
 
+_NAMES = {
+    "co2_total": "kg",
+    "fuel_total": "kg",
+    "co2_per_km": "g/km",
+    "vehicle_km": "km",
+    "travel_time_index": "",
+    "planning_time_index": "",
+    "throughput": "veh/h",
+}
 _WORDS = (
     ("error", "m"),
     ("length", "m"),
@@ -17,18 +26,27 @@ _WORDS = (
     ("delay", "s"),
     ("ttc", "s"),
     ("pet", "s"),
+    *((gas, "g") for gas in ("co2", "co", "hc", "nox", "pmx", "fuel")),
 )
-"""A figure is named after what it measures: the first word found in its name decides."""
+"""A figure is named after what it measures: the first word found in its name decides, unless its
+whole name is among ``_NAMES``."""
 
 _CONVERSIONS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "min": 60.0, "h": 3600.0},
     "m": {"m": 1.0, "cm": 0.01, "km": 1000.0},
     "m/s": {"m/s": 1.0, "km/h": 1.0 / 3.6},
+    "km": {"km": 1.0, "m": 0.001},
+    "kg": {"kg": 1.0, "g": 0.001, "t": 1000.0},
+    "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
+    "g/km": {"g/km": 1.0},
+    "veh/h": {"veh/h": 1.0},
 }
 
 
 def unit_of(name: str) -> str:
     """Unit of a figure, ``""`` for counts and whatever has none."""
+    if name in _NAMES:
+        return _NAMES[name]
     parts = name.split("_")
     return next((unit for word, unit in _WORDS if word in parts), "")
 

@@ -119,7 +119,7 @@ def _inside(chains: Sequence[_Chain], parts: _Parts, junctions: set[str], net: R
     """Places of lanes inside of SUMO junctions that have no node, or only nodes of roads.
 
     They are in the junction that their way crosses; if it has no nodes at all, in another one that
-    the SUMO junction stands for.
+    the SUMO junction stands for, as of a road that goes on past a side road.
     """
 
     def crossed(lane: NetLane) -> str | None:
@@ -127,20 +127,19 @@ def _inside(chains: Sequence[_Chain], parts: _Parts, junctions: set[str], net: R
         return own if own in junctions else None
 
     at_node: dict[str, str] = {}
-    for chain in chains:
-        for lane in chain.inside:
-            if (own := crossed(lane)) is not None:
-                at_node.setdefault(net.ends[lane.edge][0], own)
+    for source, inside, _ in chains:
+        for own in filter(None, map(crossed, inside)):
+            at_node.setdefault(net.ends[source.edge][1], own)
     found: _Parts = {}
     for source, inside, _ in chains:
         first = next(filter(None, map(crossed, inside)), None)
+        other = first or at_node.get(net.ends[source.edge][1])
         for lane in inside:
             if crossed(lane) is None and (first is not None or lane.id not in parts):
-                place = first or at_node.get(net.ends[lane.edge][0])
-                if place is None and source.id in parts:
-                    place = parts[source.id][-1].segment
-                if place is not None:
-                    found[lane.id] = (_Part(place, 1.0),)
+                if other is not None:
+                    found[lane.id] = (_Part(other, 1.0),)
+                elif source.id in parts:
+                    found[lane.id] = (_Part(parts[source.id][-1].segment, 1.0),)
     return found
 
 

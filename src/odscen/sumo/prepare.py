@@ -9,6 +9,7 @@ from odscen.results.summary import actors_from_json
 from odscen.scenario.files import dumps
 from odscen.sumo import layout
 from odscen.sumo.forecast import forecast
+from odscen.sumo.lane_places import lane_places
 from odscen.sumo.realize import realize
 from odscen.sumo.recorded import read_trajectories
 from odscen.sumo.runner import PreparedRun
@@ -85,6 +86,7 @@ def prepare(
         scenario_json=dumps(scenario),
         problems=realization.problems,
         notes=((MESO_NOTE,) if meso else ()) + realization.notes,
+        places=lane_places(sumo_map),
         about={"map": scenario.map.name, "map_sha256": scenario.map.sha256, "meso": meso},
         expected=forecast(
             plan, realization.files, every=None if recording is None else recording.every

@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any, Literal
 from odscen import __version__
 from odscen.results.expectations import COUNTS, evaluate
 from odscen.results.gridlock import find_trouble, trouble_summary
-from odscen.results.records import events_from_json
+from odscen.results.records import events_from_json, rounded
 from odscen.results.summary import actor_counts, actors_from_json, key_figures
 from odscen.sumo import layout
+from odscen.sumo.measured import write_figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from odscen.results.expectations import Expectation
+    from odscen.results.lane_places import LanePlaces
     from odscen.results.records import Plan
     from odscen.sumo.forecast import Forecast
     from odscen.sumo.process import Ended
@@ -52,6 +54,8 @@ class PreparedRun:
         Further fields of the summary, for example the map's name and hash.
     expected
         What it will need on disk and in memory.
+    places
+        Where each lane lies; figures of traffic by place need them.
     """
 
     plan: Plan
@@ -62,6 +66,7 @@ class PreparedRun:
     notes: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
     expected: Forecast | None = None
+    places: LanePlaces | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +105,8 @@ def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
     if prepared.scenario_json is not None:
         (folder / layout.SCENARIO_FILE).write_text(prepared.scenario_json, encoding="utf-8")
     (folder / layout.PLAN_FILE).write_text(prepared.plan.to_json(), encoding="utf-8")
+    if prepared.places is not None:
+        (folder / layout.LANE_PLACES_FILE).write_text(prepared.places.to_json(), encoding="utf-8")
     sumo = folder / layout.SUMO_FOLDER
     sumo.mkdir()
     write_sumo_files(prepared.sumo_files, prepared.net, sumo, link=True)
@@ -154,7 +161,7 @@ def make_summary(
     if done:
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
-        figures = key_figures(outcomes)
+        figures = key_figures(outcomes) | rounded(write_figures(folder, end=done.sim_seconds))
         summary["actors"] = actor_counts(outcomes)
         summary["insertion_error_max"] = figures["insertion_error_max"]
         summary["figures"] = figures
@@ -211,6 +218,9 @@ def found_files(folder: Path) -> dict[str, str]:
         "lane_parts": layout.LANES_FOLDER,
         "trips": layout.TRIPS_FILE,
         "trip_parts": layout.TRIPS_FOLDER,
+        "lane_places": layout.LANE_PLACES_FILE,
+        "figures": layout.FIGURES_FILE,
+        "figure_tables": layout.FIGURES_FOLDER,
         "events": layout.EVENTS_FILE,
         "actors": layout.ACTORS_FILE,
         "report": layout.REPORT_FILE,
