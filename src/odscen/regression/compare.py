@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from odscen.errors import InputError
 from odscen.regression.measure import measure, place_index
 from odscen.results.comparison import CONFIDENCE, compare_figure
 from odscen.results.units import unit_of, with_unit
+from odscen.sumo.ended import read_summary
 from odscen.sumo.layout import SUMMARY_FILE
 from odscen.workflow import load_map
 
@@ -161,17 +161,12 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    file = folder / SUMMARY_FILE
-    try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-        status, seed = summary["status"], summary["seed"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        msg = f"not the summary of a run: {error!r}"
-        raise InputError(msg, file=str(file)) from error
-    if status != "completed" or not isinstance(seed, int):
+    summary = read_summary(folder)
+    status = summary["status"]
+    if status != "completed" or not isinstance(summary["seed"], int):
         msg = f"the run has not completed, it is {status!r}"
-        raise InputError(msg, file=str(file))
-    return dict(summary)
+        raise InputError(msg, file=str(folder / SUMMARY_FILE))
+    return summary
 
 
 def _index(workspace: Workspace, summary: Mapping[str, Any]) -> PlaceIndex | None:

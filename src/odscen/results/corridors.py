@@ -114,8 +114,8 @@ def _grown(
                 total, junctions = total + count, junctions + 1
                 continue
             # Between two junctions a road may be several segments long: follow it.
-            near = {name for name in (onwards if forwards else before).get(tip, ()) if name[0] == "r"}
-            near -= set(way)
+            beside = (onwards if forwards else before).get(tip, set())
+            near = {name for name in beside if name[0] == "r"} - set(way)
             if len(near) != 1:
                 break
             way = [*way, *near] if forwards else [*near, *way]
@@ -136,8 +136,13 @@ def way_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
     if path is None:
         msg = f"one cannot drive from {first} to {last}"
         raise InputError(msg)
-    rows = graph.lanes.segment[path]
-    return tuple(graph.segments.ids[row] for row, _ in itertools.groupby(rows.tolist()))
+    return _passed(graph, path)
+
+
+def _passed(graph: MapGraph, path: IntArray) -> tuple[str, ...]:
+    """Segments in the order in which a path leads over them."""
+    rows = graph.lanes.segment[path].tolist()
+    return tuple(graph.segments.ids[row] for row, _ in itertools.groupby(rows))
 
 
 def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
@@ -156,9 +161,7 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
     names = _with_junctions(graph, named)
     mask = np.isin(graph.lanes.segment, segment_rows(graph.segments, names))
     path = _shortest(graph, names[0], names[-1], mask)
-    rows = [] if path is None else [row for row, _ in itertools.groupby(graph.lanes.segment[path].tolist())]
-    driven = [graph.segments.ids[row] for row in rows]
-    if path is None or driven != names:
+    if path is None or list(_passed(graph, path)) != names:
         msg = f"one cannot drive along {', '.join(names)} in this order; --from and --to find a way"
         raise InputError(msg)
     return _measured(graph, names, path)
@@ -232,5 +235,7 @@ _WIDEST = 20.0
 
 def junctions_of(corridor: Corridor, kinds: Iterable[str]) -> list[tuple[str, float, float]]:
     """Junctions of a corridor with where they begin and end, metres; kinds as its segments'."""
-    pieces = zip(corridor.segments, itertools.pairwise(corridor.starts.tolist()), kinds, strict=True)
+    pieces = zip(
+        corridor.segments, itertools.pairwise(corridor.starts.tolist()), kinds, strict=True
+    )
     return [(name, begin, end) for name, (begin, end), kind in pieces if kind == "junction"]

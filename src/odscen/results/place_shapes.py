@@ -70,7 +70,7 @@ def place_shapes(graph: MapGraph) -> PlaceShapes:
             line = shapely.simplify(shapely.LineString(piece), _TOLERANCE)
             pieces.setdefault(segments.ids[row], []).append(shapely.get_coordinates(line))
     middles = {
-        name: xy[lanes.segment == row].mean(axis=0)
+        str(name): xy[lanes.segment == row].mean(axis=0)
         for row, name in enumerate(segments.ids)
         if junction[row] and (lanes.segment == row).any()
     }

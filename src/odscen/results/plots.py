@@ -139,7 +139,11 @@ def line_chart(
         Where the axis of time ends, seconds; with the last value if not given.
     """
     top = max((_peak(line) for line in series), default=0.0)
-    frame = Frame(time_axis(max(float(time[-1]) if end is None else end, 1.0)), value_axis(top, y_label), height)
+    frame = Frame(
+        time_axis(max(float(time[-1]) if end is None else end, 1.0)),
+        value_axis(top, y_label),
+        height,
+    )
     parts = [
         _band(frame, time, line)
         for line in series
@@ -176,20 +180,20 @@ def dot_chart(
         Whether a thin line leads from dot to dot, through all groups in their order.
     """
     x, y = (np.concatenate([getattr(dots, key) for dots in groups]) for key in ("x", "y"))
-    frame = Frame(*(value_axis(float(values.max(initial=0.0)), name)
-                    for values, name in ((x, x_label), (y, y_label))), height=360.0)  # fmt: skip
+    x_axis, y_axis = (
+        value_axis(float(values.max(initial=0.0)), name)
+        for values, name in ((x, x_label), (y, y_label))
+    )
+    frame = Frame(x_axis, y_axis, height=360.0)
     parts = []
     if joined:
         parts.append(element("path", d=_line_data(frame, x, y), class_="trail"))
     for dots in groups:
-        titles = dots.titles or [""] * len(dots.x)
-        places = zip(np.asarray(frame.x(dots.x)).tolist(), np.asarray(frame.y(dots.y)).tolist(),
-                     titles, strict=True)  # fmt: skip
-        circles = [
-            element("circle", element("title", title) if title else None,
-                    cx=number(a, 1), cy=number(b, 1), r=4)  # fmt: skip
-            for a, b, title in places
-        ]
+        circles = []
+        places = np.column_stack([frame.x(dots.x), frame.y(dots.y)]).tolist()
+        for (a, b), title in zip(places, dots.titles or [""] * len(places), strict=True):
+            words = element("title", title) if title else None
+            circles.append(element("circle", words, cx=number(a, 1), cy=number(b, 1), r=4))
         parts.append(element("g", *circles, class_=f"dots {dots.style}"))
     entries = [(dots.style, dots.label) for dots in groups]
     return chart(frame, parts, description=description, keys=legend(entries))
@@ -204,10 +208,12 @@ class Frame:
     height: float = _HEIGHT
 
     def x(self, value: FloatArray | float) -> FloatArray | float:
+        """From the left edge of the drawing."""
         axis = self.x_axis
         return _LEFT + (value - axis.low) / (axis.high - axis.low) * (_WIDTH - _LEFT - _RIGHT)
 
     def y(self, value: FloatArray | float) -> FloatArray | float:
+        """From its upper edge."""
         axis = self.y_axis
         share = (value - axis.low) / (axis.high - axis.low)
         return self.height - _BOTTOM - share * (self.height - _TOP - _BOTTOM)
@@ -222,10 +228,14 @@ def chart(
     drawn += [_x_tick(frame, *tick) for tick in frame.x_axis.ticks]
     drawn += parts
     drawn.append(text_at(_LEFT - 42, 14, frame.y_axis.name, class_="axis-name"))
-    drawn.append(
-        text_at(_WIDTH - _RIGHT, frame.height - 4, frame.x_axis.name, class_="axis-name",
-                text_anchor="end")  # fmt: skip
+    x_name = text_at(
+        _WIDTH - _RIGHT,
+        frame.height - 4,
+        frame.x_axis.name,
+        class_="axis-name",
+        text_anchor="end",
     )
+    drawn.append(x_name)
     view = f"0 0 {number(_WIDTH)} {number(frame.height)}"
     svg = element("svg", *drawn, viewBox=view, role="img", class_="chart")
     return element("div", svg, keys, class_="chart-box")

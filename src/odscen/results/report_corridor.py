@@ -70,8 +70,8 @@ def corridor_section(traces: CorridorTraces | str) -> Markup:
         "each line is one vehicle: time runs to the right, the way upwards. A steep line is a fast "
         "vehicle; a level red one stands or crawls, below 5 km/h. Grey bands are junctions. Red "
         "wedges that start below a band are queues before it; if they grow from cycle to cycle, "
-        "more arrive than get through. Lines that pass several bands without red have a green wave. "
-        "Lines begin and end where vehicles turn in and off."
+        "more arrive than get through. Lines that pass several bands without red have a green "
+        "wave. Lines begin and end where vehicles turn in and off."
     )
     if isinstance(traces, str):
         return report_section(heading, element("p", traces), explained=explained, ident="corridor")

@@ -53,7 +53,8 @@ def emission_section(figures: TrafficFigures) -> Markup | None:
     explained = (
         "what comes out of the exhausts, and what is burnt, by the handbook of emission factors "
         "(HBEFA) for average vehicles of each category; brakes and tyres are not in it. A share is "
-        "that of the whole network. Much per vehicle at a place means that they stop and start there."
+        "that of the whole network. Much per vehicle at a place means that they stop and start "
+        "there."
     )
     return report_section("Emissions and fuel", *parts, explained=explained, ident="emissions")
 
@@ -69,8 +70,16 @@ def _charts(network: pl.DataFrame) -> list[Markup]:
             if name in network.columns and network[name].is_not_null().any()
         ]
         charts.append(element("h3", text))
-        charts.append(line_chart(time, series, y_label=label, description=text, height=210.0,
-                       end=float(network["end"][-1])))
+        charts.append(
+            line_chart(
+                time,
+                series,
+                y_label=label,
+                description=text,
+                height=210.0,
+                end=float(network["end"][-1]),
+            )
+        )
     return charts
 
 
@@ -79,9 +88,11 @@ def _places(figures: TrafficFigures, total: float) -> Markup:
 
     tables = [
         over_run(table).select(
-            pl.lit(kind).alias("kind"), pl.col(place).alias("place"),
-            "vehicles", pl.col("co2", "fuel", "nox", "pmx").cast(pl.Float64),
-        )  # fmt: skip
+            pl.lit(kind).alias("kind"),
+            pl.col(place).alias("place"),
+            "vehicles",
+            pl.col("co2", "fuel", "nox", "pmx").cast(pl.Float64),
+        )
         for kind, place, table in (
             ("road", "segment", figures.segments),
             ("junction", "junction", figures.junctions),
@@ -93,8 +104,17 @@ def _places(figures: TrafficFigures, total: float) -> Markup:
         .sort(["co2", "place"], descending=[True, False])
         .head(SHOWN)
     )
-    heads = ("Place", "Kind", "CO2, kg", "Share, %", "CO2 per vehicle, g", "Fuel, kg", "NOx, g",
-             "Fine dust, g", "Vehicles")  # fmt: skip
+    heads = (
+        "Place",
+        "Kind",
+        "CO2, kg",
+        "Share, %",
+        "CO2 per vehicle, g",
+        "Fuel, kg",
+        "NOx, g",
+        "Fine dust, g",
+        "Vehicles",
+    )
     rows = [_row(row, total) for row in most.iter_rows(named=True)]
     return html_table(heads, rows, label="Places with most emissions", class_="places")
 

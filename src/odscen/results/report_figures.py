@@ -55,8 +55,8 @@ def key_figure_section(
     """
     explained = (
         "an actor is one vehicle or pedestrian. It has entered the road when the simulation could "
-        "place it, and teleported when it was stuck so long that the simulator moved it on. Time is "
-        "lost by whoever drives more slowly than the driver would like to on a free road."
+        "place it, and teleported when it was stuck so long that the simulator moved it on. Time "
+        "is lost by whoever drives more slowly than the driver would like to on a free road."
     )
     cards = [
         *_counts(actors),

@@ -44,19 +44,29 @@ def flow_section(network: pl.DataFrame) -> Markup | None:
         return None
     time = middles(network)
     charts: list[Markup | None] = []
-    for name, factor, label in (("flow", 1.0, FLOW), ("density", 1.0, DENSITY), ("speed", 3.6, SPEED)):
+    for name, factor, label in (
+        ("flow", 1.0, FLOW),
+        ("density", 1.0, DENSITY),
+        ("speed", 3.6, SPEED),
+    ):
         series = [Series(name, "c-all", column(network, name) * factor)]
         text = f"{name.capitalize()} of the network over time"
         charts += [
             element("h3", name.capitalize()),
-            line_chart(time, series, y_label=label, description=text, height=210.0,
-                       end=float(network["end"][-1])),
+            line_chart(
+                time,
+                series,
+                y_label=label,
+                description=text,
+                height=210.0,
+                end=float(network["end"][-1]),
+            ),
         ]
     width = number((network["end"][0] - network["begin"][0]) / 60.0, 1)
     explained = (
         "flow is how many vehicles pass a place on a lane in an hour, density how many are on a "
-        f"kilometre of it, both as means over all lanes of the map and {width} min; flow is density "
-        "times speed. When density climbs while speed falls, the roads fill up."
+        f"kilometre of it, both as means over all lanes of the map and {width} min; flow is "
+        "density times speed. When density climbs while speed falls, the roads fill up."
     )
     return report_section("Flow, density and speed", *charts, explained=explained, ident="flow")
 
@@ -81,10 +91,10 @@ def diagram_section(network: pl.DataFrame) -> Markup | None:
     )
     explained = (
         "each dot is one interval, and the line joins them in order of time. As long as dots climb "
-        "to the right in a straight line, all traffic flows. Where they bend or fall, more vehicles "
-        "no longer get more traffic through: the network is full. If the line comes back below the "
-        "way it went up, it draws a loop: jams dissolve more slowly than they built up, and fewer "
-        "get through with the same number on the road."
+        "to the right in a straight line, all traffic flows. Where they bend or fall, more "
+        "vehicles no longer get more traffic through: the network is full. If the line comes back "
+        "below the way it went up, it draws a loop: jams dissolve more slowly than they built up, "
+        "and fewer get through with the same number on the road."
     )
     return report_section(
         "How much the network carries", drawn, most, explained=explained, ident="diagram"

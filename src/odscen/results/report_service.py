@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from odscen.catalog.markup import Markup, element, join, number, path_data
 from odscen.results.plots import legend
 from odscen.results.report_map import fitted_view, scale_bar
@@ -56,11 +54,12 @@ def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Mark
     if not parts:
         return None
     explained = (
-        "the level is a grade, from A (hardly anybody is held up) to F (more traffic than the place "
-        "can carry, or hardly any getting on). A junction has it from the time that a vehicle loses there on average, a road "
-        "from how much slower than free it is driven. The strip shows the level over the whole run, "
-        "from left to right. A queue is the number of vehicles that stand. Places are named as in "
-        f"the editor; those with fewer than {FEW} vehicles are not listed."
+        "the level is a grade, from A (hardly anybody is held up) to F (more traffic than the "
+        "place can carry, or hardly any getting on). A junction has it from the time that a "
+        "vehicle loses there on average, a road from how much slower than free it is driven. The "
+        "strip shows the level over the whole run, from left to right. A queue is the number of "
+        "vehicles that stand. Places are named as in the editor; those with fewer than "
+        f"{FEW} vehicles are not listed."
     )
     return report_section("Level of service", *parts, explained=explained, ident="service")
 
@@ -155,9 +154,9 @@ def _service_map(
     if busiest is not None and figures.network.height > 1:
         begin, end = busiest
         words = f"The busiest time, {stretch(begin, end)}"
-        views["peak"] = (words, *(
-            table.filter(table["begin"] == begin) for table in (figures.segments, figures.junctions)
-        ))  # fmt: skip
+        tables = (figures.segments, figures.junctions)
+        segments, junctions = (table.filter(table["begin"] == begin) for table in tables)
+        views["peak"] = (words, segments, junctions)
     roads = [
         element("path", id=f"place-{index}", d=path_data(lines.xy * (1, -1), lines.start))
         for index, lines in enumerate(shapes.segments.values())

@@ -62,10 +62,10 @@ def walking_section(
             line = Series("mean of all people on foot", "c-pedestrian", curve.mean, curve.low,
                           curve.high)  # fmt: skip
             text = "Mean walking speed over time"
-            parts.append(
-                line_chart(curve.time, [line], y_label="speed, m/s", description=text, height=210.0,
-                           end=end)  # fmt: skip
+            chart = line_chart(
+                curve.time, [line], y_label="speed, m/s", description=text, height=210.0, end=end
             )
+            parts.append(chart)
     explained = (
         "those who walk freely make some 1.4 m/s. The lower edge of the band at zero means that at "
         "any time at least one in ten stands, mostly before a red light or a busy road; much "

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.lanegraph.model import FloatArray, IntArray
     from odscen.results.corridors import Corridor
     from odscen.sumo.sumo_map import SumoMap
 
@@ -87,7 +88,7 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
 
 def _kinds(sumo_map: SumoMap, corridor: Corridor) -> list[str]:
     segments = sumo_map.graph.segments
-    kind_of = dict(zip(segments.ids, segments.kinds, strict=True))
+    kind_of = dict(zip(map(str, segments.ids), segments.kinds, strict=True))
     return [kind_of[name] for name in corridor.segments]
 
 
@@ -122,7 +123,7 @@ def _busiest(on_way: pl.LazyFrame) -> tuple[float, float] | None:
 
 
 def _placed(
-    rows: pl.DataFrame, sumo_map: SumoMap, nodes: np.ndarray, along: np.ndarray
+    rows: pl.DataFrame, sumo_map: SumoMap, nodes: IntArray, along: FloatArray
 ) -> pl.DataFrame:
     """Add ``along``; records on the same lanes beside the corridor are left out."""
     import polars as pl
@@ -136,4 +137,4 @@ def _placed(
     ahead = at - xy[near]
     hdg = lanes.hdg[nodes][near]
     metres = along[near] + ahead[:, 0] * np.cos(hdg) + ahead[:, 1] * np.sin(hdg)
-    return rows.with_columns(pl.Series("along", metres)).filter(pl.Series(away < _NEAR))
+    return rows.with_columns(pl.Series("along", metres)).filter(pl.Series(np.asarray(away) < _NEAR))
