@@ -94,14 +94,12 @@ def run_map(
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
     layers += [rings] if (rings := trouble_rings(trouble, extent / 400.0)) else []
-    cm = [round(value * 100) for value in (bounds[0], -bounds[3])]
-    size = [round((bounds[2] - bounds[0]) * 100), round((bounds[3] - bounds[1]) * 100)]
     svg = element(
         "svg",
         element("title", "Map of the run: the ways of all actors"),
         *layers,
         scale_bar(bounds),
-        viewBox=" ".join(map(str, cm + size)),
+        viewBox=view_box(bounds),
         class_="run-map",
         role="img",
     )
@@ -160,6 +158,12 @@ def fitted_view(everything: FloatArray, drawing: MapDrawing | None) -> Bounds | 
     half[0] = max(half[0], half[1] * 1.2)
     half[1] = max(half[1], half[0] * 0.3)
     return (*(middle - half).tolist(), *(middle + half).tolist())
+
+
+def view_box(bounds: Bounds) -> str:
+    """Of a drawing in centimetres, y downwards."""
+    size = (bounds[2] - bounds[0], bounds[3] - bounds[1])
+    return " ".join(str(round(value * 100)) for value in (bounds[0], -bounds[3], *size))
 
 
 def _speed_layer(cells: SpeedCells) -> Markup:

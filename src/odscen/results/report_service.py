@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.markup import Markup, element, join, number, path_data
 from odscen.results.plots import legend
-from odscen.results.report_map import fitted_view, scale_bar
+from odscen.results.report_map import fitted_view, scale_bar, view_box
 from odscen.results.report_tables import html_table, report_section
 from odscen.results.report_words import stretch
 from odscen.results.traffic import over_run
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.catalog.drawing import Bounds
     from odscen.results.place_shapes import PlaceShapes
     from odscen.results.traffic import TrafficFigures
 
@@ -172,7 +171,7 @@ def _service_map(
         *layers,
         _names(shapes, worst, extent),
         scale_bar(bounds),
-        viewBox=_view_box(bounds),
+        viewBox=view_box(bounds),
         class_="run-map",
         role="img",
     )
@@ -180,11 +179,6 @@ def _service_map(
         "div", *view_switch("service", {key: view[0] for key, view in views.items()}), svg,
         level_legend(), class_="map-figure",
     )  # fmt: skip
-
-
-def _view_box(bounds: Bounds) -> str:
-    size = (bounds[2] - bounds[0], bounds[3] - bounds[1])
-    return " ".join(str(round(value * 100)) for value in (bounds[0], -bounds[3], *size))
 
 
 def view_switch(group: str, views: Mapping[str, str]) -> list[Markup]:

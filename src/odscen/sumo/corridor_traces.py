@@ -119,7 +119,8 @@ def _busiest(on_way: pl.LazyFrame) -> tuple[float, float] | None:
         inside = seen.filter(pl.col("grain").is_between(begin, begin + size - 1))
         if inside["id"].n_unique() <= MOST:
             break
-    return begin * _GRAIN, (begin + min(size, len(records))) * _GRAIN
+    last_time = float(on_way.select(pl.col("timestep_time").max()).collect().item())
+    return begin * _GRAIN, min((begin + size) * _GRAIN, max(last_time, begin * _GRAIN + 1.0))
 
 
 def _placed(
