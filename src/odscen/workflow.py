@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from odscen.errors import InputError, WorkspaceError, in_file
+from odscen.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.results.corridors import corridor_along, way_between
 from odscen.results.expectations import needs_criticality
 from odscen.scenario.checks import check
 from odscen.scenario.config import SamplingConfig, loads_config, overridden
@@ -25,6 +26,7 @@ from odscen.scenario.graphform import to_graphml
 from odscen.scenario.problems import refuse_errors
 from odscen.scenario.sampling import choose_map, sample_scenario
 from odscen.sumo import long_runs
+from odscen.sumo.ended import read_summary
 from odscen.sumo.layout import NET_FILE
 from odscen.sumo.prepare import SLICE, prepare, write_report
 from odscen.sumo.recording import Recording
@@ -263,8 +265,8 @@ def run(
     drawings = {entry.sha256: entry for _, _, entry in jobs}
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        entry = drawings[summary["map_sha256"]]
-        write_report(folder, summary, drawing=load_map(entry).drawing)
+        loaded = load_map(drawings[summary["map_sha256"]])
+        write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
     return run_many(
         [job(*parts) for parts in jobs],
@@ -304,15 +306,64 @@ def resume(
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        drawing = None
+        loaded = None
         with suppress(InputError):  # the map has been removed meanwhile
-            entry = workspace.map_for(summary["map"], summary["map_sha256"])
-            drawing = load_map(entry).drawing
-        write_report(folder, summary, drawing=drawing)
+            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+        if loaded is None:
+            write_report(folder, summary)
+        else:
+            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
     folder = run if run.is_dir() else workspace.runs / run
     return long_runs.resume(
         folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish
+    )
+
+
+def report(
+    workspace: Workspace,
+    run: Path,
+    *,
+    corridor: Sequence[str] = (),
+    ends: tuple[str, str] | None = None,
+    out: Path | None = None,
+) -> Path:
+    """Write the report of a finished run anew.
+
+    Parameters
+    ----------
+    run
+        Its folder, or its name in the workspace.
+    corridor
+        Segments along which vehicles are followed; junctions between them may be left out.
+    ends
+        First and last segment instead: the shortest way between them. The busiest corridor if
+        neither is given.
+    out
+        File to write; the run's ``report.html`` if not given.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    InputError
+        If it has not ended, its map is not in the workspace, or one cannot drive so.
+    """
+    folder = run if run.is_dir() else workspace.runs / run
+    if not folder.is_dir():
+        names = [path.name for path in workspace.runs.glob("*")]
+        msg = "run"
+        raise NotFoundError(msg, str(run), names)
+    summary = read_summary(folder)
+    loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+    segments = way_between(loaded.sumo.graph, *ends) if ends is not None else corridor
+    return write_report(
+        folder,
+        summary,
+        drawing=loaded.drawing,
+        sumo_map=loaded.sumo,
+        corridor=corridor_along(loaded.sumo.graph, segments) if segments else None,
+        out=out,
     )
 
 

@@ -8,8 +8,8 @@ from odscen import workflow
 from odscen.catalog.store import Workspace
 from odscen.errors import InputError
 from odscen.regression.compare import compare_runs, read_runs
+from odscen.regression.comparison_page import comparison_page
 from odscen.regression.measure import Key
-from odscen.regression.pages import comparison_page
 from odscen.results.comparison import compare_figure
 from tests.cli.conftest import odscen
 from tests.regression.conftest import ROOT

@@ -111,7 +111,7 @@ def test_the_report_is_well_formed_and_says_what_happened():
     assert "9 s b was stuck too long and was lifted off the road" in text
     assert "5 s p never entered the road" in text
     assert "before bus-2: no way to its goal" in text
-    assert text.count("How to read this:") == 8
+    assert text.count("How to read this:") == 9
 
 
 def test_the_mean_speed_counts_vehicles_only_and_in_kmh():

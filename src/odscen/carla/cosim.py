@@ -235,7 +235,7 @@ def cosim(
             show.on_shown = options.on_step
 
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-            write_report(folder, summary, drawing=loaded.drawing)
+            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
             if recorder is not None:
                 recorder.write(folder, loaded.drawing)
 

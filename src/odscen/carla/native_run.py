@@ -151,7 +151,7 @@ def run_native(
         return ended
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        write_report(folder, summary, drawing=loaded.drawing)
+        write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
     # SUMO has no part in this: no files of its own, and no routes that it could not find.
     actors = tuple(replace(actor, problem=None) for actor in plan.actors)

@@ -20,6 +20,7 @@ from odscen.cli.maps import app as maps
 from odscen.cli.output import report_error, report_usage
 from odscen.cli.pull import pull
 from odscen.cli.regression import compare, gate
+from odscen.cli.report import report
 from odscen.cli.runs import resume, run
 from odscen.cli.scenarios import check, export, generate
 from odscen.cli.serve import serve
@@ -41,6 +42,7 @@ app.command()(check)
 app.command()(export)
 app.command()(run)
 app.command()(resume)
+app.command()(report)
 app.command("test")(gate)
 app.command()(compare)
 app.command()(cosim)

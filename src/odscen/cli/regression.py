@@ -97,7 +97,7 @@ def compare(
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
     from odscen.catalog.store import Workspace
     from odscen.regression.compare import compare_runs, read_runs
-    from odscen.regression.pages import comparison_page
+    from odscen.regression.comparison_page import comparison_page
     from odscen.workflow import write_text
 
     store = Workspace.open(workspace)

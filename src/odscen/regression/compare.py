@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,18 +9,25 @@ from typing import TYPE_CHECKING, Any
 from odscen.errors import InputError
 from odscen.regression.measure import measure, place_index
 from odscen.results.comparison import CONFIDENCE, compare_figure
+from odscen.results.place_shapes import place_shapes
+from odscen.results.traffic_files import read_tables
 from odscen.results.units import unit_of, with_unit
-from odscen.sumo.layout import SUMMARY_FILE
+from odscen.sumo.ended import read_summary
+from odscen.sumo.layout import FIGURES_FOLDER, SUMMARY_FILE
 from odscen.workflow import load_map
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    import polars as pl
+
     from odscen.catalog.store import Workspace
     from odscen.regression.measure import Key, Measured
     from odscen.results.comparison import Difference
+    from odscen.results.place_shapes import PlaceShapes
     from odscen.results.places import PlaceIndex
+    from odscen.workflow import LoadedMap
 
 FORMAT = "odscen-comparison"
 VERSION = 1
@@ -34,13 +40,19 @@ _PLACE_FIGURES = {"segment": "mean_speed", "junction": "waiting_time"}
 
 @dataclass(frozen=True, slots=True)
 class RunSet:
-    """Runs of one side by seed; ``versions`` and ``scenario`` as in their summaries."""
+    """Runs of one side by seed; ``versions`` and ``scenario`` as in their summaries.
+
+    ``networks`` are their tables of the whole network over time, where they have them; ``shapes``
+    those of the map, if the workspace has it and all runs are on one.
+    """
 
     name: str
     scenario: str
     versions: tuple[str, ...]
     runs: Mapping[int, Measured]
     places: bool
+    networks: tuple[pl.DataFrame, ...] = ()
+    shapes: PlaceShapes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +106,11 @@ class RunComparison:
     places: tuple[Row, ...]
     notes: tuple[str, ...]
 
+    @property
+    def place_rows(self) -> list[Row]:
+        """The one figure of each place that says how traffic gets on there."""
+        return [row for row in self.rows if _PLACE_FIGURES.get(row.key.kind) == row.key.figure]
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as data; figures in SI units, named beside each."""
 
@@ -139,15 +156,21 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
     indexes: dict[str, PlaceIndex | None] = {}
+    networks: list[pl.DataFrame] = []
+    shapes = None
     for path in folders:
         summary = _summary(path)
         sha256 = summary.get("map_sha256", "")
         if sha256 not in indexes:
-            indexes[sha256] = _index(workspace, summary)
+            loaded = _loaded(workspace, summary)
+            indexes[sha256] = None if loaded is None else place_index(loaded.sumo)
+            shapes = None if loaded is None else place_shapes(loaded.sumo.graph)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))
         runs[summary["seed"]] = measure(path, summary, indexes[sha256])
+        if (figures := read_tables(path / FIGURES_FOLDER)) is not None:
+            networks.append(figures.network)
         scenarios[str(summary.get("scenario"))] = None
         told = summary.get("versions") or {}
         versions[", ".join(f"{key} {told[key]}" for key in ("odscen", "sumo") if key in told)] = (
@@ -157,29 +180,32 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
         msg = f"runs of different scenarios: {', '.join(scenarios)}; name a folder with one"
         raise InputError(msg, file=str(folder))
     places = all(index is not None for index in indexes.values())
-    return RunSet(str(folder), next(iter(scenarios)), tuple(versions), runs, places)
+    return RunSet(
+        str(folder),
+        next(iter(scenarios)),
+        tuple(versions),
+        runs,
+        places,
+        tuple(networks),
+        shapes if len(indexes) == 1 else None,
+    )
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    file = folder / SUMMARY_FILE
-    try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-        status, seed = summary["status"], summary["seed"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        msg = f"not the summary of a run: {error!r}"
-        raise InputError(msg, file=str(file)) from error
-    if status != "completed" or not isinstance(seed, int):
+    summary = read_summary(folder)
+    status = summary["status"]
+    if status != "completed" or not isinstance(summary["seed"], int):
         msg = f"the run has not completed, it is {status!r}"
-        raise InputError(msg, file=str(file))
-    return dict(summary)
+        raise InputError(msg, file=str(folder / SUMMARY_FILE))
+    return summary
 
 
-def _index(workspace: Workspace, summary: Mapping[str, Any]) -> PlaceIndex | None:
+def _loaded(workspace: Workspace, summary: Mapping[str, Any]) -> LoadedMap | None:
     try:
         entry = workspace.map_for(str(summary.get("map")), str(summary.get("map_sha256")))
     except InputError:
         return None
-    return place_index(load_map(entry).sumo)
+    return load_map(entry)
 
 
 def compare_runs(a: RunSet, b: RunSet) -> RunComparison:

@@ -171,8 +171,8 @@ def run_suite(
 
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
             if out is not None:
-                drawing = load_map(workspace.map_for(summary["map"], summary["map_sha256"])).drawing
-                write_report(folder, summary, drawing=drawing)
+                loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+                write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
         run_many(
             run_jobs,

@@ -1,4 +1,4 @@
-"""Suites and comparisons as one HTML page each, in the dress of the run report."""
+"""Suites as one HTML page each, in the dress of the run report."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from odscen.results.report import html_page
 from odscen.results.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from odscen.regression.compare import Row, RunComparison
     from odscen.regression.gates import CaseResult, SuiteResult
     from odscen.regression.verdict import Change
 
@@ -91,53 +88,3 @@ def _change_row(change: Change) -> Markup:
     fails = element("td", "fails" if change.counts else "too few vehicles to fail",
                     class_="bad" if change.counts else "fair")  # fmt: skip
     return element("tr", element("th", _readable(row[0]), scope="row"), *cells, fails)
-
-
-def comparison_page(result: RunComparison) -> str:
-    """Page of a comparison: figures side by side, then the places that differ most."""
-    a, b = result.a, result.b
-    title = a.scenario if a.scenario == b.scenario else f"{a.scenario} and {b.scenario}"
-    head = element(
-        "header",
-        element("p", "Comparison of runs", class_="kind"),
-        element("h1", title),
-        element("p", element("b", "A "), _side(a.name, a.runs)),
-        element("p", element("b", "B "), _side(b.name, b.runs)),
-        *(element("p", note, class_="soft") for note in result.notes),
-    )
-    heads = ("Figure", "Unit", "A", "B", "B - A", "95 % interval", "Verdict")
-    explained = (
-        "A and B are means over the runs of each side. If the same comparison were made many "
-        "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
-        "is clear, one that holds zero may be chance."
-    )
-    figures = [row for row in result.rows if row.key.kind == "run"]
-    body = [head, report_section("Key figures", html_table(heads, _rows(figures)),
-                                 explained=explained, ident="figures")]  # fmt: skip
-    if result.places:
-        explained = (
-            "segments by mean speed and junctions by the time that a vehicle stands before them; "
-            "large changes where many vehicles pass come first."
-        )
-        body.append(report_section("Where it changed most",
-                                   html_table(heads, _rows(result.places), label="Places"),
-                                   explained=explained, ident="places"))  # fmt: skip
-    return html_page(f"{title} - comparison", join(body))
-
-
-def _side(name: str, seeds: Iterable[int]) -> str:
-    listed = sorted(seeds)
-    return f"{name} (seed{'s' if len(listed) > 1 else ''} {', '.join(map(str, listed))})"
-
-
-def _rows(rows: Sequence[Row]) -> list[Markup]:
-    return [
-        element(
-            "tr",
-            element("th", _readable(cells[0]), scope="row"),
-            element("td", cells[1]),
-            *(element("td", text, class_="n") for text in cells[2:6]),
-            element("td", cells[6], class_="fair" if cells[6] == "clear" else None),
-        )
-        for cells in (row.cells for row in rows)
-    ]

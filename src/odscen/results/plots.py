@@ -1,4 +1,4 @@
-"""Line charts as SVG text: small, sharp in print, and coloured by the page's style sheet.
+"""Charts as SVG text: small, sharp in print, and coloured by the page's style sheet.
 
 Direct SVG and not matplotlib: no second of import time, a tenth of the size, and the same chart is
 readable on a light and on a dark page, because colours are classes.
@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from odscen.catalog.markup import Markup, element, join, number
+from odscen.durations import clock
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 _WIDTH, _HEIGHT = 760.0, 270.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 14.0, 30.0, 40.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 20.0, 30.0, 40.0
+_HOURS = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0)
+_SIXTIETHS = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 60.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +75,51 @@ def nice_ticks(low: float, high: float, *, count: int = 5) -> list[float]:
     return [index * step for index in range(first, last + 1)]
 
 
+class Axis(NamedTuple):
+    """Where an axis begins and ends, its ticks with their labels, and what it shows."""
+
+    low: float
+    high: float
+    ticks: Sequence[tuple[float, str]]
+    name: str
+
+
+def value_axis(top: float, name: str, *, tight: bool = False) -> Axis:
+    """Axis from zero to a round number not below ``top``; to ``top`` itself if ``tight``."""
+    ticks = nice_ticks(0.0, top if top > 0 else 1.0)
+    high = top if tight and top > 0 else ticks[-1]
+    shown = [(value, _tick_text(value)) for value in ticks if value <= high]
+    return Axis(0.0, high, shown, name)
+
+
+def time_axis(end: float) -> Axis:
+    """Axis of the seconds from 0 to ``end``, labelled in the unit that gives small numbers."""
+    unit = TimeUnit.for_span(end)
+    span = end / unit.seconds
+    steps = _HOURS if unit.seconds == 3600.0 else _SIXTIETHS
+    step = next((step for step in steps if span / step <= 9), nice_ticks(0.0, span, count=8)[1])
+    values = np.arange(0.0, span + 1e-9, step).tolist()
+    ticks = [(value * unit.seconds, _tick_text(value)) for value in values]
+    return Axis(0.0, end, ticks, f"time since the start, {unit.name}")
+
+
+def clock_axis(begin: float, end: float) -> Axis:
+    """Axis of a stretch of the run, labelled ``17:15``: hours and minutes since the start."""
+    step = next(60.0 * step for step in (1, 2, 5, 10, 15, 30, 60) if end - begin <= step * 540.0)
+    first = np.ceil(begin / step - 1e-9) * step
+    values = np.arange(first, end + 1e-6, step).tolist()
+    name = "time since the start, h:min"
+    return Axis(begin, end, [(value, clock(value)) for value in values], name)
+
+
 def line_chart(
-    time: FloatArray, series: Sequence[Series], *, y_label: str, description: str
+    time: FloatArray,
+    series: Sequence[Series],
+    *,
+    y_label: str,
+    description: str,
+    height: float = _HEIGHT,
+    end: float | None = None,
 ) -> Markup:
     """Chart of lines over time.
 
@@ -87,43 +133,119 @@ def line_chart(
         What is shown, with its unit.
     description
         One sentence for those who cannot see it.
+    height
+        Of the drawing, whose width is 760.
+    end
+        Where the axis of time ends, seconds; with the last value if not given.
     """
-    end = max(float(time[-1]), 1.0)
-    unit = TimeUnit.for_span(end)
-    x_ticks = nice_ticks(0.0, end / unit.seconds, count=8)
     top = max((_peak(line) for line in series), default=0.0)
-    y_ticks = nice_ticks(0.0, top if top > 0 else 1.0)
-    frame = _Frame(x_ticks[-1] * unit.seconds, y_ticks[-1])
-    parts = [element("title", description)]
-    parts += [_grid_line(frame, value) for value in y_ticks]
-    parts += [_x_tick(frame, value * unit.seconds, value) for value in x_ticks]
-    for line in series:
-        if line.low is not None and line.high is not None:
-            parts.append(_band(frame, time, line))
+    frame = Frame(
+        time_axis(max(float(time[-1]) if end is None else end, 1.0)),
+        value_axis(top, y_label),
+        height,
+    )
+    parts = [
+        _band(frame, time, line)
+        for line in series
+        if line.low is not None and line.high is not None
+    ]
     parts += [
         element("path", d=_line_data(frame, time, line.y), class_=f"line {line.style}")
         for line in series
     ]
-    parts.append(_text(_LEFT - 42, 14, y_label, class_="axis-name"))
-    x_name = f"time since the start, {unit.name}"
-    parts.append(_text(_WIDTH - _RIGHT, _HEIGHT - 4, x_name, class_="axis-name", text_anchor="end"))
-    view = f"0 0 {number(_WIDTH)} {number(_HEIGHT)}"
-    svg = element("svg", *parts, viewBox=view, role="img", class_="chart")
-    return element("div", svg, _legend(series), class_="chart-box")
+    return chart(frame, parts, description=description, keys=_legend(series))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dots:
+    """One group of dots of a chart; ``style`` is the class that gives the colour."""
+
+    label: str
+    style: str
+    x: FloatArray
+    y: FloatArray
+    titles: Sequence[str] = ()
+
+
+def dot_chart(
+    groups: Sequence[Dots], *, x_label: str, y_label: str, description: str, joined: bool = False
+) -> Markup:
+    """Chart of dots; both axes start at zero.
+
+    Parameters
+    ----------
+    groups
+        Each with a colour of its own; ``titles``, one per dot, show when it is pointed at.
+    joined
+        Whether a thin line leads from dot to dot, through all groups in their order.
+    """
+    x, y = (np.concatenate([getattr(dots, key) for dots in groups]) for key in ("x", "y"))
+    x_axis, y_axis = (
+        value_axis(float(values.max(initial=0.0)), name)
+        for values, name in ((x, x_label), (y, y_label))
+    )
+    frame = Frame(x_axis, y_axis, height=360.0)
+    parts = []
+    if joined:
+        parts.append(element("path", d=_line_data(frame, x, y), class_="trail"))
+    for dots in groups:
+        circles = []
+        places = np.column_stack([frame.x(dots.x), frame.y(dots.y)]).tolist()
+        for (a, b), title in zip(places, dots.titles or [""] * len(places), strict=True):
+            words = element("title", title) if title else None
+            circles.append(element("circle", words, cx=number(a, 1), cy=number(b, 1), r=4))
+        parts.append(element("g", *circles, class_=f"dots {dots.style}"))
+    entries = [(dots.style, dots.label) for dots in groups]
+    return chart(frame, parts, description=description, keys=legend(entries))
 
 
 @dataclass(frozen=True, slots=True)
-class _Frame:
-    """From values to places in the chart; both axes start at zero."""
+class Frame:
+    """From values to places in a chart of ``height``, in the units of its drawing."""
 
-    x_max: float
-    y_max: float
+    x_axis: Axis
+    y_axis: Axis
+    height: float = _HEIGHT
 
     def x(self, value: FloatArray | float) -> FloatArray | float:
-        return _LEFT + value / self.x_max * (_WIDTH - _LEFT - _RIGHT)
+        """From the left edge of the drawing."""
+        axis = self.x_axis
+        return _LEFT + (value - axis.low) / (axis.high - axis.low) * (_WIDTH - _LEFT - _RIGHT)
 
     def y(self, value: FloatArray | float) -> FloatArray | float:
-        return _HEIGHT - _BOTTOM - value / self.y_max * (_HEIGHT - _TOP - _BOTTOM)
+        """From its upper edge."""
+        axis = self.y_axis
+        share = (value - axis.low) / (axis.high - axis.low)
+        return self.height - _BOTTOM - share * (self.height - _TOP - _BOTTOM)
+
+
+def chart(
+    frame: Frame, parts: Sequence[Markup], *, description: str, keys: Markup | None = None
+) -> Markup:
+    """Axes, what lies between them, and a legend below."""
+    drawn = [element("title", description)]
+    drawn += [_grid_line(frame, *tick) for tick in frame.y_axis.ticks]
+    drawn += [_x_tick(frame, *tick) for tick in frame.x_axis.ticks]
+    drawn += parts
+    drawn.append(text_at(_LEFT - 42, 14, frame.y_axis.name, class_="axis-name"))
+    x_name = text_at(
+        _WIDTH - _RIGHT,
+        frame.height - 4,
+        frame.x_axis.name,
+        class_="axis-name",
+        text_anchor="end",
+    )
+    drawn.append(x_name)
+    view = f"0 0 {number(_WIDTH)} {number(frame.height)}"
+    svg = element("svg", *drawn, viewBox=view, role="img", class_="chart")
+    return element("div", svg, keys, class_="chart-box")
+
+
+def legend(entries: Sequence[tuple[str, str]]) -> Markup:
+    """Swatches with their words; pairs of class and words."""
+    items = [element("span", element("i", class_=f"swatch {style}"), words)
+             for style, words in entries]  # fmt: skip
+    return element("div", *items, class_="legend")
 
 
 def _peak(line: Series) -> float:
@@ -132,22 +254,23 @@ def _peak(line: Series) -> float:
     return float(finite.max()) if finite.size else 0.0
 
 
-def _text(x: float, y: float, text: str, **attributes: str) -> Markup:
+def text_at(x: float, y: float, text: str, **attributes: str) -> Markup:
+    """Text of a chart."""
     return element("text", text, x=float(x), y=float(y), **attributes)
 
 
-def _grid_line(frame: _Frame, value: float) -> Markup:
+def _grid_line(frame: Frame, value: float, label: str) -> Markup:
     y = float(frame.y(value))
     line = element(
         "path", d=f"M{number(_LEFT)} {number(y)}H{number(_WIDTH - _RIGHT)}", class_="grid"
     )
-    return join([line, _text(_LEFT - 8, y + 4, _tick_text(value), text_anchor="end")])
+    return join([line, text_at(_LEFT - 8, y + 4, label, text_anchor="end")])
 
 
-def _x_tick(frame: _Frame, time: float, value: float) -> Markup:
-    x, bottom = float(frame.x(time)), _HEIGHT - _BOTTOM
+def _x_tick(frame: Frame, value: float, label: str) -> Markup:
+    x, bottom = float(frame.x(value)), frame.height - _BOTTOM
     line = element("path", d=f"M{number(x)} {number(bottom)}v4", class_="tick")
-    return join([line, _text(x, bottom + 17, _tick_text(value), text_anchor="middle")])
+    return join([line, text_at(x, bottom + 17, label, text_anchor="middle")])
 
 
 def _tick_text(value: float) -> str:
@@ -166,7 +289,7 @@ def _points(x: FloatArray, y: FloatArray) -> str:
     )
 
 
-def _line_data(frame: _Frame, time: FloatArray, y: FloatArray) -> str:
+def _line_data(frame: Frame, time: FloatArray, y: FloatArray) -> str:
     x, height = np.asarray(frame.x(time)), np.asarray(frame.y(y))
     # A lone value would be invisible as a line: a stub with round caps shows as a dot.
     return "".join(
@@ -175,7 +298,7 @@ def _line_data(frame: _Frame, time: FloatArray, y: FloatArray) -> str:
     )
 
 
-def _band(frame: _Frame, time: FloatArray, line: Series) -> Markup:
+def _band(frame: Frame, time: FloatArray, line: Series) -> Markup:
     low, high = np.asarray(line.low), np.asarray(line.high)
     x, below, above = np.asarray(frame.x(time)), np.asarray(frame.y(low)), np.asarray(frame.y(high))
     data = "".join(
@@ -188,11 +311,8 @@ def _band(frame: _Frame, time: FloatArray, line: Series) -> Markup:
 def _legend(series: Sequence[Series]) -> Markup | None:
     if len(series) < 2 and all(line.low is None for line in series):
         return None
-    items = [
-        element("span", element("i", class_=f"swatch {line.style}"), line.label) for line in series
-    ]
-    if any(line.low is not None for line in series):
-        style = next(line.style for line in series if line.low is not None)
-        text = "8 of 10 values lie in this band (10th to 90th percentile)"
-        items.append(element("span", element("i", class_=f"swatch band {style}"), text))
-    return element("div", *items, class_="legend")
+    entries = [(line.style, line.label) for line in series]
+    if (banded := next((line for line in series if line.low is not None), None)) is not None:
+        words = "8 of 10 values lie in this band (10th to 90th percentile)"
+        entries.append((f"band {banded.style}", words))
+    return legend(entries)

@@ -18,7 +18,12 @@ from odscen.catalog.markup import Markup, element, join, number
 from odscen.results.curves import presence
 from odscen.results.gridlock import find_trouble
 from odscen.results.plots import Series, line_chart
+from odscen.results.report_corridor import corridor_section
+from odscen.results.report_emissions import emission_section
+from odscen.results.report_figures import key_figure_section
+from odscen.results.report_flow import diagram_section, flow_section
 from odscen.results.report_map import CATEGORIES, run_map
+from odscen.results.report_service import service_section
 from odscen.results.report_tables import (
     actor_table,
     event_list,
@@ -26,6 +31,8 @@ from odscen.results.report_tables import (
     report_section,
 )
 from odscen.results.report_trouble import trouble_section
+from odscen.results.report_walking import walking_section
+from odscen.results.report_words import duration
 from odscen.results.summary import actor_counts, key_figures
 from odscen.results.traces import bin_width, speed_over_time, tidy, travel
 
@@ -36,8 +43,11 @@ if TYPE_CHECKING:
 
     from odscen.catalog.drawing import MapDrawing
     from odscen.results.gridlock import Trouble
+    from odscen.results.place_shapes import PlaceShapes
     from odscen.results.records import Event, Plan
+    from odscen.results.report_corridor import CorridorTraces
     from odscen.results.summary import ActorOutcome
+    from odscen.results.traffic import TrafficFigures
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +61,9 @@ def render_report(
     *,
     drawing: MapDrawing | None = None,
     every: int = 1,
+    figures: TrafficFigures | None = None,
+    shapes: PlaceShapes | None = None,
+    corridor: CorridorTraces | str | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -71,6 +84,12 @@ def render_report(
         Of the map, if it is to be shown below the ways.
     every
         Of so many records the trajectories have one only; the page says so.
+    figures
+        By place and time, if they were recorded.
+    shapes
+        Of the map's places, if it is to be coloured by level of service.
+    corridor
+        Vehicles along a corridor, or words why there is no diagram of them.
 
     Returns
     -------
@@ -82,13 +101,19 @@ def render_report(
     end = _end(summary, traces)
     trouble = find_trouble(plan, actors, events, end=end)
     title = plan.scenario or "Run"
+    given = summary.get("figures") or key_figures(actors)
     body = [
         _head(title, plan, summary, _in_a_sentence(actors)),
-        _key_figures(summary, actors, traces),
+        key_figure_section(given, actors, traces),
+        service_section(figures, shapes) if figures else None,
         _map_section(traces, plan, actors, events, drawing, trouble, every),
         trouble_section(trouble),
+        *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
+        corridor_section(corridor) if corridor is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
+        walking_section(given, actors, traces, end=end),
+        emission_section(figures) if figures else None,
         expectation_table(summary.get("expectations") or ()),
         event_list(events, actors, problems=[str(text) for text in summary.get("problems") or ()]),
         actor_table(actors, travel(traces)),
@@ -126,17 +151,6 @@ def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
     last = traces["time"].max()
     recorded = float(last) if isinstance(last, int | float) else 0.0
     return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
-
-
-def duration(seconds: float | None) -> str:
-    """``"4 min 05 s"``; empty for ``None``."""
-    if seconds is None or not np.isfinite(seconds):
-        return ""
-    if seconds < 60.0:
-        return f"{number(seconds, 1)} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s"
 
 
 def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
@@ -205,54 +219,6 @@ def _plain(value: object) -> str:
     if isinstance(value, dict):
         return str(value.get("name") or value.get("preset") or "")
     return number(value) if isinstance(value, float) else str(value)
-
-
-def _key_figures(
-    summary: Mapping[str, Any], actors: Sequence[ActorOutcome], traces: pl.DataFrame
-) -> Markup:
-    counts = actor_counts(actors)
-    given = summary.get("figures") or key_figures(actors)
-    driven = traces.filter(traces["category"] != "pedestrian")["speed"].mean()
-    planned, inserted = counts["planned"], counts["inserted"]
-    travelled = duration(given.get("mean_travel_time")) or "-"
-    error = given.get("insertion_error_max")
-    figures = [
-        ("actors planned", f"{planned:,}", ""),
-        ("entered the road", f"{inserted:,}", _share(inserted, planned)),
-        ("reached their goal", f"{counts['arrived']:,}", _share(counts["arrived"], planned)),
-        ("teleported", f"{counts['teleported']:,}", "" if counts["teleported"] else "none: good"),
-        ("collided", f"{counts['collided']:,}", "" if counts["collided"] else "none: good"),
-        ("mean travel time", travelled, "of vehicles that arrived"),
-        ("mean speed of vehicles", _kmh(driven), "stops included"),
-    ]
-    if isinstance(error, int | float):
-        text = f"{error * 100:.1f} cm"
-        figures.append(("largest start error", text, "from the planned place"))
-    cards = [
-        element(
-            "div",
-            element("strong", value),
-            element("span", name),
-            element("small", note) if note else None,
-            class_="card bad" if name in {"teleported", "collided"} and value != "0" else "card",
-        )
-        for name, value, note in figures
-    ]
-    explained = (
-        "an actor is one vehicle or pedestrian. It has entered the road when the simulation could "
-        "place it, and teleported when it was stuck so long that the simulator moved it on."
-    )
-    return report_section(
-        "Key figures", element("div", *cards, class_="cards"), explained=explained, ident="figures"
-    )
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{number(100.0 * part / whole, 1)} % of the planned" if whole else ""
-
-
-def _kmh(speed: object) -> str:
-    return f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
 
 
 def _map_section(

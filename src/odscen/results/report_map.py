@@ -46,7 +46,8 @@ SPEED_STEPS_KMH = (5.0, 15.0, 30.0, 50.0, 80.0)
 _INCIDENTS = (EventKind.TELEPORT_START, EventKind.COLLISION)
 
 _DRAW_LIMIT = 4000
-"""Ways drawn at most; of more, every n-th is drawn and the page says so."""
+_POINT_LIMIT = 150_000
+"""Ways drawn at most, and their points; of more, every n-th is drawn and the page says so."""
 
 
 def run_map(
@@ -93,18 +94,22 @@ def run_map(
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
     layers += [rings] if (rings := trouble_rings(trouble, extent / 400.0)) else []
-    cm = [round(value * 100) for value in (bounds[0], -bounds[3])]
-    size = [round((bounds[2] - bounds[0]) * 100), round((bounds[3] - bounds[1]) * 100)]
     svg = element(
         "svg",
         element("title", "Map of the run: the ways of all actors"),
         *layers,
         scale_bar(bounds),
-        viewBox=" ".join(map(str, cm + size)),
+        viewBox=view_box(bounds),
         class_="run-map",
         role="img",
     )
-    return element("div", *_controls(), svg, *_legends(paths), class_="map-figure", id="map-figure")
+    note = None
+    if (nth := _one_in(paths)) > 1:
+        words = f"There are {len(paths.ids):,} ways; one in {nth} is drawn."
+        note = element("p", words, class_="for-ways")
+    return element(
+        "div", *_controls(), svg, *_legends(paths), note, class_="map-figure", id="map-figure"
+    )
 
 
 def _controls() -> list[Markup]:
@@ -155,6 +160,12 @@ def fitted_view(everything: FloatArray, drawing: MapDrawing | None) -> Bounds | 
     return (*(middle - half).tolist(), *(middle + half).tolist())
 
 
+def view_box(bounds: Bounds) -> str:
+    """Of a drawing in centimetres, y downwards."""
+    size = (bounds[2] - bounds[0], bounds[3] - bounds[1])
+    return " ".join(str(round(value * 100)) for value in (bounds[0], -bounds[3], *size))
+
+
 def _speed_layer(cells: SpeedCells) -> Markup:
     kmh = cells.speed * 3.6
     step = np.searchsorted(SPEED_STEPS_KMH, kmh, side="right")
@@ -169,9 +180,14 @@ def _speed_layer(cells: SpeedCells) -> Markup:
     return element("g", *parts, class_="for-speeds")
 
 
+def _one_in(paths: Paths) -> int:
+    """Of so many ways one is drawn."""
+    return max(-(-len(paths.ids) // _DRAW_LIMIT), -(-len(paths.xy) // _POINT_LIMIT), 1)
+
+
 def _path_layer(paths: Paths, actors: Sequence[ActorOutcome], dot: float) -> Markup:
     status = {actor.id: actor.status for actor in actors}
-    every = -(-len(paths.ids) // _DRAW_LIMIT) or 1
+    every = _one_in(paths)
     groups: dict[str, list[Markup]] = {}
     for k in range(0, len(paths.ids), every):
         xy = paths.xy[paths.start[k] : paths.start[k + 1]] * (1.0, -1.0)
@@ -213,8 +229,9 @@ def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: 
 
 
 def _dots(places: FloatArray) -> str:
-    whole = np.rint(places * (100.0, -100.0)).astype(np.int64).tolist()
-    return "".join(f"M{x} {y}h0" for x, y in whole)
+    """Path data of dots; where many are in one place, which a day of traffic brings, of one."""
+    whole = np.unique(np.rint(places * (10.0, -10.0)).astype(np.int64), axis=0) * 10
+    return "".join(f"M{x} {y}h0" for x, y in whole.tolist())
 
 
 def scale_bar(bounds: Bounds) -> Markup:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 ACTOR_LIMIT = 3000
 """Rows of the actor table at most; a browser sorts that many at once. The file has all."""
 
+PRINTED_ACTORS = 100
+"""Rows of it on paper; the style sheet hides the others there."""
+
 EVENT_LIMIT = 300
 
 _STUCK = "Usually a blocked lane, or a turn that the traffic never left room for."
@@ -167,7 +170,13 @@ def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
         "start of the simulation; an empty field means that it never came to that."
     )
     table = html_table(_COLUMNS, rows, id="actors-table")
-    return report_section("Actors", control, more, table, explained=explained, ident="actors")
+    printed = None
+    if len(rows) > PRINTED_ACTORS:
+        words = f"The first {PRINTED_ACTORS} are printed."
+        printed = element("p", words, class_="print-only")
+    return report_section(
+        "Actors", control, more, printed, table, explained=explained, ident="actors"
+    )
 
 
 def _actor_row(actor: ActorOutcome, travel: ActorTravel) -> Markup:

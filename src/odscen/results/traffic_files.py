@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from odscen.results.records import rounded
-from odscen.results.traffic import TABLES, over_run
+from odscen.results.traffic import TABLES, TrafficFigures, over_run
 from odscen.results.traffic_sums import EMISSIONS
 from odscen.results.units import unit_of
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import polars as pl
-
-    from odscen.results.traffic import TrafficFigures
 
 FIGURES_FORMAT = "odscen-figures"
 VERSION = 1
@@ -35,6 +33,7 @@ COLUMN_UNITS = {
     "length": "km",
 }
 """Units of the columns of :class:`odscen.results.traffic.TrafficFigures`."""
+_COUNTS = ("vehicles", "departed", "arrived", "throughput")
 
 
 def write_tables(figures: TrafficFigures, folder: Path) -> None:
@@ -43,6 +42,24 @@ def write_tables(figures: TrafficFigures, folder: Path) -> None:
     for name in TABLES:
         table: pl.DataFrame = getattr(figures, name)
         _short(table).write_csv(folder / f"{name}.csv")
+
+
+def read_tables(folder: Path) -> TrafficFigures | None:
+    """Inverse of :func:`write_tables`; ``None`` if the run has none."""
+    import polars as pl
+
+    if not all((folder / f"{name}.csv").is_file() for name in TABLES):
+        return None
+    types: dict[str, type[pl.DataType]] = dict.fromkeys(COLUMN_UNITS, pl.Float64)
+    types |= dict.fromkeys(_COUNTS, pl.Int64)
+    tables = {}
+    for name in TABLES:
+        file = folder / f"{name}.csv"
+        names = pl.scan_csv(file).collect_schema().names()
+        # Whatever else a table has, such as ids and levels, is text.
+        schema = {column: types.get(column, pl.String) for column in names}
+        tables[name] = pl.read_csv(file, schema=schema)
+    return TrafficFigures(**tables)
 
 
 def figures_json(figures: TrafficFigures, of_run: Mapping[str, float | None]) -> str:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from odscen.results.records import Plan, events_from_json
 from odscen.results.summary import actors_from_json
+from odscen.results.traffic import over_run
+from odscen.results.traffic_files import read_tables
 from odscen.scenario.files import dumps
 from odscen.sumo import layout
 from odscen.sumo.forecast import forecast
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from odscen.catalog.drawing import MapDrawing
+    from odscen.results.corridors import Corridor
     from odscen.scenario.document import Scenario
     from odscen.sumo.realize import Assets
     from odscen.sumo.recording import Recording
@@ -95,7 +98,13 @@ def prepare(
 
 
 def write_report(
-    folder: Path, summary: Mapping[str, Any], *, drawing: MapDrawing | None = None
+    folder: Path,
+    summary: Mapping[str, Any],
+    *,
+    drawing: MapDrawing | None = None,
+    sumo_map: SumoMap | None = None,
+    corridor: Corridor | None = None,
+    out: Path | None = None,
 ) -> Path:
     """Write ``report.html`` into a run folder from its files; made for ``finish`` of a run.
 
@@ -103,15 +112,30 @@ def write_report(
     ----------
     drawing
         Of the map, to be shown below the ways.
+    sumo_map
+        Of the map, to show figures by place and a corridor.
+    corridor
+        To follow vehicles along; the busiest if not given.
+    out
+        File to write; ``report.html`` in the run folder if not given.
     """
     import polars as pl
 
+    from odscen.results.corridors import busiest_corridor
+    from odscen.results.place_shapes import place_shapes
     from odscen.results.report import render_report
+    from odscen.sumo.corridor_traces import corridor_traces
 
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
     recorded = read_trajectories(folder, most=REPORT_ROWS)
+    figures = read_tables(folder / layout.FIGURES_FOLDER)
+    if corridor is None and figures is not None and sumo_map is not None:
+        corridor = busiest_corridor(over_run(figures.movements), sumo_map.graph)
+    followed = None
+    if corridor is not None and sumo_map is not None:
+        followed = corridor_traces(folder, sumo_map, corridor)
     page = render_report(
         summary,
         Plan.from_json(text(layout.PLAN_FILE)),
@@ -120,7 +144,10 @@ def write_report(
         recorded.rows if recorded is not None else pl.DataFrame(),
         drawing=drawing,
         every=recorded.every if recorded is not None else 1,
+        figures=figures,
+        shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
+        corridor=followed,
     )
-    report = folder / layout.REPORT_FILE
+    report = out or folder / layout.REPORT_FILE
     report.write_text(page, encoding="utf-8")
     return report

@@ -284,7 +284,7 @@ class Runs:
 
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
             active.finishing = True
-            write_report(folder, summary, drawing=loaded.drawing)
+            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
         out = self._workspace.runs / active.id
         result = run_prepared(prepared, out, finish=finish, live=active.live)

@@ -1,0 +1,298 @@
+"""A comparison as one HTML page, in the dress of the run report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.catalog.markup import Markup, element, join, number, path_data
+from odscen.regression.figure_words import in_words
+from odscen.results.plots import Dots, dot_chart, legend
+from odscen.results.report import html_page
+from odscen.results.report_flow import DENSITY, FLOW, column
+from odscen.results.report_map import fitted_view, scale_bar, view_box
+from odscen.results.report_tables import html_table, report_section
+from odscen.results.report_words import stretch
+from odscen.results.units import with_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from odscen.regression.compare import Row, RunComparison, RunSet
+    from odscen.results.place_shapes import PlaceShapes
+
+STEPS = (0.05, 0.15, 0.3)
+"""Limits between the colours of the map, as shares of the value in A."""
+
+TOLD = 0.01
+"""Share of the value in A from which a clear difference is told in short."""
+
+LEAST_VEHICLES = 10.0
+"""Vehicles that have passed a place on both sides, on average, for it to have a colour."""
+
+_ROW, _LABELS, _RIGHT, _WIDTH, _FOOT = 26.0, 310.0, 32.0, 760.0, 44.0
+
+
+def comparison_page(result: RunComparison) -> str:
+    """Page of a comparison: what is clear, figures side by side, places, and how much flows."""
+    a, b = result.a, result.b
+    title = a.scenario if a.scenario == b.scenario else f"{a.scenario} and {b.scenario}"
+    figures = [row for row in result.rows if row.key.kind == "run"]
+    head = element(
+        "header",
+        element("p", "Comparison of runs", class_="kind"),
+        element("h1", title),
+        element("p", element("b", "A "), _side(a.name, a.runs)),
+        element("p", element("b", "B "), _side(b.name, b.runs)),
+        *(element("p", note, class_="soft") for note in result.notes),
+    )
+    parts = [
+        head,
+        _in_short(figures),
+        _chart_section(figures),
+        _table_section(figures),
+        _place_section(result),
+        _diagram_section(a, b),
+    ]
+    return html_page(f"{title} - comparison", join([part for part in parts if part]))
+
+
+def _side(name: str, seeds: Iterable[int]) -> str:
+    listed = sorted(seeds)
+    return f"{name} (seed{'s' if len(listed) > 1 else ''} {', '.join(map(str, listed))})"
+
+
+def _in_short(figures: Sequence[Row]) -> Markup:
+    clear = [row for row in figures if row.says == "clear"]
+    clear.sort(key=lambda row: -abs(row.difference.relative or np.inf))
+    if not figures or all(row.says == "the same" for row in figures):
+        content = element("p", "A and B are the same in every figure.")
+    elif not any(map(_counts, clear)):
+        words = "Whatever is clear is too small to matter." if clear else "Each may be chance."
+        content = element("p", f"No difference to speak of. {words}")
+    else:
+        content = element("ul", *(element("li", _sentence(row)) for row in filter(_counts, clear)))
+    explained = (
+        "clear means that the runs of one side differ so little among themselves that chance "
+        "hardly explains the difference. It takes at least two runs a side, better five or more."
+    )
+    return report_section("In short", content, explained=explained, ident="short")
+
+
+def _counts(row: Row) -> bool:
+    """Whether a clear difference is large enough to be told first."""
+    return abs(row.difference.relative or 1.0) >= TOLD
+
+
+def _sentence(row: Row) -> str:
+    found, figure = row.difference, row.key.figure
+    if found.a is None or found.b is None:
+        return in_words(figure)
+    values = f"{with_unit(found.a, figure)} in A, {with_unit(found.b, figure)} in B"
+    word = "more" if found.b > found.a else "less"
+    share = f"{number(100.0 * abs(found.relative), 1)} % {word} in B: " if found.relative else ""
+    return f"{in_words(figure)}: {share}{values}."
+
+
+def _chart_section(figures: Sequence[Row]) -> Markup | None:
+    shown = [row for row in figures if row.difference.relative]
+    if not shown:
+        return None
+    explained = (
+        "each dot is the difference of one figure, as a share of its value in A; right of the line "
+        "in the middle it is larger in B. The bar is the range in which the true difference lies, "
+        "19 times in 20: if it does not touch the line, the difference is clear and drawn dark. "
+        "Bars that are cut at the edge go on. Figures that are alike are left out."
+    )
+    return report_section(
+        "Differences", _interval_chart(shown), explained=explained, ident="differences"
+    )
+
+
+def _interval_chart(rows: Sequence[Row]) -> Markup:
+    shares = np.array([100.0 * (row.difference.relative or 0.0) for row in rows])
+    reach = _reach(float(np.abs(shares).max()))
+    height = len(rows) * _ROW + _FOOT
+    middle = (_LABELS + _WIDTH - _RIGHT) / 2.0
+    scale = (_WIDTH - _RIGHT - _LABELS) / 2.0 / reach
+
+    def x(share: float) -> float:
+        return middle + scale * min(max(share, -reach), reach)
+
+    parts = [element("title", "Differences of all figures in per cent, with their intervals")]
+    bottom = height - _FOOT
+    for share in np.linspace(-reach, reach, 5).tolist():
+        line = f"M{number(x(share))} 4V{number(bottom)}"
+        parts.append(element("path", d=line, class_="zero" if share == 0.0 else "grid"))
+        words = f"{'+' if share > 0 else ''}{number(share, 1)} %"
+        parts.append(element("text", words, x=x(share), y=bottom + 17, text_anchor="middle"))
+    name = "difference of B from A, per cent of A"
+    parts.append(element("text", name, x=_WIDTH - _RIGHT, y=height - 6, class_="axis-name",
+                         text_anchor="end"))  # fmt: skip
+    for index, (row, share) in enumerate(zip(rows, shares.tolist(), strict=True)):
+        y = index * _ROW + _ROW / 2.0 + 4.0
+        style = "difference clear" if row.says == "clear" else "difference"
+        marks = [element("text", in_words(row.key.figure), x=_LABELS - 12, y=y + 4,
+                         text_anchor="end", class_="axis-name")]  # fmt: skip
+        found = row.difference
+        if found.low is not None and found.high is not None and found.a:
+            low, high = (100.0 * value / abs(found.a) for value in (found.low, found.high))
+            bar = f"M{number(x(low), 1)} {number(y)}H{number(x(high), 1)}"
+            marks.append(element("path", d=bar, class_="interval"))
+        marks.append(element("circle", cx=x(share), cy=y, r=5))
+        parts.append(element("g", element("title", _sentence(row)), *marks, class_=style))
+    svg = element("svg", *parts, viewBox=f"0 0 {number(_WIDTH)} {number(height)}", role="img",
+                  class_="chart tall")  # fmt: skip
+    keys = legend([("c-clear", "clear"), ("c-unclear", "may be chance, or too few runs")])
+    return element("div", svg, keys, class_="chart-box")
+
+
+def _reach(largest: float) -> float:
+    """Round end of the axis, per cent; figures that grow manifold are cut."""
+    return next((end for end in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0) if largest <= end), 100.0)
+
+
+_HEADS = ("Figure", "Unit", "A", "B", "B - A", "95 % interval", "Verdict")
+
+
+def _table_section(figures: Sequence[Row]) -> Markup:
+    explained = (
+        "A and B are means over the runs of each side. If the same comparison were made many "
+        "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
+        "is clear, one that holds zero may be chance."
+    )
+    rows = [_table_row(row, in_words(row.key.figure)) for row in figures]
+    table = html_table(_HEADS, rows)
+    return report_section("All figures", table, explained=explained, ident="figures")
+
+
+def _table_row(row: Row, name: str) -> Markup:
+    cells = row.cells
+    return element(
+        "tr",
+        element("th", name, scope="row"),
+        element("td", cells[1]),
+        *(element("td", text, class_="n") for text in cells[2:6]),
+        element("td", cells[6], class_="fair" if cells[6] == "clear" else None),
+    )
+
+
+def _place_section(result: RunComparison) -> Markup | None:
+    if not result.places:
+        return None
+    explained = (
+        "on the map, red places are slower in B, or have longer waits, and blue ones are faster; "
+        f"places that fewer than {LEAST_VEHICLES:g} vehicles pass stay grey. The table has "
+        "segments by mean speed and junctions by the time that a vehicle stands before them; large "
+        "changes where many vehicles pass come first."
+    )
+    rows = [_table_row(row, row.key.name.replace("_", " ")) for row in result.places]
+    drawn = None if result.a.shapes is None else _change_map(result, result.a.shapes)
+    table = html_table(_HEADS, rows, label="Places")
+    return report_section(
+        "Where it changed most", drawn, table, explained=explained, ident="places"
+    )
+
+
+_GRADES = (
+    "over 30 % worse in B", "15 to 30 % worse", "5 to 15 % worse", "about the same",
+    "5 to 15 % better", "15 to 30 % better", "over 30 % better in B",
+)  # fmt: skip
+
+
+def _change_map(result: RunComparison, shapes: PlaceShapes) -> Markup | None:
+    bounds = fitted_view(shapes.points, None)
+    if bounds is None:
+        return None
+    extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+    grades = _grades(result)
+    named = {row.key.place for row in result.places}
+    parts = []
+    for name, lines in shapes.segments.items():
+        style, words = grades.get(("segment", name), ("los-none", "too few vehicles"))
+        title = element("title", f"{name}: {words}")
+        parts.append(element("path", title, d=path_data(lines.xy * (1, -1), lines.start),
+                             class_=style))  # fmt: skip
+    width = round(100 * max(3.0, extent / 350.0))
+    roads = element("g", *parts, class_="change-roads", stroke_width=width)
+    radius = round(100 * min(extent / 110.0, 10.0))
+    discs, labels = [], []
+    for name, (x, y) in shapes.junctions.items():
+        style, words = grades.get(("junction", name), ("los-none", "too few vehicles"))
+        cx, cy = round(x * 100), round(-y * 100)
+        title = element("title", f"{name}: {words}")
+        discs.append(element("circle", title, cx=cx, cy=cy, r=radius, class_=style))
+        if name in named:
+            labels.append(element("text", name, x=cx, y=cy - round(radius * 1.4),
+                                  font_size=round(extent * 1.7)))  # fmt: skip
+    svg = element(
+        "svg",
+        element("title", "Map of the roads and junctions, coloured by how they have changed"),
+        roads,
+        element("g", *discs, class_="los-discs", stroke_width=round(width / 5)),
+        element("g", *labels, class_="place-names"),
+        scale_bar(bounds),
+        viewBox=view_box(bounds),
+        class_="run-map",
+        role="img",
+    )
+    keys = [(f"d{index}", grade) for index, grade in enumerate(_GRADES)]
+    return element("div", svg, legend([*keys, ("los-none", "too few vehicles")]),
+                   class_="map-figure")  # fmt: skip
+
+
+def _grades(result: RunComparison) -> dict[tuple[str, str], tuple[str, str]]:
+    """Colour and words of each place with traffic on both sides."""
+    passed = {
+        (str(row.key.kind), row.key.place): min(row.difference.a or 0.0, row.difference.b or 0.0)
+        for row in result.rows
+        if row.key.figure == "vehicles"
+    }
+    found: dict[tuple[str, str], tuple[str, str]] = {}
+    for row in result.place_rows:
+        key = (str(row.key.kind), row.key.place)
+        difference = row.difference
+        if passed.get(key, 0.0) < LEAST_VEHICLES or difference.difference is None:
+            continue
+        # A junction's wait may be next to nothing in A: seconds count there.
+        base = max(abs(difference.a or 0.0), 1.0)
+        worse = -difference.difference if row.key.kind == "segment" else difference.difference
+        share = worse / base
+        step = int(np.searchsorted(STEPS, abs(share)))
+        grade = 3 - step if share > 0 else 3 + step
+        values = (f"{with_unit(value or 0.0, row.key.figure)} in {side}"
+                  for value, side in ((difference.a, "A"), (difference.b, "B")))  # fmt: skip
+        found[key] = (f"d{grade}", f"{in_words(row.key.figure)} {', '.join(values)}")
+    return found
+
+
+def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:
+    groups = [dots for runs, name in ((a, "A"), (b, "B")) if (dots := _dots(runs, name))]
+    if len(groups) < 2:
+        return None
+    drawn = dot_chart(
+        groups,
+        x_label=DENSITY,
+        y_label=FLOW,
+        description="Flow of the network over its density, in A and in B",
+    )
+    explained = (
+        "each dot is one interval of one run: how many vehicles were on the roads, and how many "
+        "got on. If the dots of one side lie higher at the same density, more traffic gets through "
+        "with the same number on the road; if they reach further to the right, the roads are "
+        "fuller."
+    )
+    return report_section("How much flows", drawn, explained=explained, ident="diagram")
+
+
+def _dots(runs: RunSet, name: str) -> Dots | None:
+    import polars as pl
+
+    tables = [table.filter(pl.col("density") > 0) for table in runs.networks]
+    if sum(table.height for table in tables) < 2:
+        return None
+    busy = pl.concat(tables)
+    titles = [f"{name}, {stretch(begin, end)}" for begin, end in busy.select("begin", "end").rows()]
+    return Dots(f"runs of {name}", f"side-{name.lower()}", column(busy, "density"),
+                column(busy, "flow"), titles)  # fmt: skip
