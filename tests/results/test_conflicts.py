@@ -1,5 +1,6 @@
 import polars as pl
 import pytest
+from lxml import html
 
 from odscen.results.conflicts import (
     SEEN_PET,
@@ -9,6 +10,7 @@ from odscen.results.conflicts import (
     walking_conflicts,
 )
 from odscen.results.records import PlannedActor
+from odscen.results.report_conflicts import conflict_section
 
 STEP = 0.1
 
@@ -97,3 +99,21 @@ def test_a_car_that_passes_long_after_or_beside_a_walker_is_no_conflict():
     actors = [planned("p", "pedestrian", 0.5, 0.5)]
     actors += [planned(name, "car", 4.0, 2.0) for name in ("late", "beside")]
     assert walking_conflicts(traces, actors) == []
+
+
+def test_conflicts_are_told_the_worst_first():
+    measures = {"x": 3.0, "y": -4.0, "drac": None, "pet": None}
+    rows = [
+        {"begin": 1.0, "end": 2.0, "one": "a", "other": "<b>", "kind": "following", "ttc": 2.5},
+        {"begin": 5.0, "end": 6.0, "one": "c", "other": "d", "kind": "crossing", "ttc": 0.75},
+    ]
+    section = conflict_section(conflict_table([{**measures, **row} for row in rows]))
+    page = html.fromstring(str(section))
+    told = [[cell.text_content() for cell in row] for row in page.findall(".//tbody/tr")]
+    assert told == [
+        ["5", "c", "d", "ways that cross", "0.75", "", "", "3, -4"],
+        ["1", "a", "<b>", "one behind the other", "2.50", "", "", "3, -4"],
+    ]
+    text = page.text_content()
+    assert "1serious conflictsof 2 seen" in text
+    assert "under 3 m/s\u00b2hardest braking needed" in text

@@ -85,17 +85,9 @@ def conflict_figures(conflicts: pl.DataFrame) -> dict[str, float]:
     ``min_ttc``, ``min_pet``, ``pedestrian_min_pet`` in s, ``max_drac`` in m/s^2, and the number of
     ``serious_conflicts``.
     """
-    import polars as pl
-
     afoot = conflicts["kind"] == "walking"
     driven, walked = conflicts.filter(~afoot), conflicts.filter(afoot)
-    serious = conflicts.select(
-        (
-            (pl.col("ttc") <= SERIOUS_TTC).fill_null(value=False)
-            | (pl.col("drac") >= SERIOUS_DRAC).fill_null(value=False)
-            | (pl.col("pet") <= SERIOUS_PET).fill_null(value=False)
-        ).sum()
-    ).item()
+    serious = conflicts.select(is_serious().sum()).item()
     return {
         "min_ttc": _least(driven["ttc"], SEEN_TTC),
         "max_drac": max([SEEN_DRAC, *driven["drac"].drop_nulls().to_list()]),
@@ -103,6 +95,17 @@ def conflict_figures(conflicts: pl.DataFrame) -> dict[str, float]:
         "pedestrian_min_pet": _least(walked["pet"], SEEN_PET),
         "serious_conflicts": float(serious),
     }
+
+
+def is_serious() -> pl.Expr:
+    """Whether a conflict is serious by any of its measures."""
+    import polars as pl
+
+    return (
+        (pl.col("ttc") <= SERIOUS_TTC).fill_null(value=False)
+        | (pl.col("drac") >= SERIOUS_DRAC).fill_null(value=False)
+        | (pl.col("pet") <= SERIOUS_PET).fill_null(value=False)
+    )
 
 
 def _least(values: pl.Series, most: float) -> float:

@@ -18,6 +18,7 @@ from odscen.catalog.markup import Markup, element, join, number
 from odscen.results.curves import presence
 from odscen.results.gridlock import find_trouble
 from odscen.results.plots import Series, line_chart
+from odscen.results.report_conflicts import conflict_section
 from odscen.results.report_corridor import corridor_section
 from odscen.results.report_emissions import emission_section
 from odscen.results.report_figures import key_figure_section
@@ -64,6 +65,7 @@ def render_report(
     figures: TrafficFigures | None = None,
     shapes: PlaceShapes | None = None,
     corridor: CorridorTraces | str | None = None,
+    conflicts: pl.DataFrame | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -90,6 +92,8 @@ def render_report(
         Of the map's places, if it is to be coloured by level of service.
     corridor
         Vehicles along a corridor, or words why there is no diagram of them.
+    conflicts
+        Who came close to whom, if that was measured.
 
     Returns
     -------
@@ -112,6 +116,7 @@ def render_report(
         corridor_section(corridor) if corridor is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
+        conflict_section(conflicts) if conflicts is not None else None,
         walking_section(given, actors, traces, end=end),
         emission_section(figures) if figures else None,
         expectation_table(summary.get("expectations") or ()),

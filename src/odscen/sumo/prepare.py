@@ -13,7 +13,7 @@ from odscen.sumo import layout
 from odscen.sumo.forecast import forecast
 from odscen.sumo.lane_places import lane_places
 from odscen.sumo.realize import realize
-from odscen.sumo.recorded import read_trajectories
+from odscen.sumo.recorded import read_conflicts, read_trajectories
 from odscen.sumo.runner import PreparedRun
 
 if TYPE_CHECKING:
@@ -147,6 +147,7 @@ def write_report(
         figures=figures,
         shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
         corridor=followed,
+        conflicts=read_conflicts(folder),
     )
     report = out or folder / layout.REPORT_FILE
     report.write_text(page, encoding="utf-8")
