@@ -1,5 +1,6 @@
 import json
 import math
+import re
 import subprocess
 from pathlib import Path
 
@@ -32,6 +33,24 @@ def test_a_sampled_scenario_has_nothing_to_remark(workspace, scenario):
     done = odscen("check", scenario, "--json", "--workspace", workspace)
     assert done.code == 0
     assert done.json["problems"] == []
+
+
+def test_a_report_is_written_anew_along_the_way_asked_for(workspace, finished, tmp_path):
+    run, out = Path(finished["files"]["summary"]).parent, tmp_path / "again.html"
+    places = json.loads((run / "figures.json").read_text())["movements"]
+    first, through, last = max(places, key=lambda row: row["vehicles"])["movement"].split(">")
+    options = ("--out", out, "--workspace", workspace)
+    done = odscen("report", run, "--from", first, "--to", last, *options)
+    assert done.code == 0, done.err
+    assert re.search(
+        rf"From {first} to {last}, \d+ m through 1 junction, .*{through}", out.read_text()
+    )
+    done = odscen("report", run, "--corridor", f"{first},{last}", *options)
+    assert done.code == 0, done.err
+    done = odscen("report", run, "--corridor", "r9999", *options)
+    assert (done.code, "r9999" in done.err) == (2, True)
+    done = odscen("report", "nowhere", "--workspace", workspace)
+    assert (done.code, "no run named 'nowhere'" in done.err) == (2, True)
 
 
 def test_a_run_gives_what_scripts_rely_on(finished):

@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -74,9 +75,36 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
     assert delay.a == pytest.approx(np.mean(seconds[:3]), abs=1e-3)
     assert delay.difference == pytest.approx(np.mean(seconds[3:]) - np.mean(seconds[:3]), abs=1e-3)
     assert any(row.key.place == "j10001" for row in result.places)
+
+
+def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
+    store, a, b = sides
+    result = compare_runs(read_runs(a, store), read_runs(b, store))
     page = comparison_page(result)
     assert "junction j10001: waiting time" in page
-    assert "95 % interval" in page
+    # Every figure that differs has a dot, and a bar as there are three runs a side.
+    run_rows = [row for row in result.rows if row.key.kind == "run"]
+    differing = sum(bool(row.difference.relative) for row in run_rows)
+    chart = page[page.index('id="differences"') : page.index('id="figures"')]
+    assert chart.count("<circle") == differing > 5
+    assert chart.count('class="interval"') == differing
+    assert chart.count('class="difference clear"') == sum(
+        row.says == "clear" and bool(row.difference.relative) for row in run_rows
+    )
+    waiting = next(
+        row for row in result.rows if row.key == Key("junction", "j10001", "waiting_time")
+    )
+    words = f"time {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
+    assert re.search(rf'class="d[01]"><title>j10001: [a-z ]*{re.escape(words)}', page)
+    diagram = page[page.index('id="diagram"') :]
+    assert all(f'class="dots side-{side}"' in diagram for side in "ab")
+
+
+def test_a_page_of_runs_that_are_the_same_says_so(sides):
+    store, a, _ = sides
+    page = comparison_page(compare_runs(read_runs(a, store), read_runs(a, store)))
+    assert "A and B are the same in every figure." in page
+    assert 'id="differences"' not in page
 
 
 def test_a_run_compared_with_itself_is_the_same(sides):

@@ -67,10 +67,10 @@ def road():
     )
 
 
-def report(summary=SUMMARY, plan=PLAN, events=EVENTS, trajectories=None, drawing=None):
+def report(summary=SUMMARY, plan=PLAN, events=EVENTS, trajectories=None, drawing=None, **traffic):
     outcomes = actor_outcomes(plan, events)
     rows = driven() if trajectories is None else trajectories
-    return render_report(summary, plan, outcomes, events, rows, drawing=drawing)
+    return render_report(summary, plan, outcomes, events, rows, drawing=drawing, **traffic)
 
 
 class Reader(HTMLParser):

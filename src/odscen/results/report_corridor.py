@@ -76,9 +76,11 @@ def corridor_section(traces: CorridorTraces | str) -> Markup:
     if isinstance(traces, str):
         return report_section(heading, element("p", traces), explained=explained, ident="corridor")
     first, last = traces.segments[0], traces.segments[-1]
+    count = len(traces.junctions)
     told = (
-        f"From {first} to {last}, {number(traces.length, 0)} m through {len(traces.junctions)} "
-        f"junctions, {stretch(traces.begin, traces.end)}: {traces.vehicles:,} vehicles."
+        f"From {first} to {last}, {number(traces.length, 0)} m through {count} "
+        f"junction{'' if count == 1 else 's'}, {stretch(traces.begin, traces.end)}: {traces.vehicles:,} "
+        f"vehicle{'' if traces.vehicles == 1 else 's'}."
     )
     through = ", ".join(name for name, _, _ in traces.junctions)
     note = element("p", told, element("small", f" Junctions: {through}.") if through else None)
