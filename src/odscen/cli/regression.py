@@ -91,17 +91,14 @@ def compare(
     ],
     run_b: Annotated[Path, typer.Argument(help="What to hold against it.")],
     html: HtmlOption = None,
-    workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
-    from odscen.catalog.store import Workspace
     from odscen.regression.compare import compare_runs, read_runs
     from odscen.regression.pages import comparison_page
     from odscen.workflow import write_text
 
-    store = Workspace.open(workspace)
-    result = compare_runs(read_runs(run_a, store), read_runs(run_b, store))
+    result = compare_runs(read_runs(run_a), read_runs(run_b))
     if html is not None:
         write_text(html, comparison_page(result))
     if as_json:

@@ -8,20 +8,17 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
-from odscen.regression.measure import measure, place_index
+from odscen.regression.measure import measure
 from odscen.results.comparison import CONFIDENCE, compare_figure
 from odscen.results.units import unit_of, with_unit
 from odscen.sumo.layout import SUMMARY_FILE
-from odscen.workflow import load_map
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from odscen.catalog.store import Workspace
     from odscen.regression.measure import Key, Measured
     from odscen.results.comparison import Difference
-    from odscen.results.places import PlaceIndex
 
 FORMAT = "odscen-comparison"
 VERSION = 1
@@ -118,10 +115,10 @@ def _row(row: Row) -> dict[str, Any]:
     return {**key, "unit": unit_of(row.key.figure), **found}
 
 
-def read_runs(folder: Path, workspace: Workspace) -> RunSet:
+def read_runs(folder: Path) -> RunSet:
     """Read a run, or all runs in a folder, of one scenario with different seeds.
 
-    Figures of segments and junctions are there only where the workspace has the map.
+    Figures of segments and junctions are there only where every run has measured lanes.
 
     Raises
     ------
@@ -138,16 +135,12 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     runs: dict[int, Measured] = {}
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
-    indexes: dict[str, PlaceIndex | None] = {}
     for path in folders:
         summary = _summary(path)
-        sha256 = summary.get("map_sha256", "")
-        if sha256 not in indexes:
-            indexes[sha256] = _index(workspace, summary)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))
-        runs[summary["seed"]] = measure(path, summary, indexes[sha256])
+        runs[summary["seed"]] = measure(path, summary)
         scenarios[str(summary.get("scenario"))] = None
         told = summary.get("versions") or {}
         versions[", ".join(f"{key} {told[key]}" for key in ("odscen", "sumo") if key in told)] = (
@@ -156,7 +149,7 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     if len(scenarios) > 1:
         msg = f"runs of different scenarios: {', '.join(scenarios)}; name a folder with one"
         raise InputError(msg, file=str(folder))
-    places = all(index is not None for index in indexes.values())
+    places = all(any(key.kind == "segment" for key in figures) for figures in runs.values())
     return RunSet(str(folder), next(iter(scenarios)), tuple(versions), runs, places)
 
 
@@ -172,14 +165,6 @@ def _summary(folder: Path) -> dict[str, Any]:
         msg = f"the run has not completed, it is {status!r}"
         raise InputError(msg, file=str(file))
     return dict(summary)
-
-
-def _index(workspace: Workspace, summary: Mapping[str, Any]) -> PlaceIndex | None:
-    try:
-        entry = workspace.map_for(str(summary.get("map")), str(summary.get("map_sha256")))
-    except InputError:
-        return None
-    return place_index(load_map(entry).sumo)
 
 
 def compare_runs(a: RunSet, b: RunSet) -> RunComparison:
@@ -229,5 +214,5 @@ def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
     elif len(a.runs) == 1:
         notes.append("one run each: intervals need at least two seeds a side")
     if not (a.places and b.places):
-        notes.append("the workspace does not have the map, so places are left out")
+        notes.append("a run has not measured traffic on lanes, so places are left out")
     return tuple(notes)
