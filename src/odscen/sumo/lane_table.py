@@ -80,7 +80,7 @@ def lane_table(
     here = pl.DataFrame(
         {"lane": list((present or {}).keys()), "present": list((present or {}).values())},
         schema={"lane": pl.String, "present": pl.Int64},
-    ).with_columns(begin=rows["begin"].min())
+    ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
     # Where nearly nobody moved there is no travel time, and SUMO's density has an upper bound; all
     # stood for the whole interval then, a whole number of vehicles.
