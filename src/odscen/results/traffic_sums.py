@@ -51,7 +51,7 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     import polars as pl
 
     found = lanes.group_by(INTERVAL).agg(_sum("departed", "arrived", *TRAFFIC, *LOST))
-    length = float(places.lanes.unique("lane")["length"].sum())
+    length = float(places.lanes.filter("motor").unique("lane")["length"].sum())
     under_way = (pl.col("departed") - pl.col("arrived")).cum_sum().shift(1, fill_value=0)
     return _on_clock(clock, found, INTERVAL).with_columns(
         (under_way + pl.col("departed")).alias("vehicles"), pl.lit(length / 1000.0).alias("length")
