@@ -17,6 +17,7 @@ from odscen.results.records import (
     events_to_json,
 )
 from odscen.results.summary import (
+    Trip,
     actor_counts,
     actor_outcomes,
     actors_from_json,
@@ -48,11 +49,15 @@ EVENTS = (
     Event(6.0, EventKind.TELEPORT_START, "b"),
     Event(16.0, EventKind.ARRIVED, "a", travel_time=16.0),
 )
+TRIPS = {"a": Trip(4.5, 1.5, 2), "b": Trip(3.0, 2.0, 1)}
 
 
 def test_each_actor_gets_its_own_fate() -> None:
-    a, b, c = actor_outcomes(plan(planned("a"), planned("b", depart=1.0), planned("c")), EVENTS)
-    assert (a.status, a.travel_time, a.delay, a.mean_speed) == ("arrived", 16.0, 6.0, 6.25)
+    actors = plan(planned("a"), planned("b", depart=1.0), planned("c"))
+    a, b, c = actor_outcomes(actors, EVENTS, TRIPS)
+    assert (a.status, a.travel_time, a.delay, a.mean_speed) == ("arrived", 16.0, 4.5, 6.25)
+    assert (a.time_loss, a.waiting_time, a.stops) == (4.5, 1.5, 2)
+    assert (b.delay, b.time_loss, b.waiting_time, b.stops) == (None, 3.0, 2.0, 1)
     assert (a.insertion_error, a.collisions, a.teleports) == (0.03, 1, 0)
     assert (b.status, b.depart_delay, b.arrived, b.travel_time) == ("running", 0.5, None, None)
     assert (b.teleports, b.collisions, b.emergency_stops) == (2, 1, 1)
@@ -76,12 +81,17 @@ def test_figures_keep_vehicles_and_pedestrians_apart() -> None:
         Event(10.0 + i, EventKind.ARRIVED, actor.id, travel_time=10.0 + i)
         for i, actor in enumerate(actors)
     )
-    figures = key_figures(actor_outcomes(plan(*actors), arrivals))
+    trips = {actor.id: Trip(i, 2.0 * i, i) for i, actor in enumerate(actors[:5])}
+    trips["p"] = Trip(0.5, 7.0, None)
+    figures = key_figures(actor_outcomes(plan(*actors), arrivals, trips))
     assert figures["mean_travel_time"] == 12.0
     assert figures["median_travel_time"] == 12.0
     assert figures["p95_travel_time"] == pytest.approx(np.percentile([10, 11, 12, 13, 14], 95))
     assert figures["mean_speed"] == pytest.approx(500 / 60, abs=1e-6)
-    assert figures["mean_delay"] == 2.0
+    assert (figures["mean_delay"], figures["mean_waiting_time"]) == (2.0, 4.0)
+    assert figures["mean_stops"] == 2.0
+    assert figures["pedestrian_mean_delay"] == 0.5
+    assert figures["pedestrian_mean_waiting_time"] == 7.0
     assert figures["pedestrian_mean_travel_time"] == 15.0
     assert figures["pedestrian_mean_speed"] == pytest.approx(13 / 15, abs=1e-6)
 
@@ -96,7 +106,7 @@ def test_plan_events_and_actors_come_back_from_their_files() -> None:
     whole = plan(planned("a", ego=True, model="vehicle.x", speed=8.0), planned("b", flow="f"))
     assert Plan.from_json(whole.to_json()) == whole
     assert events_from_json(events_to_json(EVENTS)) == EVENTS
-    outcomes = actor_outcomes(whole, EVENTS)
+    outcomes = actor_outcomes(whole, EVENTS, TRIPS)
     assert actors_from_json(actors_to_json(outcomes)) == outcomes
 
 

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 import statistics
+import subprocess
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from odscen.categories import DEFAULT_BODY, Category
 from odscen.sumo.driving import KINDS, STYLES, Driver, draw_factor, driver, number
 from odscen.sumo.weather import BRAKING, NO_EFFECT, REACTION, stopping_speed, weather_effect
+from tests.sumo.conftest import BIN
 
 
 def made(category: Category = Category.CAR, **changes: Any) -> Driver:
@@ -26,7 +29,29 @@ def test_a_normal_car_in_good_weather_is_sumos_own() -> None:
         "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
         "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
         "emergencyDecel": "9", "tau": "1", "sigma": "0.5", "minGap": "2.5",
+        "emissionClass": "HBEFA4/PC_petrol_Euro-4",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("category", Category)
+@pytest.mark.parametrize("electric", [False, True])
+def test_sumo_knows_every_emission_class_and_only_engines_burn_fuel(
+    category: Category, electric: bool, tmp_path: Path
+) -> None:
+    """Away from a stop for 8 s, by SUMO's own tool."""
+    name = dict(made(category, electric=electric).attributes)["emissionClass"]
+    cycle = tmp_path / "cycle.csv"
+    cycle.write_text("".join(f"{second};{1.5 * second}\n" for second in range(9)))
+    command = [
+        BIN / "emissionsDrivingCycle", "--timeline-file", cycle, "--compute-a",
+        "--emission-class", name, "--output", tmp_path / "out.csv",
+    ]  # fmt: skip
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    lines = (line.partition(":") for line in done.stdout.splitlines())
+    emitted = {key: float(value) for key, _, value in lines if value}
+    engine = category not in (Category.BICYCLE, Category.PEDESTRIAN)
+    assert (emitted["fuel"] > 0.0) == (emitted["CO2"] > 0.0) == (engine and not electric)
+    assert (emitted["electricity"] > 0.0) == (engine and electric)
 
 
 @pytest.mark.parametrize(

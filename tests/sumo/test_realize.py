@@ -18,6 +18,9 @@ class ToyAssets:
     def dimensions(self, model: str) -> Body | None:
         return {"big": Body(8.0, 2.5, 3.0)}.get(model)
 
+    def electric(self, model: str) -> bool:
+        return model == "quiet"
+
     def weather(self, preset: str) -> dict[str, float] | None:
         return {"Storm": {"precipitation": 100.0, "wetness": 100.0}}.get(preset)
 
@@ -99,6 +102,19 @@ def test_a_models_size_counts_where_the_catalogue_knows_it() -> None:
     )
     plan = realize(scenario(actors=actors), sumo_map(), ToyAssets()).plan
     assert [actor.length for actor in plan.actors] == [8.0, 7.1]
+
+
+def test_a_model_without_exhaust_emits_as_one() -> None:
+    actors = (
+        Actor(id="a", category=Category.CAR, model="quiet", spawn="1.0.-2.10"),
+        Actor(id="b", category=Category.CAR, model="gone", spawn="1.0.-2.30"),
+    )
+    realized = realize(scenario(actors=actors), sumo_map(), ToyAssets())
+    kinds = routes(realized).iterfind("vType")
+    assert [kind.attrib["emissionClass"] for kind in kinds] == [
+        "HBEFA4/PC_BEV",
+        "HBEFA4/PC_petrol_Euro-4",
+    ]
 
 
 def test_equal_types_are_written_once() -> None:

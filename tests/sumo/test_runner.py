@@ -217,5 +217,7 @@ def test_outcomes_in_actors_json_have_the_figures_of_the_plan(
     first = actors[0]
     assert (first.id, first.ego, first.status, first.depart_delay) == ("car0", True, "arrived", 0.0)
     assert first.travel_time is not None
-    assert first.delay == pytest.approx(first.travel_time - 20.0)
+    assert first.delay is not None
+    assert 0.0 < first.delay < first.travel_time
+    assert first.waiting_time == first.stops == 0
     assert first.mean_speed == pytest.approx(290.0 / first.travel_time, abs=1e-5)

@@ -102,6 +102,11 @@ class Assets:
         found = self.blueprints.get(model)
         return found.body if found else None
 
+    def electric(self, model: str) -> bool:
+        """Whether a model is electric; false if there is no such model."""
+        found = self.blueprints.get(model)
+        return found is not None and found.special_type == "electric"
+
     def weather(self, preset: str) -> Mapping[str, float] | None:
         """Parameters of a preset as they act on driving, ``None`` if there is no such preset.
 

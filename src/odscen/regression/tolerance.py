@@ -72,7 +72,7 @@ _USUAL: dict[tuple[str, str], Tolerance] = {
     ("run", "depart_delay_max"): Tolerance(0.05, 1.0),
     ("segment", "vehicles"): Tolerance(0.05, 1.0),
     ("segment", "mean_speed"): Tolerance(0.1, 1.0),
-    ("segment", "v85"): Tolerance(0.05, 0.5),
+    ("segment", "free_speed"): Tolerance(0.05, 0.5),
     ("junction", "vehicles"): Tolerance(0.05, 1.0),
     ("junction", "waiting_time"): Tolerance(0.1, 1.5),
     ("actor", "travel_time"): Tolerance(0.1, 5.0),

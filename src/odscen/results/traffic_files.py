@@ -37,16 +37,10 @@ _COUNTS = ("vehicles", "departed", "arrived", "throughput")
 
 
 def write_tables(figures: TrafficFigures, folder: Path) -> None:
-    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and ``movements.csv``.
-
-    Rows of places at which nobody was in an interval are left out.
-    """
+    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and ``movements.csv``."""
     folder.mkdir(exist_ok=True)
     for name in TABLES:
         table: pl.DataFrame = getattr(figures, name)
-        if name != "network":
-            busy = (table["seconds"] > 0) | (table["time_loss"] > 0) | (table["vehicles"] > 0)
-            table = table.filter(busy)
         _short(table).write_csv(folder / f"{name}.csv")
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What SUMO needs to know of a category; m/s and m/s^2."""
+    """What SUMO needs to know of a category; m/s and m/s^2; emission class of SUMO's models."""
 
     vclass: str
     max_speed: float
@@ -28,19 +28,36 @@ class Kind:
     decel: float
     emergency_decel: float
     shape: str
+    emissions: str
 
 
 KINDS: dict[Category, Kind] = {
     # https://sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html, SUMO 1.28
-    Category.CAR: Kind("passenger", 55.56, 2.6, 4.5, 9.0, "passenger"),
-    Category.VAN: Kind("delivery", 55.56, 2.6, 4.5, 9.0, "delivery"),
-    Category.TRUCK: Kind("truck", 36.11, 1.3, 4.0, 7.0, "truck"),
-    Category.BUS: Kind("bus", 27.78, 1.2, 4.0, 7.0, "bus"),
-    Category.MOTORCYCLE: Kind("motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle"),
-    Category.BICYCLE: Kind("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle"),
-    Category.PEDESTRIAN: Kind("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian"),
+    Category.CAR: Kind("passenger", 55.56, 2.6, 4.5, 9.0, "passenger", "HBEFA4/PC_petrol_Euro-4"),
+    Category.VAN: Kind(
+        "delivery", 55.56, 2.6, 4.5, 9.0, "delivery", "HBEFA4/LCV_diesel_N1-III_Euro-6ab"
+    ),
+    Category.TRUCK: Kind("truck", 36.11, 1.3, 4.0, 7.0, "truck", "HBEFA4/RT_le7.5t_Euro-VI_A-C"),
+    Category.BUS: Kind("bus", 27.78, 1.2, 4.0, 7.0, "bus", "HBEFA4/UBus_Std_gt15-18t_Euro-VI_A-C"),
+    Category.MOTORCYCLE: Kind(
+        "motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle", "HBEFA4/MC_4S_gt250cc_Euro-3"
+    ),
+    Category.BICYCLE: Kind("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle", "Zero"),
+    Category.PEDESTRIAN: Kind("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian", "Zero"),
 }
-"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h."""
+"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h.
+
+Emissions: https://sumo.dlr.de/docs/Models/Emissions/HBEFA4-based.html; the classes that SUMO 1.28
+itself takes, but for motorcycles, of which it takes those from before 1999.
+"""
+ELECTRIC: dict[Category, str] = {
+    Category.CAR: "HBEFA4/PC_BEV",
+    Category.VAN: "HBEFA4/LCV_BEV_N1-IIII",
+    Category.TRUCK: "HBEFA4/RigidTruck_BEV_le7.5t",
+    Category.BUS: "HBEFA4/Coach_BEV_Std_le18t",
+    Category.MOTORCYCLE: "HBEFA4/MC_BEV",
+}
+"""Emission classes of models that are electric."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +126,7 @@ def driver(
     limit: float | None,
     weather: WeatherEffect,
     ignores_red: bool = False,
+    electric: bool = False,
 ) -> Driver:
     """Attributes of somebody who drives, or walks, like this.
 
@@ -124,6 +142,8 @@ def driver(
         Speed limit at the spawn, m/s; ``None`` if unknown.
     ignores_red
         Of a pedestrian: crosses at red as at green (R45).
+    electric
+        Whether the model has no exhaust.
     """
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
@@ -151,6 +171,7 @@ def driver(
         ("tau", number(manner.headway * weather.headway)),
         ("sigma", number(manner.sigma)),
         ("minGap", number(min_gap)),
+        ("emissionClass", ELECTRIC.get(category, kind.emissions) if electric else kind.emissions),
     )
     return Driver(attributes, max_speed, round(factor, 4), accel)
 
@@ -164,6 +185,7 @@ def _walker(body: Body, *, speed: float, ignores_red: bool) -> Driver:
         ("desiredMaxSpeed", number(speed)),
         ("speedFactor", "1"),
         ("speedDev", "0"),
+        ("emissionClass", KINDS[Category.PEDESTRIAN].emissions),
     )
     if ignores_red:
         attributes += (("jmDriveAfterRedTime", number(ALWAYS, digits=0)),)

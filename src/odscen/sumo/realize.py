@@ -61,6 +61,9 @@ class Assets(Protocol):
     def dimensions(self, model: str) -> Body | None:
         """Size of a model, ``None`` if there is no such model."""
 
+    def electric(self, model: str) -> bool:
+        """Whether a model has no exhaust; false if there is no such model."""
+
     def weather(self, preset: str) -> Mapping[str, float] | None:
         """Parameters of a weather preset, ``None`` if there is no such preset."""
 
@@ -276,6 +279,9 @@ class _Writer:
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
             ignores_red=user.ignores_red,
+            electric=user.model is not None
+            and self._assets is not None
+            and self._assets.electric(user.model),
         )
 
     def _body(self, user: RoadUser) -> Body:
