@@ -78,7 +78,8 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
 
 
 def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
-    store, a, b = sides
+    a, b = sides
+    store = Workspace.open(a.parent / "workspace")
     result = compare_runs(read_runs(a, store), read_runs(b, store))
     page = comparison_page(result)
     assert "junction j10001: waiting time" in page
@@ -101,8 +102,8 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
 
 
 def test_a_page_of_runs_that_are_the_same_says_so(sides):
-    store, a, _ = sides
-    page = comparison_page(compare_runs(read_runs(a, store), read_runs(a, store)))
+    a, _ = sides
+    page = comparison_page(compare_runs(read_runs(a), read_runs(a)))
     assert "A and B are the same in every figure." in page
     assert 'id="differences"' not in page
 
