@@ -22,7 +22,8 @@ from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.scenario.document import Flow
 from odscen.scenario.files import dumps
-from odscen.sumo.recorded import trajectory_files
+from odscen.sumo.layout import RECORDED
+from odscen.sumo.recorded import recorded_files
 
 KILLS = 20
 SLICE = 600.0
@@ -104,7 +105,8 @@ def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:
 
 
 def recorded(run: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in trajectory_files(run)}
+    files = [file for name in RECORDED for file in recorded_files(run, name)]
+    return {str(file.relative_to(run)): file.read_bytes() for file in files}
 
 
 def results(run: Path) -> dict[str, bytes]:

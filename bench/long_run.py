@@ -16,6 +16,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+from bench.recording import without_outputs
 from odscen.results.records import Plan
 from odscen.sumo import layout
 
@@ -41,9 +42,8 @@ def main() -> None:
         binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
         bare = [str(binary), "-c", str(config), "--end", f"{until:g}"]
         ours = [sys.executable, "-m", "odscen.sumo.worker", str(run / layout.PLAN_FILE)]
-        lines = config.read_text(encoding="utf-8").splitlines(keepends=True)
         quiet = config.with_name("quiet.sumocfg")
-        quiet.write_text("".join(line for line in lines if "fcd" not in line), encoding="utf-8")
+        quiet.write_text(without_outputs(config.read_text(encoding="utf-8")), encoding="utf-8")
         silent = [str(binary), "-c", str(quiet), "--end", f"{until:g}"]
         seconds = {"sumo": cpu(bare), "odscen": cpu(ours)}
         shown = json.loads((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))["actors"]
@@ -51,7 +51,7 @@ def main() -> None:
     inserted = sum(actor["status"] != "waiting" for actor in shown)
     print(
         f"{hours:g} h, {inserted:,} on the road: odscen {seconds['odscen']:.1f} s, sumo with the "
-        f"same Parquet {seconds['sumo']:.1f} s, ratio {seconds['odscen'] / seconds['sumo']:.2f} "
+        f"same output {seconds['sumo']:.1f} s, ratio {seconds['odscen'] / seconds['sumo']:.2f} "
         f"(aim 1.15); sumo without output {seconds['silent']:.1f} s, ratio "
         f"{seconds['odscen'] / seconds['silent']:.2f}"
     )

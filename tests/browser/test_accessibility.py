@@ -6,12 +6,17 @@ A picture of each view is kept under build/browser/views.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
+from odscen import workflow
+from odscen.catalog.store import Workspace
+from odscen.regression.compare import compare_runs, read_runs
+from odscen.regression.comparison_page import comparison_page
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle
 from tools import page as tool
@@ -166,6 +171,43 @@ def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -
     expect(user.result).to_contain_text("finished")
     expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
     inspector.look("run-finished")
+
+
+@pytest.fixture(scope="module")
+def written(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Report of a run, and the comparison of it with another, both by two seeds."""
+    root = tmp_path_factory.mktemp("written")
+    workspace = Workspace.open(one_map)
+    sides = {}
+    for side, fill in (("a", 0.25), ("b", 0.4)):
+        made = workflow.generate(
+            workspace, map_name=CROSSING, seed=5, fill=fill, out=root / "made" / side
+        )
+        for seed in (1, 2):
+            workflow.run(workspace, made, out=root / side / str(seed), seed=seed)
+            run = next((root / side / str(seed)).iterdir())
+            run.rename(root / side / f"seed-{seed}")
+        sides[side] = read_runs(root / side, workspace)
+    comparison = root / "comparison.html"
+    comparison.write_text(comparison_page(compare_runs(sides["a"], sides["b"])), encoding="utf-8")
+    return {"report": root / "a/seed-1/report.html", "comparison": comparison}
+
+
+@pytest.mark.parametrize("view", ["report", "comparison"])
+def test_the_pages_that_are_files(
+    visit: Callable[..., Any], written: dict[str, Path], view: str
+) -> None:
+    user, inspector = visit("about:blank")
+    user.page.goto(written[view].as_uri())
+    wanted = {
+        "report": ("Level of service", "How much the network carries", "Emissions and fuel"),
+        "comparison": ("In short", "Where it changed most", "How much flows"),
+    }
+    for heading in wanted[view]:
+        expect(user.page.get_by_role("heading", name=heading)).to_be_visible()
+    if view == "report":
+        user.page.get_by_label("The busiest time").check()
+    inspector.look(view)
 
 
 def test_a_failed_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:

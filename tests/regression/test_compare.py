@@ -56,12 +56,12 @@ def sides(tmp_path_factory):
         for seed in (1, 2, 3):
             workflow.run(store, [path], out=root / side / str(seed), seed=seed)
             (root / side / str(seed) / "signal_crossing").rename(root / side / f"seed-{seed}")
-    return store, root / "a", root / "b"
+    return root / "a", root / "b"
 
 
 def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
-    store, a, b = sides
-    result = compare_runs(read_runs(a, store), read_runs(b, store))
+    a, b = sides
+    result = compare_runs(read_runs(a), read_runs(b))
     rows = {row.key: row.difference for row in result.rows}
     delay = rows[Key("run", "", "mean_delay")]
     assert delay.paired
@@ -78,7 +78,8 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
 
 
 def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
-    store, a, b = sides
+    a, b = sides
+    store = Workspace.open(a.parent / "workspace")
     result = compare_runs(read_runs(a, store), read_runs(b, store))
     page = comparison_page(result)
     assert "junction j10001: waiting time" in page
@@ -101,21 +102,21 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
 
 
 def test_a_page_of_runs_that_are_the_same_says_so(sides):
-    store, a, _ = sides
-    page = comparison_page(compare_runs(read_runs(a, store), read_runs(a, store)))
+    a, _ = sides
+    page = comparison_page(compare_runs(read_runs(a), read_runs(a)))
     assert "A and B are the same in every figure." in page
     assert 'id="differences"' not in page
 
 
 def test_a_run_compared_with_itself_is_the_same(sides):
-    store, a, _ = sides
-    result = compare_runs(read_runs(a, store), read_runs(a, store))
+    a, _ = sides
+    result = compare_runs(read_runs(a), read_runs(a))
     assert {row.says for row in result.rows} == {"the same"}
 
 
 def test_the_command_prints_json_and_writes_a_page(sides, tmp_path):
-    store, a, b = sides
-    out = ("--json", "--html", tmp_path / "c.html", "--workspace", store.root)
+    a, b = sides
+    out = ("--json", "--html", tmp_path / "c.html")
     done = odscen("compare", a / "seed-1", b / "seed-2", *out)
     assert done.code == 0, done.err
     delay = next(row for row in done.json["figures"] if row["figure"] == "mean_delay")
@@ -125,7 +126,6 @@ def test_the_command_prints_json_and_writes_a_page(sides, tmp_path):
     assert (tmp_path / "c.html").read_text().startswith("<!DOCTYPE html>")
 
 
-def test_a_folder_without_runs_is_refused_by_name(sides, tmp_path):
-    store, *_ = sides
+def test_a_folder_without_runs_is_refused_by_name(tmp_path):
     with pytest.raises(InputError, match=r"no run here: there is no summary\.json"):
-        read_runs(tmp_path, store)
+        read_runs(tmp_path)

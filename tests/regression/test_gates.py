@@ -61,9 +61,9 @@ def test_a_lower_speed_limit_fails_naming_the_segment(store, suite):
     assert failed.status == "failed"
     assert failed.changed_inputs == ("the map",)
     changes = {change.key[1:]: change.difference for change in failed.verdict.places}
-    assert changes["r2", "v85"].relative < -0.3
+    assert changes["r2", "free_speed"].relative < -0.3
     told = next(line for line in lines(failed) if line.startswith("most changed"))
-    assert "segment r2: v85 is" in told
+    assert "segment r2: free_speed is" in told
 
 
 def test_a_changed_figure_without_a_changed_input_is_a_changed_behaviour(store, suite):
@@ -85,7 +85,7 @@ def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     figures = json.loads((suite.parent / "baselines" / "signal_crossing.json").read_text())["rows"]
     names = [row["figure"] for row in figures if "figure" in row]
     rows = [f'{name} = "1000 %"' for name in names]
-    rows += [f'segment.{name} = "1000 %"' for name in ("vehicles", "mean_speed", "v85")]
+    rows += [f'segment.{name} = "1000 %"' for name in ("vehicles", "mean_speed", "free_speed")]
     rows += [f'junction.{name} = "1000 %"' for name in ("vehicles", "waiting_time")]
     suite.write_text(suite.read_text() + "\n[tolerance]\n" + "\n".join(rows))
     result = run(store, suite)
@@ -160,7 +160,7 @@ def test_maps_of_the_same_name_in_the_workspace_are_left_alone(store, suite):
         ("maps/*.xodr", "maps/x.xodr", "maps: there is no file 'maps/x.xodr'"),
         ("name =", "tolerance.mean_delay = '5 apples'\nname =", "tolerance.mean_delay: "),
         ("name =", "tolerance.mean_delai = '5 %'\nname =", "tolerance.mean_delai: no figure"),
-        ("name =", "tolerance.segment.v86 = '5 %'\nname =", "tolerance.segment.v86: no figure"),
+        ("name =", "tolerance.segment.fast = '5 %'\nname =", "tolerance.segment.fast: no figure"),
         ("name =", "name", "the suite cannot be read"),
     ],
 )

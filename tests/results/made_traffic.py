@@ -8,9 +8,9 @@ from odscen.results.traffic import traffic_figures
 INTERVAL = 900.0
 PLACES = LanePlaces.of(
     lanes=[
-        ("a_0", 100.0, "r1", 1.0, True),
-        (":j_0_0", 10.0, "j10", 1.0, True),
-        ("b_0", 200.0, "r2", 1.0, True),
+        ("a_0", 100.0, True, "r1", 1.0, True),
+        (":j_0_0", 10.0, True, "j10", 1.0, True),
+        ("b_0", 200.0, True, "r2", 1.0, True),
     ],
     ways=[
         ("a_0", "j10", "a", None, None, None),

@@ -45,10 +45,34 @@ def test_the_busiest_way_goes_through_several_junctions_that_follow_each_other(r
     assert len(inside) >= 2
     assert len(set(corridor.segments)) == len(corridor.segments)
     assert np.all(np.diff(corridor.starts) > 0)
-    # It holds more passages than the busiest turn alone.
-    driven = {">".join(corridor.segments[k - 1 : k + 2]) for k in range(1, len(corridor.segments))}
-    counts = dict(turns.select("movement", "vehicles").iter_rows())
-    assert sum(counts.get(turn, 0) for turn in driven) > turns["vehicles"].max()
+    # It leads straight on: its ends are about as far apart as it is long.
+    nodes = graph.lanes
+    ends = corridor.nodes[[corridor.along.argmin(), corridor.along.argmax()]]
+    apart = np.hypot(*np.diff([nodes.x[ends], nodes.y[ends]], axis=1).ravel())
+    assert apart > 0.8 * corridor.length
+
+
+def test_a_corridor_is_where_most_drive_and_does_not_turn_off_with_the_crowd(run: Path) -> None:
+    graph = built(NAME).sumo.graph
+    corridor = busiest_corridor(movements(run), graph)
+    assert corridor is not None
+    along = corridor.segments
+    counts = {
+        ">".join(along[k - 1 : k + 2]): 100 for k, name in enumerate(along) if name.startswith("j")
+    }
+    inside = next(k for k, name in enumerate(along) if name.startswith("j"))
+    onto, junction = along[inside - 1], along[inside]
+    turning_off = [
+        name
+        for name in movements(run)["movement"]
+        if name.startswith(f"{onto}>{junction}>") and name not in counts
+    ]
+    assert turning_off
+    counts |= dict.fromkeys(turning_off, 900)
+    table = pl.DataFrame({"movement": list(counts), "vehicles": list(counts.values())})
+    chosen = busiest_corridor(table, graph)
+    assert chosen is not None
+    assert chosen.segments == along
 
 
 def test_vehicles_advance_along_a_corridor_as_fast_as_they_drive(run: Path) -> None:

@@ -100,7 +100,8 @@ def compare(
     from odscen.regression.comparison_page import comparison_page
     from odscen.workflow import write_text
 
-    store = Workspace.open(workspace)
+    # The page draws the map, if the workspace has it.
+    store = None if html is None else Workspace.open(workspace)
     result = compare_runs(read_runs(run_a, store), read_runs(run_b, store))
     if html is not None:
         write_text(html, comparison_page(result))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
-from odscen.regression.measure import measure, place_index
+from odscen.regression.measure import measure
 from odscen.results.comparison import CONFIDENCE, compare_figure
 from odscen.results.place_shapes import place_shapes
 from odscen.results.traffic_files import read_tables
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from odscen.regression.measure import Key, Measured
     from odscen.results.comparison import Difference
     from odscen.results.place_shapes import PlaceShapes
-    from odscen.results.places import PlaceIndex
-    from odscen.workflow import LoadedMap
 
 FORMAT = "odscen-comparison"
 VERSION = 1
@@ -43,7 +42,7 @@ class RunSet:
     """Runs of one side by seed; ``versions`` and ``scenario`` as in their summaries.
 
     ``networks`` are their tables of the whole network over time, where they have them; ``shapes``
-    those of the map, if the workspace has it and all runs are on one.
+    those of the map, if a workspace that has it was given.
     """
 
     name: str
@@ -135,10 +134,15 @@ def _row(row: Row) -> dict[str, Any]:
     return {**key, "unit": unit_of(row.key.figure), **found}
 
 
-def read_runs(folder: Path, workspace: Workspace) -> RunSet:
+def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     """Read a run, or all runs in a folder, of one scenario with different seeds.
 
-    Figures of segments and junctions are there only where the workspace has the map.
+    Figures of segments and junctions are there only where every run has measured lanes.
+
+    Parameters
+    ----------
+    workspace
+        To draw its map, if it has it.
 
     Raises
     ------
@@ -155,22 +159,17 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     runs: dict[int, Measured] = {}
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
-    indexes: dict[str, PlaceIndex | None] = {}
     networks: list[pl.DataFrame] = []
-    shapes = None
+    maps: set[tuple[str, str]] = set()
     for path in folders:
         summary = _summary(path)
-        sha256 = summary.get("map_sha256", "")
-        if sha256 not in indexes:
-            loaded = _loaded(workspace, summary)
-            indexes[sha256] = None if loaded is None else place_index(loaded.sumo)
-            shapes = None if loaded is None else place_shapes(loaded.sumo.graph)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))
-        runs[summary["seed"]] = measure(path, summary, indexes[sha256])
+        runs[summary["seed"]] = measure(path, summary)
         if (figures := read_tables(path / FIGURES_FOLDER)) is not None:
             networks.append(figures.network)
+        maps.add((str(summary.get("map")), str(summary.get("map_sha256"))))
         scenarios[str(summary.get("scenario"))] = None
         told = summary.get("versions") or {}
         versions[", ".join(f"{key} {told[key]}" for key in ("odscen", "sumo") if key in told)] = (
@@ -179,7 +178,7 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
     if len(scenarios) > 1:
         msg = f"runs of different scenarios: {', '.join(scenarios)}; name a folder with one"
         raise InputError(msg, file=str(folder))
-    places = all(index is not None for index in indexes.values())
+    places = all(any(key.kind == "segment" for key in figures) for figures in runs.values())
     return RunSet(
         str(folder),
         next(iter(scenarios)),
@@ -187,7 +186,7 @@ def read_runs(folder: Path, workspace: Workspace) -> RunSet:
         runs,
         places,
         tuple(networks),
-        shapes if len(indexes) == 1 else None,
+        None if workspace is None else _shapes(workspace, maps),
     )
 
 
@@ -200,12 +199,12 @@ def _summary(folder: Path) -> dict[str, Any]:
     return summary
 
 
-def _loaded(workspace: Workspace, summary: Mapping[str, Any]) -> LoadedMap | None:
-    try:
-        entry = workspace.map_for(str(summary.get("map")), str(summary.get("map_sha256")))
-    except InputError:
-        return None
-    return load_map(entry)
+def _shapes(workspace: Workspace, maps: set[tuple[str, str]]) -> PlaceShapes | None:
+    """Shapes of the one map that all runs are on, if the workspace has it."""
+    with suppress(InputError):
+        if len(maps) == 1:
+            return place_shapes(load_map(workspace.map_for(*next(iter(maps)))).sumo.graph)
+    return None
 
 
 def compare_runs(a: RunSet, b: RunSet) -> RunComparison:
@@ -255,5 +254,5 @@ def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
     elif len(a.runs) == 1:
         notes.append("one run each: intervals need at least two seeds a side")
     if not (a.places and b.places):
-        notes.append("the workspace does not have the map, so places are left out")
+        notes.append("a run has not measured traffic on lanes, so places are left out")
     return tuple(notes)

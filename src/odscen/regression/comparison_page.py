@@ -102,7 +102,7 @@ def _chart_section(figures: Sequence[Row]) -> Markup | None:
     explained = (
         "each dot is the difference of one figure, as a share of its value in A; right of the line "
         "in the middle it is larger in B. The bar is the range in which the true difference lies, "
-        "19 times in 20: if it does not touch the line, the difference is clear and drawn dark. "
+        "19 times in 20: if it does not touch the line, the difference is clear and stands out. "
         "Bars that are cut at the edge go on. Figures that are alike are left out."
     )
     return report_section(

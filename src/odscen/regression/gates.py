@@ -7,7 +7,6 @@ import shutil
 import tempfile
 import threading
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,7 +20,7 @@ from odscen.regression.baseline import (
     read_baseline,
     write_baseline,
 )
-from odscen.regression.measure import measure, place_index
+from odscen.regression.measure import measure
 from odscen.regression.verdict import hold_against
 from odscen.results.expectations import evaluate, needs_criticality
 from odscen.scenario.problems import refuse_errors
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
     from odscen.regression.verdict import Verdict
-    from odscen.results.places import PlaceIndex
     from odscen.scenario.document import Scenario
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunResult
@@ -118,11 +116,6 @@ class _Loaded:
     made_of: Fingerprint
     baseline: Baseline | None
     runs: dict[int, SeedResult] = field(default_factory=dict)
-
-
-@lru_cache(maxsize=4)
-def _index(entry: MapEntry) -> PlaceIndex:
-    return place_index(load_map(entry).sumo)
 
 
 def run_suite(
@@ -274,7 +267,7 @@ def _seed_result(loaded: _Loaded, seed: int, result: RunResult) -> SeedResult:
     if result.status == "failed":
         error = f"seed {seed}: the run failed: {summary['error']}"
         missed = []
-    figures = measure(result.folder, summary, _index(loaded.entry))
+    figures = measure(result.folder, summary)
     return SeedResult(seed, summary["wall_seconds"], error, tuple(missed), figures)
 
 

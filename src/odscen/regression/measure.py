@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-import numpy as np
-
 from odscen.errors import InputError, in_file
 from odscen.results.expectations import COUNTS
-from odscen.results.places import PlaceIndex, figures_by_place
 from odscen.results.summary import actors_from_json
+from odscen.results.traffic import over_run
 from odscen.sumo import layout
+from odscen.sumo.measured import read_figures
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
     from typing import Any
 
-    from odscen.sumo.sumo_map import SumoMap
+    from odscen.results.traffic import TrafficFigures
 
 Kind = Literal["run", "segment", "junction", "actor"]
 
@@ -34,7 +33,7 @@ class Key(NamedTuple):
 
     @property
     def name(self) -> str:
-        """``"mean_delay"``, ``"segment r1-0: v85"``."""
+        """``"mean_delay"``, ``"segment r1-0: mean_speed"``."""
         return f"{self.kind} {self.place}: {self.figure}" if self.place else self.figure
 
 
@@ -53,22 +52,28 @@ def run_figures(summary: Mapping[str, Any]) -> Measured:
     }
 
 
-def place_index(sumo_map: SumoMap) -> PlaceIndex:
-    """Lane-graph nodes of a map with their SUMO lanes and segments."""
-    lanes, segments = sumo_map.graph.lanes, sumo_map.graph.segments
-    places = sumo_map.lane_places
-    return PlaceIndex(
-        xy=np.column_stack([lanes.x, lanes.y]) + np.array(sumo_map.net_offset),
-        lane=places.lane,
-        lanes=places.lanes,
-        segment=lanes.segment,
-        segments=segments.ids,
-        junction=[kind == "junction" for kind in segments.kinds],
-    )
+_PLACES: dict[str, tuple[Kind, dict[str, str]]] = {
+    "segments": ("segment", {"vehicles": "vehicles", "mean_speed": "speed", "free_speed": "free"}),
+    "junctions": ("junction", {"vehicles": "vehicles", "waiting_time": "waiting"}),
+}
+"""Tables with the kind of their places, and their figures by the names that baselines have."""
 
 
-def measure(folder: Path, summary: Mapping[str, Any], index: PlaceIndex | None) -> Measured:
-    """Figures of a run and of its places; of the places only with the map's ``index``.
+def place_figures(figures: TrafficFigures) -> Iterator[tuple[Key, float | None]]:
+    """Figures of each segment and junction over the whole run."""
+    import polars as pl
+
+    for table, (kind, names) in _PLACES.items():
+        rows = over_run(getattr(figures, table))
+        if kind == "segment":
+            rows = rows.with_columns(free=1000.0 * pl.col("length") / pl.col("free_flow_time"))
+        for row in rows.iter_rows(named=True):
+            for name, column in names.items():
+                yield Key(kind, row[kind], name), row[column]
+
+
+def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
+    """Figures of a run and of its places.
 
     Actors of flows have no figures of their own: another seed has others of the same name.
 
@@ -89,14 +94,12 @@ def measure(folder: Path, summary: Mapping[str, Any], index: PlaceIndex | None) 
         for actor in actors:
             if actor.flow is None:
                 found[Key("actor", actor.id, "travel_time")] = actor.travel_time
-        if index is not None:
-            vehicles = {a.id: a.category for a in actors if a.category != "pedestrian"}
-            trajectories = pl.read_parquet(folder / layout.TRAJECTORIES_FILE)
-            for (kind, place), figures in figures_by_place(trajectories, vehicles, index).items():
-                for name, value in figures.items():
-                    key = Key("junction" if kind == "junction" else "segment", place, name)
-                    found[key] = round(value, DIGITS)
+        figures = read_figures(folder, end=summary["sim_seconds"])
     except (OSError, pl.exceptions.PolarsError) as error:
         msg = f"files of the run cannot be read: {error}"
         raise InputError(msg, file=str(folder)) from error
+    if figures is not None:
+        for key, value in place_figures(figures):
+            if value is not None:
+                found[key] = round(float(value), DIGITS)
     return found

@@ -169,7 +169,7 @@ def _case(document: _Document, entry: _ScenarioEntry, path: Path, folder: Path |
 
 
 def _tolerances(table: ToleranceTable) -> dict[tuple[str, str], Tolerance]:
-    """Tolerances by kind of place and figure; ``segment.v85`` stands in a table of its own."""
+    """Tolerances by kind of place and figure; ``segment.vehicles`` is in a table."""
     found = {}
     for key, value in table.items():
         kind, rows = ("run", {key: value}) if isinstance(value, str) else (key, value)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odscen.errors import InputError
+from odscen.lanegraph.model import Relation
 from odscen.lanegraph.paths import Router
 from odscen.lanegraph.query import segment_rows
 from odscen.scenario.counting import transitions
@@ -30,6 +31,9 @@ LONGEST = 10
 
 _STEADY = 0.25
 """A corridor goes on while at least this share of the vehicles of its busiest turn does."""
+
+_STRAIGHT = np.radians(40.0)
+"""Change of direction at a junction up to which one goes straight on."""
 
 _TRIED = 40
 """Turns, the busiest first, from which a corridor is tried."""
@@ -65,8 +69,9 @@ class Corridor:
 def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | None:
     """Corridor on which most vehicles pass most junctions; ``None`` if nobody passed any.
 
-    From each of the busiest turns a way goes on, forwards and backwards, with the busiest turn that
-    joins it. Of all ways found, the one with the largest sum of vehicles over its junctions.
+    From each of the busiest turns that lead straight on a way is continued, forwards and backwards,
+    with the busiest such turn that joins it. Of all ways found, the one with the largest sum of
+    vehicles over its junctions.
 
     Parameters
     ----------
@@ -75,6 +80,9 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
     """
     passed = movements.select("movement", "vehicles").iter_rows()
     turns = {tuple(str(name).split(">")): int(vehicles) for name, vehicles in passed if vehicles}
+    ahead = _Headings(graph)
+    # Who turns off leaves the corridor; only where nobody goes straight on does it turn itself.
+    turns = {turn: count for turn, count in turns.items() if ahead.straight(*turn)} or turns
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
     for one, others in onwards.items():
@@ -87,6 +95,28 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
         with suppress(InputError):
             return corridor_along(graph, way)
     return None
+
+
+class _Headings:
+    """Directions in which one leaves a segment for the next, and comes into it."""
+
+    def __init__(self, graph: MapGraph) -> None:
+        lanes, ids = graph.lanes, graph.segments.ids
+        one, other = lanes.segment[lanes.source], lanes.segment[lanes.target]
+        leaves = (one != other) & (lanes.relation == Relation.SUCCESSOR)
+        self._out: dict[tuple[str, str], complex] = defaultdict(complex)
+        self._into: dict[tuple[str, str], complex] = defaultdict(complex)
+        for edge in np.flatnonzero(leaves).tolist():
+            pair = str(ids[one[edge]]), str(ids[other[edge]])
+            self._out[pair] += np.exp(1j * lanes.hdg[lanes.source[edge]])
+            self._into[pair] += np.exp(1j * lanes.hdg[lanes.target[edge]])
+
+    def straight(self, first: str, through: str, last: str) -> bool:
+        """Whether one leaves the junction about as one came."""
+        out, into = self._out.get((first, through)), self._into.get((through, last))
+        if not out or not into:
+            return False
+        return bool(abs(np.angle(into / out)) < _STRAIGHT)
 
 
 def _grown(

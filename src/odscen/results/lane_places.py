@@ -26,8 +26,9 @@ class LanePlaces:
     Attributes
     ----------
     lanes
-        One row for each lane and segment: ``lane``, its ``length``, ``segment``, ``share`` of the
-        lane that lies in the segment, and ``entry``: whether one comes into the segment by it.
+        One row for each lane and segment: ``lane``, its ``length``, whether ``motor`` vehicles may
+        use it, ``segment``, ``share`` of the lane that lies in the segment, and ``entry``: whether
+        one comes into the segment by its edge.
     ways
         One row for each lane that leads to a junction or through it: ``lane``, ``junction``,
         ``approach`` (the last edge before the junction), and inside of the junction also
@@ -96,6 +97,7 @@ def _schemas() -> dict[str, dict[str, type[pl.DataType]]]:
         "lanes": {
             "lane": pl.String,
             "length": pl.Float64,
+            "motor": pl.Boolean,
             "segment": pl.String,
             "share": pl.Float64,
             "entry": pl.Boolean,

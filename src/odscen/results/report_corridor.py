@@ -76,15 +76,18 @@ def corridor_section(traces: CorridorTraces | str) -> Markup:
     if isinstance(traces, str):
         return report_section(heading, element("p", traces), explained=explained, ident="corridor")
     first, last = traces.segments[0], traces.segments[-1]
-    count = len(traces.junctions)
+    junctions = _counted(len(traces.junctions), "junction")
     told = (
-        f"From {first} to {last}, {number(traces.length, 0)} m through {count} "
-        f"junction{'' if count == 1 else 's'}, {stretch(traces.begin, traces.end)}: {traces.vehicles:,} "
-        f"vehicle{'' if traces.vehicles == 1 else 's'}."
+        f"From {first} to {last}, {number(traces.length, 0)} m through {junctions}, "
+        f"{stretch(traces.begin, traces.end)}: {_counted(traces.vehicles, 'vehicle')}."
     )
     through = ", ".join(name for name, _, _ in traces.junctions)
     note = element("p", told, element("small", f" Junctions: {through}.") if through else None)
     return report_section(heading, note, _diagram(traces), explained=explained, ident="corridor")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'' if count == 1 else 's'}"
 
 
 def _diagram(traces: CorridorTraces) -> Markup:

@@ -51,7 +51,7 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     import polars as pl
 
     found = lanes.group_by(INTERVAL).agg(_sum("departed", "arrived", *TRAFFIC, *LOST))
-    length = float(places.lanes.unique("lane")["length"].sum())
+    length = float(places.lanes.filter("motor").unique("lane")["length"].sum())
     under_way = (pl.col("departed") - pl.col("arrived")).cum_sum().shift(1, fill_value=0)
     return _on_clock(clock, found, INTERVAL).with_columns(
         (under_way + pl.col("departed")).alias("vehicles"), pl.lit(length / 1000.0).alias("length")
@@ -93,8 +93,9 @@ def junction_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
 def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
     """Sums per movement; time lost before the junction is shared by the vehicles of a lane.
 
-    Time lost on a lane of the last edge is that of the vehicles which entered the junction from it
-    in the interval, time lost elsewhere that of all which entered from the last edge.
+    Time lost on a lane of the last edge is that of the vehicles which entered the junction from it,
+    time lost elsewhere that of all which entered from the last edge; in the same interval, or else
+    in the next in which one did.
     """
     import polars as pl
 
@@ -108,28 +109,13 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
             *_sum(*TRAFFIC, *LOST),
         )
     )
-    from_lane = ways.group_by(pl.col("source").alias("lane"), *INTERVAL).agg(
-        pl.col("through").sum().alias("of_lane")
-    )
-    from_edge = ways.group_by("approach", *INTERVAL).agg(pl.col("through").sum().alias("of_edge"))
-    before = rows.filter(pl.col("via").is_null()).join(
-        from_lane.filter(pl.col("of_lane") > 0), on=("lane", *INTERVAL), how="left"
-    )
-    by_lane = (
-        before.drop_nulls("of_lane")
-        .with_columns(pl.col(name) / pl.col("of_lane") for name in LOST)
-        .select(pl.col("lane").alias("source"), *INTERVAL, *LOST)
-    )
-    by_edge = (
-        before.filter(pl.col("of_lane").is_null())
-        .group_by("approach", *INTERVAL)
-        .agg(_sum(*LOST))
-        .join(from_edge.filter(pl.col("of_edge") > 0), on=("approach", *INTERVAL))
-        .select("approach", *INTERVAL, *(pl.col(name) / pl.col("of_edge") for name in LOST))
-    )
+    before = rows.filter(pl.col("via").is_null())
+    used = before.select(pl.col("lane").is_in(ways["source"].unique().implode())).to_series()
+    by_lane = _shared(before.filter(used).with_columns(source="lane"), ways, "source")
+    by_edge = _shared(before.filter(~used), ways, "approach")
     found = (
-        ways.join(by_lane, on=("source", *INTERVAL), how="left", suffix="_of_lane")
-        .join(by_edge, on=("approach", *INTERVAL), how="left", suffix="_of_edge")
+        ways.join(by_lane, on=("source", "begin"), how="left", suffix="_of_lane")
+        .join(by_edge, on=("approach", "begin"), how="left", suffix="_of_edge")
         .with_columns(
             pl.col(name)
             + pl.col("through")
@@ -140,6 +126,27 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
         .agg(_sum(*SUMS))
     )
     return _filled(found, clock, places.movements)
+
+
+def _shared(lost: pl.DataFrame, ways: pl.DataFrame, by: str) -> pl.DataFrame:
+    """Time lost per vehicle that entered a junction from a lane or edge in an interval."""
+    import polars as pl
+
+    entered = ways.group_by(by, "begin").agg(pl.col("through").sum().alias("by_all"))
+    return (
+        lost.select(by, "begin", *LOST)
+        .sort("begin")
+        .join_asof(
+            entered.filter(pl.col("by_all") > 0).sort("begin").with_columns(then="begin"),
+            on="begin",
+            by=by,
+            strategy="forward",
+            check_sortedness=False,
+        )
+        .drop_nulls("then")
+        .group_by(by, pl.col("then").alias("begin"))
+        .agg(pl.col(name).sum() / pl.col("by_all").first() for name in LOST)
+    )
 
 
 def _came_in() -> pl.Expr:

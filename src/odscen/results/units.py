@@ -20,7 +20,6 @@ _WORDS = (
     ("length", "m"),
     ("distance", "m"),
     ("speed", "m/s"),
-    ("v85", "m/s"),
     ("seconds", "s"),
     ("time", "s"),
     ("delay", "s"),

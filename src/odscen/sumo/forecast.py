@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.errors import WorkspaceError
+from odscen.sumo.measures import interval_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,8 +23,10 @@ CONGESTION = 2.0
 """Time under way, as a multiple of that without anybody else."""
 ROW = 24
 """Bytes of trajectories for each road user and record."""
-ACTOR = 1_400
-"""Bytes of events, outcomes and the copy of the route for each actor."""
+LANE_ROW = 75
+"""Bytes of what is measured on a lane in an interval, with emissions."""
+ACTOR = 1_600
+"""Bytes of events, outcome, trip and the copy of the route for each actor."""
 STATE = 600
 """Bytes of saved state for each road user that is under way."""
 UNKNOWN_TIME = 300.0
@@ -53,7 +56,9 @@ class Forecast:
         )
 
 
-def forecast(plan: Plan, files: Mapping[str, str], *, every: float | None) -> Forecast:
+def forecast(
+    plan: Plan, files: Mapping[str, str], *, every: float | None, lanes: int = 0
+) -> Forecast:
     """Predict what a run will need.
 
     Parameters
@@ -62,6 +67,8 @@ def forecast(plan: Plan, files: Mapping[str, str], *, every: float | None) -> Fo
         Texts that are written before it starts.
     every
         Seconds between two records of trajectories; ``None`` for every step.
+    lanes
+        How many are measured.
     """
     minutes = max(1, int(plan.until / _MINUTE) + 1)
     change = [0] * (minutes + 1)
@@ -81,7 +88,9 @@ def forecast(plan: Plan, files: Mapping[str, str], *, every: float | None) -> Fo
     rows = seconds / max(every or 0.0, plan.step_length) if plan.trajectories else 0.0
     slices = plan.until / plan.slice_length if plan.slice_length else 0.0
     written = sum(len(text) for text in files.values())
-    disk = written + ROW * rows + ACTOR * len(plan.actors) + STATE * slices * most
+    intervals = plan.until / interval_of(plan.until, plan.slice_length)
+    measured = LANE_ROW * lanes * min(intervals, seconds)  # nobody: nothing
+    disk = written + ROW * rows + measured + ACTOR * len(plan.actors) + STATE * slices * most
     memory = MEMORY_BASE + MEMORY_RUNNING * most + MEMORY_PLANNED * len(plan.actors)
     return Forecast(int(disk), int(memory), most)
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from odscen.sumo.sumo_map import SumoMap
 
 _ONLY_WALKERS = frozenset({PEDESTRIAN})
+_NO_MOTOR = frozenset({PEDESTRIAN, "bicycle"})
 
 
 class _Part(NamedTuple):
@@ -52,9 +53,10 @@ class _Way(NamedTuple):
 def lane_places(sumo_map: SumoMap) -> LanePlaces:
     """Places of all lanes that vehicles may use.
 
-    A lane is where the nodes of the lane graph on it are; of the lanes inside of a SUMO junction
-    those that touch a junction of the map belong to it as a whole. A lane that crosses no junction
-    of the map, and is too short for a node, is in the segment that it is entered from.
+    A lane is where the nodes of the lane graph on it are, or on a lane beside it; of the lanes
+    inside of a SUMO junction those that touch a junction of the map belong to it as a whole. A lane
+    that crosses no junction of the map, and is too short for a node, is in the segment that it is
+    entered from.
     """
     net, segments = sumo_map.net, sumo_map.graph.segments
     junctions = {
@@ -63,6 +65,7 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
         if kind == "junction"
     }
     parts = dict(_parts(sumo_map, junctions))
+    parts |= _beside(parts, net)
     chains = list(_chains(net))
     parts |= _inside(chains, parts, junctions, net)
     ways = list(_ways(chains, parts, junctions))
@@ -102,6 +105,17 @@ def _parts(sumo_map: SumoMap, junctions: set[str]) -> Iterator[tuple[str, tuple[
         else:
             found = [(name, len(list(same))) for name, same in groupby(names)]
             yield lane.id, tuple(_Part(name, number / len(names)) for name, number in found)
+
+
+def _beside(parts: _Parts, net: RoadNet) -> _Parts:
+    """Places of lanes without nodes beside a lane that has some: lanes of bicycles."""
+    return {
+        lane.id: beside
+        for lanes in net.edge_lanes.values()
+        if (beside := next((parts[lane.id] for lane in lanes if lane.id in parts), None))
+        for lane in lanes
+        if lane.id not in parts and not lane.internal and _for_vehicles(lane)
+    }
 
 
 def _chains(net: RoadNet) -> Iterator[_Chain]:
@@ -165,16 +179,18 @@ def _controls(sumo_map: SumoMap) -> dict[str, Control]:
     return found
 
 
-def _lane_rows(parts: _Parts, net: RoadNet) -> Iterator[tuple[str, float, str, float, bool]]:
+def _lane_rows(parts: _Parts, net: RoadNet) -> Iterator[tuple[str, float, bool, str, float, bool]]:
     before: dict[str, set[str]] = defaultdict(set)
     for link in net.links:
         if link.source in parts:
-            before[link.via or link.target].add(parts[link.source][-1].segment)
+            onto = net.lanes[link.via or link.target]
+            before[onto.edge].add(parts[link.source][-1].segment)
     for name, lane in sorted(net.lanes.items()):
         if _for_vehicles(lane):
+            motor = lane.allowed is None or not lane.allowed <= _NO_MOTOR
             for number, part in enumerate(parts.get(name, ())):
-                entry = number > 0 or bool(before[name] - {part.segment})
-                yield name, lane.length, part.segment, part.share, entry
+                entry = number > 0 or bool(before[lane.edge] - {part.segment})
+                yield name, lane.length, motor, part.segment, part.share, entry
 
 
 def _way_rows(ways: Sequence[_Way], net: RoadNet) -> Iterator[tuple[str | None, ...]]:

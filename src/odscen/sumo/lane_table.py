@@ -21,11 +21,11 @@ SUMO also tells, per lane, travel time and distance of the fronts, from which
 
     seconds   = traveltime * distance / length
     time_loss = seconds - distance * (sampled - timeLoss) / (speed * sampled)
-    waiting   = min(waitingTime, seconds)
+    waiting   = waitingTime * seconds / sampled
 
 with ``sampled`` for its seconds. The second is exact if all who were on the lane wished to drive
 equally fast; where it was held against recorded trips, the sum was off by less than 1 %. The third
-is exact where no vehicle stands with its rear on another lane than its front.
+takes rears to stand as much as fronts do; held against every step, it was off by 1 %.
 """
 
 from __future__ import annotations
@@ -101,7 +101,10 @@ def lane_table(
         .with_columns(seconds=fronts.fill_null(0.0))
         .with_columns(
             time_loss=loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds")),
-            waiting=pl.min_horizontal(col("waitingTime").fill_null(0.0), "seconds"),
+            waiting=pl.when(sampled > 0.0)
+            .then(col("waitingTime") * col("seconds") / sampled)
+            .fill_null(0.0)
+            .clip(0.0, col("seconds")),
             entered=(col("entered") - col("present").fill_null(0)).clip(0),
         )
         .select(

@@ -20,8 +20,13 @@ if TYPE_CHECKING:
     from odscen.results.traffic import TrafficFigures
 
 
-def read_figures(run: Path, *, end: float) -> TrafficFigures | None:
+def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures | None:
     """Figures by place and time of a run that lasted ``end`` seconds.
+
+    Parameters
+    ----------
+    meso
+        Whether it was mesoscopic: nobody stands in its trajectories, so that there are no queues.
 
     Returns
     -------
@@ -41,14 +46,14 @@ def read_figures(run: Path, *, end: float) -> TrafficFigures | None:
     places = LanePlaces.from_json(file.read_text(encoding="utf-8"))
     files = trajectory_files(run)
     queues = None
-    if files:
+    if files and not meso:
         queues = queue_lengths(pl.scan_parquet(files), places, intervals(lanes, end))
     return traffic_figures(lanes, places, end=end, queues=queues)
 
 
-def write_figures(run: Path, *, end: float) -> dict[str, float | None]:
+def write_figures(run: Path, *, end: float, meso: bool = False) -> dict[str, float | None]:
     """Write ``figures.json`` and the tables of a run, and return the figures of the whole run."""
-    figures = read_figures(run, end=end)
+    figures = read_figures(run, end=end, meso=meso)
     of_run = traffic_of_run(figures, read_trips(run))
     conflicts = read_conflicts(run)
     if conflicts is not None:

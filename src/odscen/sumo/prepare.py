@@ -92,7 +92,10 @@ def prepare(
         places=lane_places(sumo_map),
         about={"map": scenario.map.name, "map_sha256": scenario.map.sha256, "meso": meso},
         expected=forecast(
-            plan, realization.files, every=None if recording is None else recording.every
+            plan,
+            realization.files,
+            every=None if recording is None else recording.every,
+            lanes=len(sumo_map.net.lanes),
         ),
     )
 

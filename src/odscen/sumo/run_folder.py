@@ -161,7 +161,9 @@ def make_summary(
     if done:
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
-        figures = key_figures(outcomes) | rounded(write_figures(folder, end=done.sim_seconds))
+        meso = bool(prepared.about.get("meso"))
+        traffic = write_figures(folder, end=done.sim_seconds, meso=meso)
+        figures = key_figures(outcomes) | rounded(traffic)
         summary["actors"] = actor_counts(outcomes)
         summary["insertion_error_max"] = figures["insertion_error_max"]
         summary["figures"] = figures
