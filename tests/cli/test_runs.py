@@ -46,6 +46,8 @@ def test_a_run_gives_what_scripts_rely_on(finished):
     for path in finished["files"].values():
         assert Path(path).is_file()
     assert set(finished["files"]) >= {"summary", "events", "actors", "trajectories", "report"}
+    assert finished["figures"]["co2_total"] > 0.0
+    assert finished["figures"]["vehicle_km"] > 0.0
 
 
 def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, finished, tmp_path):
@@ -54,7 +56,7 @@ def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, 
     second = odscen(
         "run", again["file"], "--out", tmp_path, "--json", "--workspace", workspace
     ).json
-    for name in ("trajectories", "events", "actors", "plan"):
+    for name in ("trajectories", "events", "actors", "plan", "figures", "movements_figures"):
         assert _bytes(second["files"][name]) == _bytes(finished["files"][name]), name
     for name in ("routes.rou.xml", "scenario.sumocfg", "net.net.xml"):
         one, other = (f"{run['folder']}/sumo/{name}" for run in (finished, second))
