@@ -100,7 +100,7 @@ def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
     assert done.code == 0, done.err
     binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
     subprocess.run([binary, "-c", tmp_path / "scenario.sumocfg"], check=True, capture_output=True)
-    plain = pl.read_parquet(next(tmp_path.glob("*.parquet")))
+    plain = pl.read_parquet(tmp_path / "trajectories.parquet")
     ours = pl.read_parquet(finished["files"]["trajectories"])
     assert plain.equals(ours)
 
