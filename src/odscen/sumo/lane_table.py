@@ -24,7 +24,7 @@ SUMO also tells, per lane, travel time and distance of the fronts, from which
     waiting   = min(waitingTime, seconds)
 
 with ``sampled`` for its seconds. The second is exact if all who were on the lane wished to drive
-equally fast; where it was held against recorded trips, the sum was off by less than 1 %. The third
+equally fast; where it was held against the trips, the sum was less than 2 % below theirs. The third
 is exact where no vehicle stands with its rear on another lane than its front.
 """
 
