@@ -163,3 +163,13 @@ def test_generating_without_maps_says_how_to_add_one(tmp_path):
 
 def _bytes(path):
     return Path(path).read_bytes()
+
+
+def test_emissions_are_recorded_unless_they_are_not_wanted(workspace, scenario, tmp_path):
+    options = ("--until", 30, "--workspace", workspace, "--json")
+    with_them = odscen("run", scenario, "--out", tmp_path / "with", *options)
+    without = odscen("run", scenario, "--out", tmp_path / "without", "--no-emissions", *options)
+    lanes = [pl.read_parquet(done.json["files"]["lanes"]) for done in (with_them, without)]
+    assert lanes[0]["co2"].sum() > 0.0
+    assert "co2" not in lanes[1].columns
+    assert lanes[0].select(lanes[1].columns).equals(lanes[1])
