@@ -65,6 +65,8 @@ def test_a_run_gives_what_scripts_rely_on(finished):
     for path in finished["files"].values():
         assert Path(path).is_file()
     assert set(finished["files"]) >= {"summary", "events", "actors", "trajectories", "report"}
+    assert finished["figures"]["co2_total"] > 0.0
+    assert finished["figures"]["vehicle_km"] > 0.0
 
 
 def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, finished, tmp_path):
@@ -73,7 +75,7 @@ def test_the_same_seed_gives_the_same_bytes_in_two_folders(workspace, scenario, 
     second = odscen(
         "run", again["file"], "--out", tmp_path, "--json", "--workspace", workspace
     ).json
-    for name in ("trajectories", "events", "actors", "plan"):
+    for name in ("trajectories", "events", "actors", "plan", "figures", "movements_figures"):
         assert _bytes(second["files"][name]) == _bytes(finished["files"][name]), name
     for name in ("routes.rou.xml", "scenario.sumocfg", "net.net.xml"):
         one, other = (f"{run['folder']}/sumo/{name}" for run in (finished, second))
@@ -128,7 +130,7 @@ def test_exported_files_run_with_plain_sumo_and_give_the_same_trajectories(
     assert done.code == 0, done.err
     binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
     subprocess.run([binary, "-c", tmp_path / "scenario.sumocfg"], check=True, capture_output=True)
-    plain = pl.read_parquet(next(tmp_path.glob("*.parquet")))
+    plain = pl.read_parquet(tmp_path / "trajectories.parquet")
     ours = pl.read_parquet(finished["files"]["trajectories"])
     assert plain.equals(ours)
 
@@ -191,3 +193,13 @@ def test_generating_without_maps_says_how_to_add_one(tmp_path):
 
 def _bytes(path):
     return Path(path).read_bytes()
+
+
+def test_emissions_are_recorded_unless_they_are_not_wanted(workspace, scenario, tmp_path):
+    options = ("--until", 30, "--workspace", workspace, "--json")
+    with_them = odscen("run", scenario, "--out", tmp_path / "with", *options)
+    without = odscen("run", scenario, "--out", tmp_path / "without", "--no-emissions", *options)
+    lanes = [pl.read_parquet(done.json["files"]["lanes"]) for done in (with_them, without)]
+    assert lanes[0]["co2"].sum() > 0.0
+    assert "co2" not in lanes[1].columns
+    assert lanes[0].select(lanes[1].columns).equals(lanes[1])

@@ -108,6 +108,20 @@ def test_a_page_of_runs_that_are_the_same_says_so(sides):
     assert 'id="differences"' not in page
 
 
+def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
+    store = Workspace.open(tmp_path / "workspace")
+    store.add_map(ROOT / "maps" / "signal_crossing.xodr")
+    (done,) = workflow.run(store, [SCENARIO], out=tmp_path, seed=1, slice_length=100.0)
+    assert "trajectory_parts" in done.summary["files"]
+    sliced, whole = read_runs(done.folder), read_runs(sides[0] / "seed-1")
+    assert sliced.places
+    assert {key for key in sliced.runs[1] if key.place} == {
+        key for key in whole.runs[1] if key.place
+    }
+    passed = Key("junction", "j10001", "vehicles")
+    assert sliced.runs[1][passed] == pytest.approx(whole.runs[1][passed], abs=2)
+
+
 def test_a_run_compared_with_itself_is_the_same(sides):
     a, _ = sides
     result = compare_runs(read_runs(a), read_runs(a))

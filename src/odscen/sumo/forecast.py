@@ -89,7 +89,7 @@ def forecast(
     slices = plan.until / plan.slice_length if plan.slice_length else 0.0
     written = sum(len(text) for text in files.values())
     intervals = plan.until / interval_of(plan.until, plan.slice_length)
-    measured = LANE_ROW * lanes * min(intervals, seconds)  # nobody: nothing
+    measured = LANE_ROW * lanes * intervals if seconds else 0.0
     disk = written + ROW * rows + measured + ACTOR * len(plan.actors) + STATE * slices * most
     memory = MEMORY_BASE + MEMORY_RUNNING * most + MEMORY_PLANNED * len(plan.actors)
     return Forecast(int(disk), int(memory), most)

@@ -24,7 +24,7 @@ SUMO also tells, per lane, travel time and distance of the fronts, from which
     waiting   = waitingTime * seconds / sampled
 
 with ``sampled`` for its seconds. The second is exact if all who were on the lane wished to drive
-equally fast; where it was held against recorded trips, the sum was off by less than 1 %. The third
+equally fast; where it was held against the trips, the sum was less than 2 % below theirs. The third
 takes rears to stand as much as fronts do; held against every step, it was off by 1 %.
 """
 

@@ -14,6 +14,7 @@ from odscen.results.expectations import COUNTS, evaluate
 from odscen.results.gridlock import find_trouble, trouble_summary
 from odscen.results.records import events_from_json, rounded
 from odscen.results.summary import actor_counts, actors_from_json, key_figures
+from odscen.results.traffic import TABLES
 from odscen.sumo import layout
 from odscen.sumo.measured import write_figures
 
@@ -224,7 +225,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "conflict_parts": layout.CONFLICTS_FOLDER,
         "lane_places": layout.LANE_PLACES_FILE,
         "figures": layout.FIGURES_FILE,
-        "figure_tables": layout.FIGURES_FOLDER,
+        **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},
         "events": layout.EVENTS_FILE,
         "actors": layout.ACTORS_FILE,
         "report": layout.REPORT_FILE,
