@@ -2,9 +2,10 @@
 
 ``python -m bench.interruptions [MAP.xodr] [--hours H] [--weekday TRIPS] [--kills N] [--meso]``:
 traffic on a map (the shipped town, 2 hours, if not given) in slices of 10 minutes; with
-``--weekday`` the hours from 7:00 on of a weekday with so many trips. The command line is killed at 20 random moments,
-half of the time together with its worker, and resumed each time. The results must be the same
-bytes, and nothing that was there before a kill may be gone or different after it.
+``--weekday`` the hours from 7:00 on of a weekday with so many trips. The command line
+is killed at 20 random moments, half of the time together with its worker, and resumed each time,
+the last time to its end. The results must be the same bytes, and nothing that was there before a
+kill may be gone or different after it.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from odscen.sumo.recorded import trajectory_files
 SLICE = 600.0
 FLOWS = 40
 PER_HOUR = 900.0
-LONGEST = 8.0
-"""Wall seconds until a kill at most."""
+LONGEST = 0.7
+"""Wall seconds until a kill at most, as a share of what the run alone takes."""
 
 
 def main(
@@ -65,21 +66,23 @@ def main(
         resume = [*cli, "resume", str(target), *options]
         expected = results(folder / "alone" / target.name)
         moments = lost = compared = differing = 0
-        while moments < kills or (target / "status.json").is_file():
+        ended = False
+        while not ended:
             before = recorded(target)
-            patience = chance.uniform(0.2, LONGEST) if moments < kills else None
+            patience = chance.uniform(0.2, LONGEST * alone) if moments < kills else None
             if kill(command, patience, worker=chance.random() < 0.5):
                 compared += 1
                 differing += results(target) != expected
                 shutil.rmtree(target)
-                command = run
+                command, ended = run, patience is None
                 continue
             moments += 1
             after = recorded(target)
             lost += sum(after.get(file) != content for file, content in before.items())
             command = resume if (target / "status.json").is_file() else run
     print(
-        f"{path.stem}{', meso' if meso else ''}, {hours:g} h in slices of {SLICE:g} s, {alone:.0f} s of wall time alone: "
+        f"{path.stem}{', meso' if meso else ''}, {hours:g} h in slices of {SLICE:g} s, "
+        f"{alone:.0f} s of wall time alone: "
         f"killed {moments} times; {lost} files lost or changed by a kill; "
         f"{compared} runs came to their end, {differing} with other results"
     )

@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from bench.common import shared_maps
 from odscen import demands, workflow
@@ -117,7 +117,7 @@ def bare(config: Path) -> None:
 
 def without_output(config: Path) -> Path:
     """Write the same configuration without output, and without files that only ask for some."""
-    tree = ElementTree.parse(config)
+    tree = ET.parse(config)
     root = tree.getroot()
     root.remove(next(section for section in root if section.tag == "output"))
     extra = root.find("input/additional-files")
@@ -131,7 +131,7 @@ def without_output(config: Path) -> Path:
 
 
 def asks_for_output(additional: Path) -> bool:
-    root = ElementTree.parse(additional).getroot()
+    root = ET.parse(additional).getroot()
     return any("file" in element.attrib for element in root.iter())
 
 

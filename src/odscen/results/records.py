@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
@@ -289,12 +288,13 @@ def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
 def _without_defaults(value: PlannedActor | Event) -> dict[str, Any]:
     return {
         name: item
-        for name, default in _defaults(type(value))
+        for name, default in _DEFAULTS[type(value)]
         if (item := getattr(value, name)) != default
     }
 
 
-@cache
-def _defaults(kind: type[PlannedActor | Event]) -> tuple[tuple[str, Any], ...]:
-    """Names and defaults of the fields; asked for every row of a long run."""
-    return tuple((field.name, field.default) for field in fields(kind))
+_DEFAULTS: dict[type, tuple[tuple[str, Any], ...]] = {
+    kind: tuple((field.name, field.default) for field in fields(kind))
+    for kind in (PlannedActor, Event)
+}
+"""Names and defaults of the fields; asked for every row of a long run."""
