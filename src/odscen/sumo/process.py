@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 WORKER = "odscen.sumo.worker"
 _SURROUNDINGS = {
     # SUMO allocates and frees small blocks all the time: a tenth of its seconds. glibc keeps seven
-    # of a size at hand for a thread; more, and room that is not given back, save half of that.
+    # of a size at hand for a thread; more, and room that is not given back, save some of that.
     "GLIBC_TUNABLES": (
         "glibc.malloc.tcache_count=4000:glibc.malloc.trim_threshold=268435456:"
         "glibc.malloc.top_pad=16777216"
