@@ -7,6 +7,7 @@ import statistics
 import time
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 OUT = Path(__file__).parent / "out"
 
@@ -40,3 +41,23 @@ def _seconds(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
+
+
+def without_output(config: Path) -> Path:
+    """Write the same configuration without output, and without files that only ask for some."""
+    tree = ET.parse(config)
+    root = tree.getroot()
+    root.remove(next(section for section in root if section.tag == "output"))
+    extra = root.find("input/additional-files")
+    if extra is not None:
+        names = extra.attrib["value"].split(",")
+        kept = [name for name in names if not asks_for_output(config.with_name(name))]
+        extra.attrib["value"] = ",".join(kept)
+    silent = config.with_name("silent.sumocfg")
+    tree.write(silent, encoding="unicode")
+    return silent
+
+
+def asks_for_output(additional: Path) -> bool:
+    root = ET.parse(additional).getroot()
+    return any("file" in element.attrib for element in root.iter())

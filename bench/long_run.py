@@ -1,69 +1,153 @@
-"""A long run in slices by odscen against bare ``sumo`` in one piece, same demand, same recording.
+"""A day of traffic by odscen, in slices, against bare ``sumo`` in one piece: same demand, devices
+and recorded output, whatever the run folder's sumocfg names. Aim: at most 1.15.
 
-``python -m bench.long_run RUN [HOURS]``: RUN is the folder of a long run (of which plan, network,
-routes and configuration are taken); HOURS of it are run, in slices of an hour. CPU seconds, as wall
-time on a shared machine measures the neighbours. Aim: at most 1.15.
+``python -m bench.long_run``: a day on the shipped town up to 8:00. With ``--full`` 24 hours from
+midnight on the large town and, where the shared maps are, on carla-2019/Town05, at least 50,000
+trips each; name one of them to run it alone. ``--rounds N`` for more than one round.
+
+Wall and CPU seconds of each, in turn, and the median of the ratios of each round. Everything is
+made from scratch. Preparation and report, which ``sumo`` does not have, are told apart. Memory is
+what the worker holds at each boundary between slices.
 """
 
 from __future__ import annotations
 
-import json
+import argparse
 import os
-import shutil
+import statistics
 import subprocess
-import sys
 import tempfile
-from dataclasses import replace
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
-from bench.recording import without_outputs
-from odscen.results.records import Plan
+from bench.common import shared_maps, without_output
+from odscen import demands, workflow
+from odscen.catalog.shipped import shipped_maps
+from odscen.catalog.store import Workspace
 from odscen.sumo import layout
+from odscen.sumo.checkpoint import last_number, read_checkpoint
+from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.process import run_worker
+from odscen.sumo.run_folder import make_summary, write_run_folder
+from tools.make_maps.__main__ import map_text
 
-SLICE = 3600.0
+HOUR = 3600.0
+TRIPS = 51_000.0
+SHORT_TRIPS = 12_000.0
+
+
+class Spent(NamedTuple):
+    """Seconds of this process and its children that have ended."""
+
+    wall: float
+    cpu: float
 
 
 def main() -> None:
-    if len(sys.argv) < 2:
-        print("skipped: name the folder of a long run")
-        return
-    given, hours = Path(sys.argv[1]), float(sys.argv[2]) if len(sys.argv) > 2 else 3.0
+    (town,) = (path for path in shipped_maps() if path.stem == "town_5x5")
+    day(town, trips=SHORT_TRIPS, until=8 * HOUR, rounds=3)
+
+
+def full(only: str | None, rounds: int) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        large = Path(name) / "large_town.xodr"
+        large.write_text(map_text(large.stem), encoding="utf-8")
+        maps = shared_maps()
+        town = maps / "carla-2019" / "Town05.xodr" if maps else None
+        for path in (large, town):
+            if path is not None and only in (None, path.stem):
+                day(path, trips=TRIPS, until=24 * HOUR, rounds=rounds)
+
+
+def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        workspace = Workspace.open(Path(name) / "workspace")
+        entry = workspace.add_map(path)
+        scenario, _ = demands.whole_day(workspace, entry.name, trips=trips, day="weekday", seed=0)
+        loaded = workflow.load_map(entry)
+        run = Path(name) / "run"
+        run.mkdir()
+        start = spent()
+        prepared = prepare(
+            scenario, loaded.sumo, entry.path("net"), workspace.assets(), until=until
+        )
+        write_run_folder(prepared, run)
+        preparation = since(start)
+        sumo_folder = run / layout.SUMO_FOLDER
+        config = sumo_folder / layout.CONFIG_FILE
+        silent = without_output(config)
+        times: dict[str, list[Spent]] = {"odscen": [], "sumo": [], "silent": []}
+        for _ in range(rounds):
+            times["sumo"].append(timed(lambda: bare(config)))
+            start = spent()
+            ended = run_worker(run)
+            times["odscen"].append(since(start))
+            if ended.done is None:
+                raise SystemExit(ended.error)
+            times["silent"].append(timed(lambda: bare(silent)))
+        start = spent()
+        summary = make_summary(prepared, run, ended, ())
+        write_report(run, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
+        report = since(start)
+        memory = [read_checkpoint(run, n).memory / 1e6 for n in range(1, last_number(run) + 1)]
+        print(
+            f"{path.stem}, {until / HOUR:g} h, {len(prepared.plan.actors):,} trips, "
+            f"{summary['actors']['arrived']:,} arrived, {rounds} rounds, wall (CPU) seconds:\n"
+            f"  odscen {told(times['odscen'])}\n"
+            f"  sumo with the same output {told(times['sumo'])}, "
+            f"ratio {ratios(times['odscen'], times['sumo'])} (aim 1.15)\n"
+            f"  sumo without output {told(times['silent'])}, "
+            f"ratio {ratios(times['odscen'], times['silent'])}\n"
+            f"  apart: preparation {told([preparation])}, report {told([report])}\n"
+            f"  memory, MB, at the end of each slice: {' '.join(f'{m:.0f}' for m in memory)}; "
+            f"after the first {max(memory[1:], default=0.0) / memory[0]:.2f} times as much at most",
+            flush=True,
+        )
+
+
+def bare(config: Path) -> None:
     import sumo
 
-    with tempfile.TemporaryDirectory() as name:
-        run = Path(name)
-        shutil.copytree(given / layout.SUMO_FOLDER, run / layout.SUMO_FOLDER)
-        plan = Plan.from_json((given / layout.PLAN_FILE).read_text(encoding="utf-8"))
-        until = hours * 3600.0
-        actors = tuple(actor for actor in plan.actors if actor.depart < until)
-        plan = replace(plan, until=until, slice_length=SLICE, actors=actors)
-        (run / layout.PLAN_FILE).write_text(plan.to_json(), encoding="utf-8")
-        config = run / layout.SUMO_FOLDER / layout.CONFIG_FILE
-        binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
-        bare = [str(binary), "-c", str(config), "--end", f"{until:g}"]
-        ours = [sys.executable, "-m", "odscen.sumo.worker", str(run / layout.PLAN_FILE)]
-        quiet = config.with_name("quiet.sumocfg")
-        quiet.write_text(without_outputs(config.read_text(encoding="utf-8")), encoding="utf-8")
-        silent = [str(binary), "-c", str(quiet), "--end", f"{until:g}"]
-        seconds = {"sumo": cpu(bare), "odscen": cpu(ours)}
-        shown = json.loads((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))["actors"]
-        seconds["silent"] = cpu(silent)
-    inserted = sum(actor["status"] != "waiting" for actor in shown)
-    print(
-        f"{hours:g} h, {inserted:,} on the road: odscen {seconds['odscen']:.1f} s, sumo with the "
-        f"same output {seconds['sumo']:.1f} s, ratio {seconds['odscen'] / seconds['sumo']:.2f} "
-        f"(aim 1.15); sumo without output {seconds['silent']:.1f} s, ratio "
-        f"{seconds['odscen'] / seconds['silent']:.2f}"
-    )
+    binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
+    subprocess.run([binary, "-c", config], check=True, capture_output=True)
 
 
-def cpu(command: list[str]) -> float:
-    before = os.times()
-    subprocess.run(command, check=True, capture_output=True)
-    after = os.times()
-    spent = after.children_user + after.children_system
-    return spent - before.children_user - before.children_system
+def timed(work: Callable[[], object]) -> Spent:
+    start = spent()
+    work()
+    return since(start)
+
+
+def spent() -> Spent:
+    times = os.times()
+    cpu = times.user + times.system + times.children_user + times.children_system
+    return Spent(time.perf_counter(), cpu)
+
+
+def since(start: Spent) -> Spent:
+    now = spent()
+    return Spent(now.wall - start.wall, now.cpu - start.cpu)
+
+
+def told(times: list[Spent]) -> str:
+    wall = statistics.median(one.wall for one in times)
+    return f"{wall:.1f} ({statistics.median(one.cpu for one in times):.1f})"
+
+
+def ratios(ours: list[Spent], theirs: list[Spent]) -> str:
+    pairs = list(zip(ours, theirs, strict=True))
+    wall = statistics.median(mine.wall / other.wall for mine, other in pairs)
+    return f"{wall:.2f} ({statistics.median(mine.cpu / other.cpu for mine, other in pairs):.2f})"
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--full", nargs="?", const="", metavar="MAP")
+    parser.add_argument("--rounds", type=int, default=1)
+    given = parser.parse_args()
+    if given.full is None:
+        main()
+    else:
+        full(given.full or None, given.rounds)

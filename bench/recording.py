@@ -15,6 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bench.common import without_output
 from odscen.results.records import Plan, PlannedActor
 from odscen.sumo import layout
 from odscen.sumo.config import RunSettings, sumo_config
@@ -34,8 +35,7 @@ def main() -> None:
         folder = Path(name)
         prepare(folder, binaries)
         config = folder / layout.SUMO_FOLDER / layout.CONFIG_FILE
-        bare = config.with_name("bare.sumocfg")
-        bare.write_text(without_outputs(config.read_text(encoding="utf-8")), encoding="utf-8")
+        bare = without_output(config)
         commands = {
             "odscen": [sys.executable, "-m", "odscen.sumo.worker", str(folder / layout.PLAN_FILE)],
             "sumo": [str(binaries / "sumo"), "-c", str(config)],
@@ -54,13 +54,6 @@ def main() -> None:
         f"sumo without output {middle['bare']:.2f} s, ratio {to_bare:.2f}; "
         f"trajectories {'identical' if same else 'DIFFER'}"
     )
-
-
-def without_outputs(config: str) -> str:
-    """A configuration with which SUMO writes nothing; ours has an element on each line."""
-    outputs = ("fcd-output", "tripinfo-output", layout.MEASURES_FILE)
-    lines = config.splitlines(keepends=True)
-    return "".join(line for line in lines if not any(name in line for name in outputs))
 
 
 def interleaved(commands: dict[str, list[str]]) -> dict[str, list[float]]:

@@ -21,6 +21,9 @@ EVENTS_FORMAT = "odscen-events"
 ACTORS_FORMAT = "odscen-actors"
 VERSION = 1
 
+_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+"""What ``json.dumps`` makes anew at each call; a long run has a row for every event."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlannedActor:
@@ -216,7 +219,8 @@ def event_line(event: Event) -> str:
 def event_from_line(line: str) -> Event:
     """Inverse of :func:`event_line`."""
     data = json.loads(line)
-    return Event(**{**data, "kind": EventKind(data["kind"])})
+    data["kind"] = EventKind(data["kind"])
+    return Event(**data)
 
 
 def events_to_json(events: Iterable[Event]) -> str:
@@ -271,7 +275,7 @@ def _text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> I
 
 
 def _row_text(row: Mapping[str, Any]) -> str:
-    return json.dumps(rounded(row), ensure_ascii=False, allow_nan=False)
+    return _encode(rounded(row))
 
 
 def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -282,9 +286,15 @@ def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_defaults(value: PlannedActor | Event) -> dict[str, Any]:
-    row = {}
-    for field in fields(value):
-        item = getattr(value, field.name)
-        if item != field.default:
-            row[field.name] = item
-    return row
+    return {
+        name: item
+        for name, default in _DEFAULTS[type(value)]
+        if (item := getattr(value, name)) != default
+    }
+
+
+_DEFAULTS: dict[type, tuple[tuple[str, Any], ...]] = {
+    kind: tuple((field.name, field.default) for field in fields(kind))
+    for kind in (PlannedActor, Event)
+}
+"""Names and defaults of the fields; asked for every row of a long run."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -189,7 +189,9 @@ def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
 def actors_to_json(outcomes: Sequence[ActorOutcome]) -> str:
     """``actors.json``: one actor per line."""
     head = {"format": ACTORS_FORMAT, "version": VERSION}
-    return json_with_rows(head, "actors", (asdict(outcome) for outcome in outcomes))
+    names = [field.name for field in fields(ActorOutcome)]
+    rows = ({name: getattr(outcome, name) for name in names} for outcome in outcomes)
+    return json_with_rows(head, "actors", rows)
 
 
 def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:

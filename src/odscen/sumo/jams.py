@@ -50,22 +50,28 @@ class Stuck(NamedTuple):
 
 
 class JamWatch:
-    """Finds jams and says why somebody was stuck."""
+    """Finds jams and says why somebody was stuck.
+
+    Attributes
+    ----------
+    due
+        When to look next, simulated seconds.
+    """
 
     def __init__(self, net_offset: tuple[float, float]) -> None:
+        self.due = 0.0
         self._offset = net_offset
-        self._next = 0.0
         self._since: dict[str, float] = {}
         self._seen: dict[str, float] = {}
         self._stuck: dict[str, Stuck] = {}
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
-        return {"next": self._next, "since": self._since, "seen": self._seen, "stuck": self._stuck}
+        return {"next": self.due, "since": self._since, "seen": self._seen, "stuck": self._stuck}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self._next = state["next"]
+        self.due = state["next"]
         self._since = dict(state["since"])
         self._seen = dict(state["seen"])
         self._stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
@@ -75,10 +81,8 @@ class JamWatch:
         return self._stuck.get(vehicle)
 
     def look(self, session: Session, time: float) -> list[Event]:
-        """Jams that have begun or ended, if it is time to look."""
-        if time < self._next:
-            return []
-        self._next = time + PERIOD
+        """Jams that have begun or ended since the last look."""
+        self.due = time + PERIOD
         queues: dict[str, list[Standing]] = {}
         for one in session.standing(WATCHED):
             queues.setdefault(one.lane, []).append(one)

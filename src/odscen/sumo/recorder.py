@@ -1,7 +1,8 @@
 """What happened to whom, collected while the simulation steps.
 
-Only id lists are read per step, and poses of those who have just departed: the cost does not grow
-with the number of vehicles running. Twice a minute all are looked at for jams. Trajectories are
+Only counts are read per step, and, where they are not 0, id lists and poses of those who have just
+departed: the cost does not grow with the number of vehicles running. Four times a minute all are
+looked at for jams. Trajectories are
 SUMO's own business (FCD output).
 """
 
@@ -93,6 +94,12 @@ class Recorder:
 
     def record(self, session: Session, time: float) -> None:
         """Record the step that began at ``time`` and has just been made."""
+        if session.eventful() or self._touching or self._stopping:
+            self._record_events(session, time)
+        elif self._jams.due <= time:  # a quiet step, as most are: all that costs is saved there
+            self.events += self._jams.look(session, time)
+
+    def _record_events(self, session: Session, time: float) -> None:
         lists = session.lists()
         for vehicle in lists.departed:
             self._depart(time, vehicle, session.vehicle_front(vehicle))
@@ -105,7 +112,8 @@ class Recorder:
             self._place(time, EventKind.TELEPORT_END, vehicle, front)
         self._stops(time, lists.emergency_stops, session)
         self._collisions(time, session.collisions())
-        self.events += self._jams.look(session, time)
+        if self._jams.due <= time:
+            self.events += self._jams.look(session, time)
         for name in (*lists.arrived, *lists.arrived_persons):
             self._arrive(time, name)
 

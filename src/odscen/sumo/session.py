@@ -158,6 +158,20 @@ class Session:
         """How many vehicles and persons are on the road now."""
         return int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
 
+    def eventful(self) -> bool:
+        """Whether :meth:`lists` or :meth:`collisions` tell of anything in the last step."""
+        simulation = self._simulation
+        return bool(
+            simulation.getDepartedNumber()
+            or simulation.getArrivedNumber()
+            or simulation.getDepartedPersonNumber()
+            or simulation.getArrivedPersonNumber()
+            or simulation.getEmergencyStoppingVehiclesNumber()
+            or simulation.getStartingTeleportNumber()
+            or simulation.getEndingTeleportNumber()
+            or simulation.getCollisions()
+        )
+
     def lists(self) -> StepLists:
         """Id lists of the last step: one call each, whatever the number of vehicles running."""
         simulation = self._simulation

@@ -67,19 +67,23 @@ class Stepper:
         more
             Whether somebody is to come whom this simulation does not know of.
         """
+        watch, record = self._watch, self.recorder.record
         now = session.time
         if self._start is None:
             self._start = now, self.recorder.departed
+        begin = time.monotonic()
         while now < until and (more or session.expected() > 0):
-            if self._watch is not None and not self._watch.next_step(session, self.recorder):
-                break
-            begin = time.monotonic()
+            if watch is not None:
+                if not watch.next_step(session, self.recorder):
+                    break
+                begin = time.monotonic()
             session.step()
-            self.recorder.record(session, now)
+            record(session, now)
             now = session.time
             self.steps += 1
             end = time.monotonic()
             self._busy += end - begin
+            begin = end
             if end - self._sent >= MESSAGE_PAUSE:
                 self._sent = end
                 self._tell(session, now)
