@@ -138,11 +138,12 @@ class WeatherInfo(Answer):
 
 
 class AssetsInfo(Answer):
-    """The asset catalogue."""
+    """The asset catalogue, and the built-in day profiles: relative shares of equal slices."""
 
     categories: list[CategoryInfo]
     blueprints: list[BlueprintInfo]
     weather: list[WeatherInfo]
+    day_profiles: dict[str, list[float]]
 
 
 class ProblemInfo(Answer):
@@ -233,7 +234,9 @@ class NewRun(Body):
 
     ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
     simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
-    With ``carla`` it is shown on the CARLA server too, step by step.
+    Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
+    ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
+    recorded whole.
     """
 
     scenario: Name
@@ -242,7 +245,50 @@ class NewRun(Body):
     step_length: Annotated[float, Field(ge=0.01, le=1)] | None = None
     speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
     paused: bool = False
+    trajectories: bool = True
+    every: Annotated[float, Field(gt=0, le=3600)] | None = None
     carla: bool = False
+
+
+class GoOn(Body):
+    """Go on with an interrupted run; ``speed`` as in :class:`NewRun`."""
+
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+
+
+class RunForecast(Answer):
+    """What a run will need, roughly: bytes, and how many will be on the road at a time at most.
+
+    ``free`` is what the disk has; ``planned`` is how many set out in all.
+    """
+
+    planned: int
+    running: int
+    disk: int
+    memory: int
+    free: int
+
+
+class SliceInfo(Answer):
+    """A slice of a long run: simulated seconds at its end, how many were on the road then, wall
+    seconds of the run so far, and megabytes that it held.
+    """
+
+    time: float
+    running: int
+    wall_seconds: float
+    memory_mb: float
+
+
+class RunSlices(Answer):
+    """Slices of a long run: what was simulated up to ``time`` cannot be lost any more.
+
+    ``done`` is how many are complete, of ``length`` seconds each.
+    """
+
+    done: int
+    length: float
+    time: float
 
 
 class CarlaInfo(Answer):
@@ -282,7 +328,8 @@ class RunInfo(Answer):
     """A run, going on or finished; ``summary`` is that of ``summary.json``.
 
     ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
-    shown on a CARLA server, whose camera can then be watched.
+    shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
+    ``slices``; one that is ``interrupted`` can go on from the last of them.
     """
 
     run: str
@@ -295,6 +342,65 @@ class RunInfo(Answer):
     error: str | None = None
     finished: float | None = None
     carla: bool = False
+    slices: RunSlices | None = None
+
+
+class RunFile(Answer):
+    """A file of a run that can be downloaded; ``size`` in bytes."""
+
+    name: str
+    size: int
+
+
+class FitRow(Answer):
+    """One count of vehicles from ``begin`` to ``end`` (seconds) and what a run made of it.
+
+    ``x`` and ``y`` are where it was counted, metres; ``why`` says why it is not met.
+    """
+
+    counts: str
+    place: str
+    begin: float
+    end: float
+    counted: float
+    modelled: int
+    geh: float
+    met: bool
+    why: str
+    x: float | None = None
+    y: float | None = None
+
+
+class RunFit(Answer):
+    """All counts of a run's scenario against the run; ``rmse`` in vehicles per slice."""
+
+    rows: list[FitRow]
+    met: int
+    rmse: float | None
+    contradictions: list[str]
+
+
+class DayMade(Answer):
+    """A scenario that was given a day of traffic, and what that asks of the busiest junction.
+
+    ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
+    ``peak_trips`` set out.
+    """
+
+    scenario: ScenarioState
+    trips: float
+    peak_trips: float
+    place: str
+    volume: float
+    capacity: float
+
+
+class WholeDay(Body):
+    """Give a scenario a day of traffic on its whole map."""
+
+    version: Version
+    day: Literal["weekday", "weekend"] = "weekday"
+    trips: Annotated[float, Field(ge=1, le=1e6)] = 51_000.0
 
 
 class RunCurve(Answer):
@@ -331,9 +437,13 @@ class RunCurves(Answer):
 
 
 class RunContent(Answer):
-    """``digest`` is the same where scenarios differ at most in name and description."""
+    """``digest`` is the same where scenarios differ at most in name and description.
+
+    ``counts`` is how many counts of vehicles the scenario has.
+    """
 
     digest: str
+    counts: int
 
 
 class RunEvents(Answer):
