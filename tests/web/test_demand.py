@@ -59,7 +59,7 @@ def test_tables_are_read_in_and_taken_back(client: TestClient, state: dict[str, 
         (
             "od",
             "from,to,trips\nr1,r2,3\nr1,gone,3\n",
-            ["table.csv: line 3, column 'to': 'gone' is neither a zone nor a segment of the map"],
+            ["line 3, column 'to': 'gone' is neither a zone nor a segment of the map"],
         ),
         (
             "counts",
