@@ -235,12 +235,12 @@ export function Editor({ store, drawing, loaded, assets }: {
           },
           traffic: {
             title: "Traffic", done: bringsSomebody(document.demand), note: trafficNote(document.demand),
-            body: <><TrafficStep store={store} document={document} assets={assets} onEdit={changes.change} onShow={showSegments} />
+            body: <><TrafficStep store={store} document={document} profiles={profiles} onEdit={changes.change} onShow={showSegments} />
               <Button onClick={() => openStep("run")}>Next: run</Button></>,
           },
           run: {
             title: "Run", done: false, note: errors ? count(errors, "problem") + " to solve first" : "Watch it live",
-            body: <RunStep key={`${document.simulation.duration} ${document.seed}`} document={document} lights={drawing.symbols.some(([kind]) => kind.includes("light"))}
+            body: <RunStep name={name} version={scenario.version} document={document} lights={drawing.symbols.some(([kind]) => kind.includes("light"))}
               blocked={errors > 0} busy={run.busy} empty={ones.length === 0 && !bringsSomebody(document.demand)} onEdit={changes.change} onRun={run.start} />,
           },
         }} />

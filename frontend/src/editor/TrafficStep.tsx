@@ -1,11 +1,11 @@
 import { Button, Stack, Text, TextInput } from "@mantine/core";
-import { useMemo, useState } from "react";
+import { useState } from "react";
 
-import type { Assets, Edit, ScenarioDocument } from "../api/types";
+import type { Edit, ScenarioDocument } from "../api/types";
 import { BackgroundForm } from "./BackgroundForm";
 import { freeName, secondsOfDay, timeOfDay } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
-import { profilesOf } from "./DayProfiles";
+import type { Profiles } from "./DayProfiles";
 import type { EditorStore } from "./store";
 import { TableForm } from "./TableForm";
 import { WholeDay } from "./WholeDay";
@@ -13,14 +13,13 @@ import { WholeDay } from "./WholeDay";
 type Adding = "day" | "table" | null;
 
 /** Everybody who comes besides those placed by hand: background, trips from tables, counts. */
-export function TrafficStep({ store, document, assets, onEdit, onShow }: {
-  store: EditorStore; document: ScenarioDocument; assets: Assets | null; onEdit: (edit: Edit) => void;
+export function TrafficStep({ store, document, profiles, onEdit, onShow }: {
+  store: EditorStore; document: ScenarioDocument; profiles: Profiles; onEdit: (edit: Edit) => void;
   /** Shows segments on the map. */
   onShow: (segments: readonly string[]) => void;
 }) {
   const { demand } = document;
   const [adding, setAdding] = useState<Adding>(null);
-  const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
   const toggle = (what: Adding): void => setAdding(adding === what ? null : what);
   return (
