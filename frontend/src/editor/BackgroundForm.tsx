@@ -20,7 +20,7 @@ export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
           const chosen = AMOUNTS.find((one) => one.key === key);
           if (chosen && chosen !== amount) change({ [chosen.key]: chosen.begin });
         }} />
-      <Committed label={amount.word} suffix={amount.suffix} min={amount.min} max={amount.max} digits={amount.digits}
+      <Committed label={amount.unit} suffix={amount.suffix} min={amount.min} max={amount.max} digits={amount.digits}
         value={(background[amount.key] ?? amount.begin) * amount.scale}
         onCommit={(value) => { if (value !== null) change({ [amount.key]: value / amount.scale }); }} />
       <ProfileChoice value={background.profile} profiles={profiles} onChange={(profile) => change({ profile })} />

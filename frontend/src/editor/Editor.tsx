@@ -74,6 +74,10 @@ export function Editor({ store, drawing, loaded, assets }: {
   const placing = step === "actors";
   // Where segments are what one points at.
   const naming = step === "region" || step === "traffic";
+  const roads = useMemo(() => {
+    const kinds = new Map(graph.columns.segments.map(({ id, kind }) => [id, kind]));
+    return document.roi.filter((id) => kinds.get(id) !== "junction");
+  }, [graph, document.roi]);
   const profiles = useMemo(() => profilesOf(document.demand, assets?.day_profiles ?? {}), [document.demand, assets]);
 
   const scene = useMemo<Scene>(() => ({
@@ -235,7 +239,7 @@ export function Editor({ store, drawing, loaded, assets }: {
           },
           traffic: {
             title: "Traffic", done: bringsSomebody(document.demand), note: trafficNote(document.demand),
-            body: <><TrafficStep store={store} document={document} profiles={profiles} onEdit={changes.change} onShow={showSegments} />
+            body: <><TrafficStep store={store} document={document} roads={roads} profiles={profiles} onEdit={changes.change} onShow={showSegments} />
               <Button onClick={() => openStep("run")}>Next: run</Button></>,
           },
           run: {

@@ -1,5 +1,5 @@
 import { Alert, Button, Text } from "@mantine/core";
-import { useEffect, useState } from "react";
+import { useEffect, useRef, useState } from "react";
 
 import { type Forecast as Found, runs, type RunWish } from "../api/runs";
 import { bytes, count } from "../ui/words";
@@ -12,6 +12,8 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
   const { scenario, trajectories, every } = wish;
   // What was said holds for what was asked.
   useEffect(() => { setFound(null); setFailure(null); }, [scenario, version, trajectories, every]);
+  const answer = useRef<HTMLDivElement>(null);
+  useEffect(() => { if (found) answer.current?.scrollIntoView({ block: "nearest" }); }, [found]);
   const ask = (): void => {
     setBusy(true);
     setFailure(null);
@@ -22,7 +24,7 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
       <Button variant="default" loading={busy} onClick={ask}>What will it need?</Button>
       {failure && <Alert color="red" title="That cannot be told">{failure}</Alert>}
       {found && (
-        <Alert color={found.disk > found.free ? "red" : "blue"} role="status" title={found.disk > found.free ? "The disk is too small for it" : "About this much"}>
+        <Alert ref={answer} color={found.disk > found.free ? "red" : "blue"} role="status" title={found.disk > found.free ? "The disk is too small for it" : "About this much"}>
           <Text size="sm">{count(found.planned, "road user")} in all, {found.running.toLocaleString("en")} on the road at a time.</Text>
           <Text size="sm">{bytes(found.disk)} of disk ({bytes(found.free)} are free) and {bytes(found.memory)} of memory.</Text>
         </Alert>

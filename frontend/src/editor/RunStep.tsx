@@ -1,4 +1,4 @@
-import { Button, Group, NumberInput, SegmentedControl, Select, Text } from "@mantine/core";
+import { Button, NumberInput, SegmentedControl, Select, Text } from "@mantine/core";
 import { useState } from "react";
 
 import type { RunWish } from "../api/runs";
@@ -36,12 +36,10 @@ export function RunStep({ name, version, document, lights, blocked, empty, busy,
     <>
       <Duration key={duration} label="Lasts" seconds={duration} onCommit={(value) => onEdit({ kind: "set_simulation", duration: value })} />
       {long && <Text size="xs" c="dimmed">A run of more than an hour is kept hour by hour: whatever breaks it off, it can go on from the last full hour.</Text>}
-      <Group grow align="flex-start">
-        <NumberInput label="Chance number" description="same number, same traffic" inputWrapperOrder={["label", "input", "description"]} min={0} allowDecimal={false} defaultValue={seed} key={seed}
-          onBlur={(event) => { const value = Number.parseInt(event.currentTarget.value, 10); if (value >= 0 && value !== seed) onEdit({ kind: "set_seed", seed: value }); }} />
-        <Select label="Record where all are" description="for replay and counts" inputWrapperOrder={["label", "input", "description"]}
-          data={RECORDINGS} value={inCarla ? "step" : recording} disabled={inCarla} allowDeselect={false} onChange={(value) => setRecording(value ?? "step")} />
-      </Group>
+      <NumberInput label="Chance number" description="same number, same traffic" inputWrapperOrder={["label", "input", "description"]} min={0} allowDecimal={false} defaultValue={seed} key={seed}
+        onBlur={(event) => { const value = Number.parseInt(event.currentTarget.value, 10); if (value >= 0 && value !== seed) onEdit({ kind: "set_seed", seed: value }); }} />
+      <Select label="Record where everybody is" description="for watching again, charts and counts" inputWrapperOrder={["label", "input", "description"]}
+        data={RECORDINGS} value={inCarla ? "step" : recording} disabled={inCarla} allowDeselect={false} onChange={(value) => setRecording(value ?? "step")} />
       {lights && (
         <div>
           <Text size="sm" fw={500}>Traffic lights change</Text>

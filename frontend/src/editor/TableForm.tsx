@@ -2,8 +2,7 @@ import { Alert, Anchor, Button, FileButton, Group, List, Select, Text, TextInput
 import { useRef, useState } from "react";
 
 import { ApiError } from "../api/client";
-import { demand, type TableKind } from "../api/demand";
-import type { ScenarioDocument } from "../api/types";
+import { type Demand, demand, type TableKind } from "../api/demand";
 import { tell } from "../ui/notices";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
@@ -21,7 +20,11 @@ interface Refusal {
 }
 
 /** Reads a table into the scenario, all of it or nothing. */
-export function TableForm({ store, document }: { store: EditorStore; document: ScenarioDocument }) {
+export function TableForm({ store, demand: known, roads }: {
+  store: EditorStore; demand: Demand;
+  /** Roads of the region, for the example. */
+  roads: readonly string[];
+}) {
   const { name, take } = store();
   const [kind, setKind] = useState<TableKind>("od");
   const [part, setPart] = useState("trips");
@@ -29,7 +32,7 @@ export function TableForm({ store, document }: { store: EditorStore; document: S
   const [refusal, setRefusal] = useState<Refusal | null>(null);
   const reset = useRef<() => void>(null);
   const chosen = KINDS.find((one) => one.value === kind) ?? KINDS[0];
-  const example = exampleTable(kind, document.demand, document.roi);
+  const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
     const found = KINDS.find((one) => one.value === next);
     if (!found) return;

@@ -13,8 +13,8 @@ import { WholeDay } from "./WholeDay";
 type Adding = "day" | "table" | null;
 
 /** Everybody who comes besides those placed by hand: background, trips from tables, counts. */
-export function TrafficStep({ store, document, profiles, onEdit, onShow }: {
-  store: EditorStore; document: ScenarioDocument; profiles: Profiles; onEdit: (edit: Edit) => void;
+export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }: {
+  store: EditorStore; document: ScenarioDocument; roads: readonly string[]; profiles: Profiles; onEdit: (edit: Edit) => void;
   /** Shows segments on the map. */
   onShow: (segments: readonly string[]) => void;
 }) {
@@ -38,7 +38,7 @@ export function TrafficStep({ store, document, profiles, onEdit, onShow }: {
         <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>A weekday of the whole town</Button>
         {adding === "day" && <WholeDay store={store} onDone={() => setAdding(null)} />}
         <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>Add from a table</Button>
-        {adding === "table" && <TableForm store={store} document={document} />}
+        {adding === "table" && <TableForm store={store} demand={demand} roads={roads} />}
       </Stack>
       <ProfileList profiles={profiles} own={demand.profiles.map(({ id }) => id)} onRemove={remove} />
       <Text size="xs" c="dimmed">Whoever was placed by hand keeps place and time, whatever is added here.</Text>

@@ -4,9 +4,9 @@ import { CATEGORY_WORD, count } from "../ui/words";
 
 /** Ways to say how much background traffic there is, with what to begin with. */
 export const AMOUNTS = [
-  { key: "fill", word: "Share of the room on the roads", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
-  { key: "per_km", word: "Vehicles per kilometre of lane", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
-  { key: "trips", word: "Trips in all", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
+  { key: "fill", word: "Share of the room on the roads", unit: "Percent", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
+  { key: "per_km", word: "Vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
+  { key: "trips", word: "Trips in all", unit: "Trips", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
 ] as const;
 export type Amount = (typeof AMOUNTS)[number];
 
@@ -69,9 +69,9 @@ export function peakWords(shares: readonly number[]): string {
   return `most from ${at(shares.indexOf(Math.max(...shares)))}, fewest from ${at(shares.indexOf(Math.min(...shares)))}`;
 }
 
-/** What a table looks like, with places of the scenario's own; it can be read in as it is. */
-export function exampleTable(kind: TableKind, demand: Demand, roi: readonly string[]): string {
-  const [a, b] = [roi[0] ?? "r1", roi[1] ?? roi[0] ?? "r2"];
+/** What a table looks like, with roads of the scenario's own; it can be read in as it is. */
+export function exampleTable(kind: TableKind, demand: Demand, roads: readonly string[]): string {
+  const [a, b] = [roads[0] ?? "r1", roads[1] ?? roads[0] ?? "r2"];
   const start = demand.clock;
   const slice = (n: number): string => `${timeOfDay(start + 900 * n)},${timeOfDay(start + 900 * (n + 1))}`;
   const rows: Record<TableKind, string[]> = {

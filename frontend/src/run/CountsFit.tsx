@@ -34,7 +34,7 @@ export function CountsFit({ run, onFit, onShow }: {
         {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}</Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (
-        <Alert color="yellow" title="Counts that cannot be right together" mb="md">
+        <Alert color="gray" title="Counts that cannot be right together" mb="md">
           <List size="sm">{contradictions.slice(0, 20).map((text) => <List.Item key={text}>{text}</List.Item>)}</List>
         </Alert>
       )}
@@ -42,7 +42,7 @@ export function CountsFit({ run, onFit, onShow }: {
       {rows.length > met && <Text size="xs" c="dimmed">Choose one to see its place.</Text>}
       {shown.length === 0 && <Text size="sm">Every count is met.</Text>}
       {shown.length > 0 && (
-        <Table mt="xs" verticalSpacing={4} fz={13} aria-label={all ? "All counts" : "Counts that are not met"}>
+        <Table mt="xs" verticalSpacing={4} horizontalSpacing={5} fz={13} aria-label={all ? "All counts" : "Counts that are not met"}>
           <Table.Thead><Table.Tr><Table.Th>Place</Table.Th><Table.Th>When</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
           {shown.slice(0, LISTED).map((row) => <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />)}
         </Table>
@@ -61,7 +61,7 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
         <Table.Th scope="row" fw={400}>{x !== null && y !== null
           ? <button type="button" className="row-button" onClick={() => onShow(x, y)}>{place.replaceAll(">", " > ")}</button>
           : place.replaceAll(">", " > ")}</Table.Th>
-        <Table.Td>{span(begin, end)}</Table.Td><Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
+        <Table.Td style={{ whiteSpace: "nowrap" }}>{span(begin, end)}</Table.Td><Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
         <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td><Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
       </Table.Tr>
       {why && <Table.Tr><Table.Td colSpan={5} c="dimmed" pt={0}>{why}</Table.Td></Table.Tr>}

@@ -7,6 +7,7 @@ import { tellError } from "../ui/notices";
 import { go } from "../ui/route";
 import { Comparison } from "./Comparison";
 import { keyFigures } from "./figures";
+import { Files } from "./Files";
 import { Interrupted, SliceTable } from "./LongRun";
 
 /** Nobody watches a longer run in real time. */
@@ -43,6 +44,7 @@ export function Result({ info, scenario, onBack, onGoOn }: {
       </Group>
       {info.summary && !failed && <SliceTable summary={info.summary} />}
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
+      {info.summary && !failed && <Files run={info.run} />}
     </section>
   );
 }

@@ -11,7 +11,6 @@ import { go } from "../ui/route";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
 import { hasEnded } from "./figures";
-import { Files } from "./Files";
 import { countMarks } from "./fit";
 import type { Crowd } from "./frames";
 import { IncidentLog } from "./IncidentLog";
@@ -30,7 +29,7 @@ import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
 import { useGround, useRun } from "./useRun";
 
-type Tab = "result" | "charts" | "counts" | "files" | "users" | "events" | "runs";
+type Tab = "result" | "charts" | "counts" | "users" | "events" | "runs";
 
 /** Watches one run from above; one that goes on after an interruption is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
@@ -124,7 +123,6 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
               {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}
               {replayable && <Tabs.Tab value="charts">Charts</Tabs.Tab>}
               {counts > 0 && <Tabs.Tab value="counts">Counts</Tabs.Tab>}
-              {replayable && <Tabs.Tab value="files">Files</Tabs.Tab>}
               <Tabs.Tab value="users">Road users</Tabs.Tab>
               <Tabs.Tab value="events">Events{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}</Tabs.Tab>
               <Tabs.Tab value="runs">Runs</Tabs.Tab>
@@ -132,7 +130,6 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
             <Tabs.Panel value="result" className="run-panel"><Result info={info} scenario={scenario} onBack={back} onGoOn={onGoOn} /></Tabs.Panel>
             <Tabs.Panel value="charts" className="run-panel"><Plots run={run} /></Tabs.Panel>
             <Tabs.Panel value="counts" className="run-panel"><CountsFit run={run} onFit={setFit} onShow={(x, y) => { follow(null); handle.current?.centre(x, y); }} /></Tabs.Panel>
-            <Tabs.Panel value="files" className="run-panel"><Files run={run} /></Tabs.Panel>
             <Tabs.Panel value="users" className="run-panel">{!ended && <SafeSlices info={info} />}<RoadUsers picture={picture} wanted={shownTab === "users"} /></Tabs.Panel>
             <Tabs.Panel value="events" className="run-panel">
               <IncidentLog incidents={incidents} categories={categories} over={ended} onShow={({ x, y, time: at }) => {
