@@ -160,7 +160,7 @@ def with_whole_day(
     scenario = edits.set_simulation(scenario, duration=DAY)
     scenario = demand_edits.set_clock(scenario, clock=0.0)
     scenario = demand_edits.set_matrix(
-        scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX, begin=0.0, end=None
+        scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX, begin=0.0, end=DAY
     )
     return scenario, load
 

@@ -97,7 +97,7 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     assert set(document["roi"]) == set(ids)
     assert document["simulation"]["duration"] == 86_400
     (matrix,) = document["demand"]["matrices"]
-    assert matrix["profile"] == "weekday"
+    assert (matrix["profile"], matrix["begin"], matrix["end"]) == ("weekday", 0, 86_400)
     assert sum(row[2] for row in matrix["trips"]) == pytest.approx(made["trips"], rel=0.02)
     assert made["volume"] < made["capacity"]
     assert not [one for one in made["scenario"]["problems"] if one["severity"] == "error"]

@@ -4,7 +4,7 @@ import { type ReactNode, useState } from "react";
 import type { Counts, Matrix, Mix, Zone } from "../api/demand";
 import type { Edit } from "../api/types";
 import { IconTrash } from "../ui/icons";
-import { count } from "../ui/words";
+import { count, span } from "../ui/words";
 import { ProfileChart, ProfileChoice, type Profiles, profileWord } from "./DayProfiles";
 import { mixWords, timeOfDay, tripsOf } from "./demand";
 import { MixForm } from "./MixForm";
@@ -43,7 +43,8 @@ export function MatrixForm({ matrix, profiles, onEdit, onRemove }: {
   matrix: Matrix; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
 }) {
   const change = (fields: object): void => onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
-  const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}`;
+  const when = matrix.end === null ? "until the end of the run" : `from ${span(matrix.begin, matrix.end).replace("–", " to ")} h of the run`;
+  const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}, ${when}`;
   return (
     <PartCard name={matrix.id} what="Trips from where to where" note={note} onRemove={onRemove}>
       <ProfileChoice value={matrix.profile} profiles={profiles} onChange={(profile) => change({ profile })} />

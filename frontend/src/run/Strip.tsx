@@ -33,7 +33,7 @@ export function LiveStrip({ info, now, onBack, learn }: {
         {state === "paused"
           ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Go on</Button>
           : <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>Pause</Button>}
-        <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>
+        {!info.slices && <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>}
         <Button variant="default" leftSection={<IconStop />} disabled={!going && state !== "preparing"} onClick={() => control("stop")}>Stop</Button>
         {info.slices && <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>Go on later</Button>}
         <SpeedChoice speeds={SPEEDS} speed={info.speed ?? null} onChange={(speed) => control("speed", speed)} />
