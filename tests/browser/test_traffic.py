@@ -71,7 +71,7 @@ def test_background_traffic_is_added_changed_and_taken_back(
         user.page.keyboard.press("Enter")
     with user.changing():
         user.page.get_by_label("Time of day at the start").fill("07:30")
-        user.page.keyboard.press("Tab")
+        user.page.keyboard.press("Enter")
     demand = user.document()["demand"]
     assert demand["clock"] == 7.5 * HOUR
     (one,) = demand["background"]

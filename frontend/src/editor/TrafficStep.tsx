@@ -21,14 +21,16 @@ export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }
   const { demand } = document;
   const [adding, setAdding] = useState<Adding>(null);
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
+  const setClock = (text: string): void => {
+    const clock = secondsOfDay(text);
+    if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60)) onEdit({ kind: "set_clock", clock });
+  };
   const toggle = (what: Adding): void => setAdding(adding === what ? null : what);
   return (
     <>
       <TextInput type="time" label="Time of day at the start" key={demand.clock} defaultValue={timeOfDay(demand.clock)}
-        onBlur={(event) => {
-          const clock = secondsOfDay(event.currentTarget.value);
-          if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60)) onEdit({ kind: "set_clock", clock });
-        }} />
+        onBlur={(event) => setClock(event.currentTarget.value)}
+        onKeyDown={(event) => { if (event.key === "Enter") setClock(event.currentTarget.value); }} />
       {demand.background.map((one) => <BackgroundForm key={one.id} background={one} profiles={profiles} onEdit={onEdit} onRemove={() => remove(one.id)} />)}
       {demand.matrices.map((one) => <MatrixForm key={one.id} matrix={one} profiles={profiles} onEdit={onEdit} onRemove={() => remove(one.id)} />)}
       {demand.counts.map((one) => <CountsList key={one.id} counts={one} onEdit={onEdit} onShow={onShow} onRemove={() => remove(one.id)} />)}

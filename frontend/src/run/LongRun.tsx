@@ -51,14 +51,15 @@ export function SliceTable({ summary }: { summary: Summary }) {
   return (
     <details className="words" style={{ marginTop: 18 }}>
       <summary>The {done.length} parts of the run</summary>
+      <Text size="xs" c="dimmed">How many were on the road at the end of each, and what it took the machine.</Text>
       <Table mt="xs" verticalSpacing={3} fz={13} aria-label="Parts of the run">
-        <Table.Thead><Table.Tr><Table.Th>Part</Table.Th><Table.Th ta="right">On the road at its end</Table.Th><Table.Th ta="right">Took</Table.Th><Table.Th ta="right">Memory</Table.Th></Table.Tr></Table.Thead>
+        <Table.Thead><Table.Tr><Table.Th>Part</Table.Th><Table.Th ta="right">On the road</Table.Th><Table.Th ta="right">Took</Table.Th><Table.Th ta="right">Memory</Table.Th></Table.Tr></Table.Thead>
         <Table.Tbody>
           {done.map((one, n) => (
             <Table.Tr key={one.time}>
-              <Table.Th scope="row" fw={400}>{span(done[n - 1]?.time ?? 0, one.time)}</Table.Th>
+              <Table.Th scope="row" fw={400} style={{ whiteSpace: "nowrap" }}>{span(done[n - 1]?.time ?? 0, one.time)}</Table.Th>
               <Table.Td ta="right">{one.running.toLocaleString("en")}</Table.Td>
-              <Table.Td ta="right">{(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0)).toFixed(1)} s</Table.Td>
+              <Table.Td ta="right" style={{ whiteSpace: "nowrap" }}>{(one.wall_seconds - (done[n - 1]?.wall_seconds ?? 0)).toFixed(1)} s</Table.Td>
               <Table.Td ta="right">{Math.round(one.memory_mb).toLocaleString("en")} MB</Table.Td>
             </Table.Tr>
           ))}
