@@ -1,5 +1,5 @@
 import { Alert, Anchor, Button, FileButton, Group, List, Select, Text, TextInput } from "@mantine/core";
-import { useRef, useState } from "react";
+import { useEffect, useRef, useState } from "react";
 
 import { ApiError } from "../api/client";
 import { type Demand, demand, type TableKind } from "../api/demand";
@@ -31,6 +31,8 @@ export function TableForm({ store, demand: known, roads }: {
   const [busy, setBusy] = useState(false);
   const [refusal, setRefusal] = useState<Refusal | null>(null);
   const reset = useRef<() => void>(null);
+  const alert = useRef<HTMLDivElement>(null);
+  useEffect(() => { if (refusal) alert.current?.scrollIntoView({ block: "nearest" }); }, [refusal]);
   const chosen = KINDS.find((one) => one.value === kind) ?? KINDS[0];
   const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
@@ -62,7 +64,7 @@ export function TableForm({ store, demand: known, roads }: {
       {chosen.stem && <TextInput label="Name" description="what has this name already is replaced" inputWrapperOrder={["label", "input", "description"]}
         value={part} onChange={(event) => setPart(event.currentTarget.value)} />}
       {refusal && (
-        <Alert color="red" title={`${refusal.file} was not read in`} style={{ overflowWrap: "anywhere" }}>
+        <Alert ref={alert} color="red" title={`${refusal.file} was not read in`} style={{ overflowWrap: "anywhere" }}>
           {refusal.problems.length === 1 ? refusal.problems[0]
             : <List size="sm">{refusal.problems.map((problem) => <List.Item key={problem}>{problem}</List.Item>)}</List>}
         </Alert>
