@@ -111,7 +111,7 @@ def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> Non
         user.run.click()
         expect(user.result).to_contain_text("finished", timeout=120_000)
         user.page.get_by_role("tab", name="Counts").click()
-        expect(user.page.get_by_role("heading", name="met")).to_be_visible()
+        expect(user.page.get_by_role("heading", name="counts met")).to_be_visible()
         camera.take("counts")
         user.open_editor(LONG)
         user.step("Run").click()

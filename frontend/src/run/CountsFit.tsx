@@ -43,7 +43,7 @@ export function CountsFit({ run, onFit, onShow }: {
       {shown.length === 0 && <Text size="sm">Every count is met.</Text>}
       {shown.length > 0 && (
         <Table mt="xs" verticalSpacing={4} horizontalSpacing={5} fz={13} aria-label={all ? "All counts" : "Counts that are not met"}>
-          <Table.Thead><Table.Tr><Table.Th>Place</Table.Th><Table.Th>When</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
+          <Table.Thead><Table.Tr><Table.Th>Place and time</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
           {shown.slice(0, LISTED).map((row) => <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />)}
         </Table>
       )}
@@ -60,11 +60,11 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
       <Table.Tr>
         <Table.Th scope="row" fw={400}>{x !== null && y !== null
           ? <button type="button" className="row-button" onClick={() => onShow(x, y)}>{place.replaceAll(">", " > ")}</button>
-          : place.replaceAll(">", " > ")}</Table.Th>
-        <Table.Td style={{ whiteSpace: "nowrap" }}>{span(begin, end)}</Table.Td><Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
+          : place.replaceAll(">", " > ")}<div className="fit-time">{span(begin, end)} h</div></Table.Th>
+        <Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
         <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td><Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
       </Table.Tr>
-      {why && <Table.Tr><Table.Td colSpan={5} c="dimmed" pt={0}>{why}</Table.Td></Table.Tr>}
+      {why && <Table.Tr><Table.Td colSpan={4} c="dimmed" pt={0}>{why}</Table.Td></Table.Tr>}
     </Table.Tbody>
   );
 }
