@@ -16,11 +16,16 @@ from playwright.sync_api import Browser, expect
 from odscen import workflow
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
+from odscen.scenario import demand_edits, edits
+from odscen.scenario.counting import transitions
+from odscen.scenario.document import Scenario
 from tests.browser.pages import OdscenPage, settle
 from tools import page as tool
 
 IMAGES = tool.ROOT / "docs/images"
 MAP = "town_5x5"
+SMALL = "signal_crossing"
+COUNTED, LONG = "morning", "night"
 SIZE = {"width": 1280, "height": 800}
 LARGEST = 400_000
 
@@ -52,9 +57,69 @@ def main() -> None:
             workspace.add_map(path)
         made = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.15, roi_segments=7)[0]
         scenario = made.name.removesuffix(workflow.SUFFIX)
+        _counted(workspace)
+        _long(workspace)
         with tool.served(Path(name)) as server, tool.launched() as browser:
             for scheme in ("light", "dark"):
                 _views(browser, server.url, scheme, scenario, folder)
+                _traffic_views(browser, server.url, scheme, folder)
+
+
+def _counted(workspace: Workspace) -> None:
+    """Save a scenario with background traffic and counts, some of which contradict each other."""
+    graph = workflow.load_map(workspace.map(MAP)).sumo.graph
+    scenario = edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
+    scenario = demand_edits.set_clock(scenario, clock=7.5 * 3600)
+    mix = {"car": 8, "van": 1, "bicycle": 1}
+    scenario = demand_edits.set_background(
+        scenario, graph, background="others", per_km=2, profile="weekday", mix=mix
+    )
+    streams = sorted(
+        (one, other)
+        for one, others in transitions(graph).items()
+        for other in others
+        if one.startswith("r")
+    )[::3]
+    rows = [(f"{one}>{other}", 0, 600, 5 + 7 * n % 30) for n, (one, other) in enumerate(streams)]
+    scenario = demand_edits.set_counts(scenario, graph, counts="survey", rows=rows)
+    _save(workspace, COUNTED, scenario)
+
+
+def _long(workspace: Workspace) -> None:
+    """Save a scenario of hours."""
+    graph = workflow.load_map(workspace.map(SMALL)).sumo.graph
+    scenario = edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
+    scenario = edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
+    scenario = demand_edits.set_background(scenario, graph, background="others", trips=1200)
+    _save(workspace, LONG, scenario)
+
+
+def _save(workspace: Workspace, name: str, scenario: Scenario) -> None:
+    workflow.write_scenario(scenario, workspace.scenarios / f"{name}{workflow.SUFFIX}")
+
+
+def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> None:
+    with browser.new_context(base_url=url, viewport=SIZE, color_scheme=scheme) as context:
+        context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
+        user = OdscenPage(context.new_page())
+        camera = Camera(user, scheme, folder)
+        user.open_editor(COUNTED)
+        user.step("Traffic").click()
+        camera.take("traffic")
+        user.step("Run").click()
+        user.choose_pace("As fast as it can")
+        user.run.click()
+        expect(user.result).to_contain_text("finished", timeout=120_000)
+        user.page.get_by_role("tab", name="Counts").click()
+        expect(user.page.get_by_role("heading", name="counts met")).to_be_visible()
+        camera.take("counts")
+        user.open_editor(LONG)
+        user.step("Run").click()
+        user.run.click()
+        expect(user.page.get_by_text("1 of 4 parts done")).to_be_visible(timeout=120_000)
+        user.control("Go on later").click()
+        expect(user.result).to_contain_text("interrupted")
+        camera.take("interrupted")
 
 
 def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path) -> None:

@@ -14,11 +14,12 @@ const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   style: "normal", ego: false, crosses_anywhere: false, ignores_red: false,
 });
 const flow = (id: string, spawn: string): Flow => ({
-  id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null,
+  id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null, profile: null,
 });
 const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
   name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
   environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows,
+  demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
   signals: { control: "fixed", junctions: [] },
   simulation: { duration: 60, step_length: 0.5 },
 });

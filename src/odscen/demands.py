@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from odscen import workflow
-from odscen.errors import InputError, in_file
+from odscen.errors import InputError, ScenarioError, in_file
 from odscen.scenario import demand_edits, edits
 from odscen.scenario.profiles import DAY
-from odscen.scenario.tables import read_counts, read_matrix, read_profile, read_zones
+from odscen.scenario.tables import COLUMNS, read_counts, read_matrix, read_profile, read_zones
 from odscen.sumo.fit import planned_fit, run_fit
-from odscen.sumo.layout import SCENARIO_FILE, TRAJECTORIES_FILE
+from odscen.sumo.layout import SCENARIO_FILE
+from odscen.sumo.recorded import trajectory_files
 from odscen.sumo.town_day import TOWN_MIX, town_day
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from odscen.catalog.store import Workspace
@@ -56,37 +60,57 @@ def import_table(
     ScenarioError
         If the scenario has no such places.
     """
-    graph = _loaded(workspace, scenario).sumo.graph
+    loaded = _loaded(workspace, scenario)
     with in_file(str(file)):
-        text, clock = _text(file), scenario.demand.clock
-        if kind == "zones":
-            for zone, segments in read_zones(text).items():
-                scenario = demand_edits.set_zone(scenario, graph, zone=zone, segments=segments)
-            return scenario
-        if kind == "profile":
-            shares = read_profile(text)
-            return demand_edits.set_profile(
-                scenario, graph, profile=name or "profile", shares=shares
-            )
-        if kind == "counts":
-            rows = read_counts(text, clock=clock)
-            return demand_edits.set_counts(
-                scenario, graph, counts=name or "counts", rows=rows, **fields
-            )
-        slices = read_matrix(text, clock=clock)
-        for number, (when, trips) in enumerate(slices.items(), start=1):
-            whole = when is None and len(slices) == 1
-            own: dict[str, Any] = {} if when is None else {"begin": when[0], "end": when[1]}
-            scenario = demand_edits.set_matrix(
-                scenario,
-                graph,
-                matrix=(name or "trips") + ("" if whole else f"-{number}"),
-                trips=trips,
-                profile=day,
-                **own,
-                **fields,
-            )
+        return import_text(loaded, scenario, _text(file), kind=kind, name=name, day=day, **fields)
+
+
+def import_text(
+    loaded: LoadedMap,
+    scenario: Scenario,
+    text: str,
+    *,
+    kind: str,
+    name: str | None = None,
+    day: str | None = None,
+    **fields: Any,
+) -> Scenario:
+    """Read the text of a table into a scenario, all of it or nothing.
+
+    Parameters as in :func:`import_table`.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be used; names line and column.
+    """
+    graph, clock = loaded.sumo.graph, scenario.demand.clock
+    if kind == "zones":
+        for zone, named in read_zones(text).items():
+            with _by_line(scenario, kind, zone, named.lines):
+                scenario = demand_edits.set_zone(scenario, graph, zone=zone, segments=named.values)
         return scenario
+    if kind == "profile":
+        shares = read_profile(text)
+        own = name or "profile"
+        with _by_line(scenario, kind, own, ()):
+            return demand_edits.set_profile(scenario, graph, profile=own, shares=shares)
+    if kind == "counts":
+        counted, own = read_counts(text, clock=clock), name or "counts"
+        with _by_line(scenario, kind, own, counted.lines):
+            return demand_edits.set_counts(
+                scenario, graph, counts=own, rows=counted.values, **fields
+            )
+    slices = read_matrix(text, clock=clock)
+    for number, (when, trips) in enumerate(slices.items(), start=1):
+        whole = when is None and len(slices) == 1
+        own = (name or "trips") + ("" if whole else f"-{number}")
+        window = {} if when is None else {"begin": when[0], "end": when[1]}
+        with _by_line(scenario, kind, own, trips.lines):
+            scenario = demand_edits.set_matrix(
+                scenario, graph, matrix=own, trips=trips.values, profile=day, **window, **fields
+            )
+    return scenario
 
 
 def add_background(
@@ -107,13 +131,36 @@ def whole_day(
 ) -> tuple[Scenario, Load]:
     """Make 24 hours of traffic on a whole map, from midnight on; see :func:`town_day`."""
     loaded = workflow.load_map(workspace.map(map_name))
+    scenario = edits.new_scenario(loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed)
+    return with_whole_day(loaded, scenario, trips=trips, day=day)
+
+
+def with_whole_day(
+    loaded: LoadedMap, scenario: Scenario, *, trips: float = 51_000.0, day: str = "weekday"
+) -> tuple[Scenario, Load]:
+    """Give a scenario 24 hours of traffic on its whole map, from midnight on.
+
+    Its region becomes the whole map; road users that are there stay. A matrix of that name is
+    replaced.
+
+    Raises
+    ------
+    ScenarioError
+        If the map is in several pieces.
+    InputError
+        If there is no such day, or no trips are possible.
+    """
     graph = loaded.sumo.graph
-    scenario = edits.new_scenario(graph, name=f"{day} on {map_name}", roi=graph.segments.ids)
-    scenario = edits.set_seed(scenario, seed=seed)
+    empty = edits.new_scenario(
+        graph, name=scenario.name, roi=graph.segments.ids, seed=scenario.seed
+    )
+    matrix, load = town_day(empty, loaded.sumo, trips=trips, day=day)
+    roi = tuple(dict.fromkeys((*scenario.roi, *empty.roi)))
+    scenario = scenario.model_copy(update={"roi": roi})
     scenario = edits.set_simulation(scenario, duration=DAY)
-    matrix, load = town_day(scenario, loaded.sumo, trips=trips, day=day)
+    scenario = demand_edits.set_clock(scenario, clock=0.0)
     scenario = demand_edits.set_matrix(
-        scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX
+        scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX, begin=0.0, end=DAY
     )
     return scenario, load
 
@@ -139,11 +186,43 @@ def fit(workspace: Workspace, what: Path) -> Fit:
     loaded = _loaded(workspace, scenario)
     if folder is None:
         return planned_fit(scenario, loaded.sumo)
-    trajectories = folder / TRAJECTORIES_FILE
-    if not trajectories.is_file():
+    trajectories = trajectory_files(folder)
+    if not trajectories:
         msg = "the run has no trajectories to count in"
         raise InputError(msg, file=str(what))
     return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
+
+
+_FIELDS = {"od": "matrices", "counts": "counts", "profile": "profiles", "zones": "zones"}
+"""Where in the document's demand the rows of a table come to stand, by its kind."""
+
+
+@contextmanager
+def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> Iterator[None]:
+    """Say of problems of the part that is being read in which line and column they stand."""
+    parts = getattr(scenario.demand, _FIELDS[kind])
+    index = next((i for i, one in enumerate(parts) if one.id == name), len(parts))
+    row = r"(?:\.\w+\[(?P<row>\d+)\](?:\[(?P<cell>\d+)\])?)?"
+    own = re.compile(rf"demand\.{_FIELDS[kind]}\[{index}\]{row}[^:]*: ")
+
+    def told(match: re.Match[str]) -> str:
+        if match["row"] is None or not lines:
+            return ""
+        column = COLUMNS[kind][int(match["cell"] or 0)]
+        exact = match["cell"] is not None or len(COLUMNS[kind]) == 1
+        return f"line {lines[int(match['row'])]}{f', column {column!r}' if exact else ''}: "
+
+    try:
+        yield
+    except ScenarioError as error:
+        problems = [f"{error.element}: {error.problem}"] if error.element else error.problems
+        if not any(own.match(problem) for problem in problems):
+            raise
+        found = [own.sub(told, problem, count=1) for problem in problems]
+        if len(found) == 1:
+            raise ScenarioError(found[0]) from error
+        msg = f"{len(found)} problems"
+        raise ScenarioError(msg, problems=found) from error
 
 
 def _loaded(workspace: Workspace, scenario: Scenario) -> LoadedMap:

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from odscen.scenario.problems import Problem
     from odscen.scenario.signals import Light
     from odscen.scenario.supply import Usable
+    from odscen.sumo.process import Companion
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunResult
 
@@ -287,6 +288,7 @@ def resume(
     time_limit: float | None = None,
     progress: Callable[[Progress], None] | None = None,
     tell: Callable[[str], None] | None = None,
+    live: Companion | None = None,
 ) -> RunResult:
     """Go on with an interrupted run and write its report.
 
@@ -296,6 +298,8 @@ def resume(
         Its folder, or its name in the workspace.
     tell
         Called with where it goes on, and what is damaged.
+    live
+        Makes it a run that can be watched and steered.
 
     Raises
     ------
@@ -316,7 +320,7 @@ def resume(
 
     folder = run if run.is_dir() else workspace.runs / run
     return long_runs.resume(
-        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish
+        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
     )
 
 

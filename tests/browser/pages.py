@@ -304,6 +304,16 @@ class OdscenPage:
         ).first.click()
         self.page.get_by_role("option", name=re.compile(word)).click()
 
+    def choose(self, label: str, word: str) -> None:
+        """Choose from the list with this label."""
+        self.page.get_by_role("textbox", name=label).first.click()
+        self.page.get_by_role("option", name=word, exact=True).click()
+
+    def choose_pace(self, word: str) -> None:
+        """Choose how fast a run begins."""
+        pace = self.page.get_by_role("radiogroup", name="Pace at the start")
+        pace.get_by_text(word, exact=True).click()
+
     # What the server knows
 
     def get(self, path: str) -> Any:

@@ -116,7 +116,7 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
     user.wait_for_editor()
     inspector.look("editor-new")
     user.open_editor(sampled)
-    for step in ("Map", "Region", "Weather and time", "Road users", "Run"):
+    for step in ("Map", "Region", "Weather and time", "Road users", "Traffic", "Run"):
         user.step(step).click()
         inspector.look("editor-" + step.lower().replace(" ", "-"))
     user.step("Weather and time").click()
@@ -138,6 +138,70 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
         inspector.look(f"editor-{view}")
         user.page.keyboard.press("Escape")
         expect(user.page.get_by_role("dialog")).to_have_count(0)
+
+
+def test_traffic_and_counts(
+    visit: Callable[..., Any], served: tool.Served, sampled: str, tmp_path: Path
+) -> None:
+    user, inspector = visit(served.url)
+    user.open_editor(sampled)
+    user.step("Traffic").click()
+    with user.changing():
+        user.page.get_by_role("button", name="Add background traffic").click()
+    user.choose("Spread over the day", "Weekday")
+    user.page.get_by_role("button", name="Change the kinds").click()
+    user.page.get_by_role("button", name="A weekday of the whole town").click()
+    user.page.get_by_role("button", name="Show the day profiles").click()
+    inspector.look("editor-traffic-day")
+    user.page.get_by_role("button", name="Add from a table").click()
+    table = tmp_path / "table.csv"
+    place = user.document()["roi"][0]
+    good = f"place,begin,end,count\n{place},0,300,10\n{place},300,600,0\n"
+    for text in ("place,begin,end\n", good):
+        table.write_text(text)
+        user.choose("What the table has", "Counts")
+        with user.page.expect_file_chooser() as chooser:
+            user.page.get_by_role("button", name="Choose a table").click()
+        chooser.value.set_files(table)
+        if text != good:
+            expect(user.page.get_by_text("was not read in")).to_be_visible()
+            inspector.look("editor-traffic-refused")
+    expect(user.page.get_by_text("is read in")).to_be_visible()
+    inspector.look("editor-traffic-counts")
+    user.step("Run").click()
+    user.page.get_by_role("button", name="What will it need?").click()
+    expect(user.page.get_by_text("of memory")).to_be_visible()
+    inspector.look("editor-run-forecast")
+    user.choose_pace("As fast as it can")
+    user.run.click()
+    expect(user.result).to_contain_text("finished", timeout=60_000)
+    user.result.get_by_text("Download the results").click()
+    expect(user.result.get_by_role("link", name="Key figures")).to_be_visible()
+    inspector.look("run-files")
+    user.page.get_by_role("tab", name="Counts").click()
+    user.page.get_by_role("button", name="Show all counts").click()
+    expect(user.page.get_by_role("table", name="All counts")).to_be_visible()
+    inspector.look("run-counts")
+
+
+def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
+    user, inspector = visit(served.url)
+    user.open_editor(sampled)
+    user.step("Traffic").click()
+    with user.changing():
+        user.page.get_by_role("button", name="Add background traffic").click()
+    user.step("Run").click()
+    user.choose("Lasts: unit", "hours")
+    with user.changing():
+        user.page.get_by_role("textbox", name="Lasts", exact=True).fill("6")
+        user.page.keyboard.press("Enter")
+    user.choose_pace("Real time")
+    user.run.click()
+    user.wait_until_moving()
+    inspector.look("run-long")
+    user.control("Go on later").click()
+    expect(user.result).to_contain_text("interrupted")
+    inspector.look("run-interrupted")
 
 
 def test_the_tour(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:

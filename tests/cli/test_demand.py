@@ -66,7 +66,13 @@ def test_a_wrong_table_is_refused_with_file_and_line_and_changes_nothing(
     table.write_text("from,to,trips\nr1,nowhere,3\n")
     done = odscen("demand", "import", scenario, "--od", table, "--workspace", workspace)
     assert done.code == 2
-    assert "'nowhere' is neither a zone nor a segment" in done.err
+    told = "trips.csv: line 2, column 'to': 'nowhere' is neither a zone nor a segment"
+    assert told in done.err
+    table.write_text("from,to,trips\nr1,r2,3\n\nr7,r8,1\nr1,r2,4\n")
+    done = odscen("demand", "import", scenario, "--od", table, "--workspace", workspace)
+    assert "line 4, column 'from': 'r7' is neither" in done.err
+    assert "line 4, column 'to': 'r8' is neither" in done.err
+    assert "line 5: trips from 'r1' to 'r2' are given 2 times" in done.err
     assert Path(scenario).read_bytes() == before
 
 

@@ -175,15 +175,21 @@ def test_a_way_passes_streams_turns_and_segments() -> None:
 
 def test_tables_are_read_with_seconds_or_times_of_day() -> None:
     text = "place;begin;end;count\nr1 > j9;7:00;7:15;12\nr1>j9;26100;27000;9\n"
-    assert read_counts(text) == (("r1>j9", 25200, 26100, 12), ("r1>j9", 26100, 27000, 9))
-    assert read_counts(text.splitlines()[0] + "\nr1;7:00;7:15;12", clock=25200) == (
+    assert read_counts(text) == (
+        (("r1>j9", 25200, 26100, 12), ("r1>j9", 26100, 27000, 9)),
+        (2, 3),
+    )
+    assert read_counts(text.splitlines()[0] + "\nr1;7:00;7:15;12", clock=25200).values == (
         ("r1", 0, 900, 12),
     )
-    assert read_matrix("from,to,trips\na,b,3\n") == {None: (("a", "b", 3),)}
-    sliced = read_matrix("from,to,trips,begin,end\na,b,3,0,900\na,b,4,900,1800\n")
-    assert sliced == {(0, 900): (("a", "b", 3),), (900, 1800): (("a", "b", 4),)}
+    assert read_matrix("from,to,trips\n\na,b,3\n") == {None: ((("a", "b", 3),), (3,))}
+    sliced = read_matrix("from,to,trips,begin,end\na,b,3,0,900\na,b,4,900,1800\nb,a,1,0,900\n")
+    assert sliced == {
+        (0, 900): ((("a", "b", 3), ("b", "a", 1)), (2, 4)),
+        (900, 1800): ((("a", "b", 4),), (3,)),
+    }
     assert read_profile("time,share\n0:00,1\n12:00,3\n") == (1, 3)
-    assert read_zones("zone,segment\nn,r1\nn,r2\n") == {"n": ("r1", "r2")}
+    assert read_zones("zone,segment\nn,r1\nn,r2\n") == {"n": (("r1", "r2"), (2, 3))}
 
 
 @pytest.mark.parametrize(
@@ -195,6 +201,7 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
         (read_matrix, "from,to,trips\n", "no lines below the first"),
         (read_counts, "place,begin,end,count\nr1,900,0,3\n", "line 2: the slice from 900 to 0"),
         (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: time '13:00'"),
+        (read_zones, "zone,segment\nold town,r1\n", "line 2: zone must be .*not 'old town'"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, message) -> None:

@@ -84,7 +84,4 @@ export const api = {
   downloadUrl: (name: string, form: "json" | "graphml") =>
     `${BASE}/scenarios/${enc(name)}/download?form=${form}`,
   uploadScenario: (file: File) => upload<ScenarioState>("/scenarios/upload", file),
-  /** At real speed: a person watches. */
-  startRun: (scenario: string, inCarla = false) =>
-    send<{ run: string }>("POST", "/runs", { scenario, speed: 1, carla: inCarla }),
 };

@@ -1,3 +1,5 @@
+import type { Demand, Mix } from "./demand";
+
 /** What the server sends: the names are the server's, lengths in metres, angles in radians. */
 
 export type Category = "car" | "van" | "truck" | "bus" | "motorcycle" | "bicycle" | "pedestrian";
@@ -93,6 +95,8 @@ export interface Assets {
   categories: { category: Category; length: number; width: number }[];
   blueprints: Blueprint[];
   weather: WeatherPreset[];
+  /** Built-in day profiles: relative shares of equal slices of the day. */
+  day_profiles: Record<string, number[]>;
 }
 
 export interface Actor {
@@ -117,9 +121,10 @@ export interface Flow {
   per_hour: number;
   begin: number;
   end: number;
-  /** Relative shares; they need not sum to one. */
-  mix: Partial<Record<Category, number>>;
+  mix: Mix;
   speed: number | null;
+  /** Name of a day profile; null is evenly. */
+  profile: string | null;
 }
 
 export interface ScenarioDocument {
@@ -131,6 +136,7 @@ export interface ScenarioDocument {
   environment: { preset: string; parameters: Record<string, number>; affects_driving: boolean };
   actors: Actor[];
   flows: Flow[];
+  demand: Demand;
   signals: { control: SignalControl; junctions: unknown[] };
   simulation: { duration: number; step_length: number };
 }

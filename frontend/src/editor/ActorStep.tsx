@@ -6,6 +6,7 @@ import type { Graph, Place } from "../map/graph";
 import { CategoryGlyph, IconStream, IconTrash } from "../ui/icons";
 import { CATEGORY_WORD } from "../ui/words";
 import { ActorForm, ManyForm } from "./ActorForm";
+import type { Profiles } from "./DayProfiles";
 import { FillForm } from "./FillForm";
 import { FlowForm } from "./FlowForm";
 import { isFlow, type Starts, type Tool, toolWord } from "./placing";
@@ -19,6 +20,7 @@ interface Props {
   tool: Tool | null;
   goals: readonly Place[] | null;
   actors: number;
+  profiles: Profiles;
   filling: boolean;
   onTool: (tool: Tool | null) => void;
   /** Uses the tool without the map. */
@@ -77,7 +79,7 @@ export function ActorStep(props: Props) {
           {one && <StartAndGoal one={one} graph={graph} starts={starts} goals={goals} onShowGoals={props.onShowGoals}
             onStart={(spawn) => props.onStart(one, spawn)} onGoal={(goal) => props.onGoal(one, goal)} />}
           {one && (isFlow(one)
-            ? <FlowForm key={one.id} flow={one} onEdit={onEdit} />
+            ? <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
             : <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />)}
           {!one && actors.length > 0 && <ManyForm actors={actors} onChange={(fields, what) => onEdit(
             actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })), `${what} of ${actors.length} road users`)} />}

@@ -11,6 +11,8 @@ import { tell } from "../ui/notices";
 import { CATEGORY_WORD, count } from "../ui/words";
 import { ActorStep } from "./ActorStep";
 import { useRegion, useStarter, useWays } from "./asked";
+import { profilesOf } from "./DayProfiles";
+import { bringsSomebody, trafficNote } from "./demand";
 import { EnvironmentStep } from "./EnvironmentStep";
 import { HeadTools } from "./HeadTools";
 import { useKeys } from "./keys";
@@ -28,6 +30,7 @@ import { boundsOfPlaces, boundsOfProblem, firstStep, inFrame, nearestOne, ofProb
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
 import { firstVisit, Tour, tourSeen } from "./Tour";
+import { TrafficStep } from "./TrafficStep";
 import { useChanges } from "./useChanges";
 import { useShown } from "./useShown";
 
@@ -69,10 +72,17 @@ export function Editor({ store, drawing, loaded, assets }: {
   const walks = !tool ? null : tool.does === "place" ? tool.category === "pedestrian" : tool.does === "stream" ? tool.walk : onFoot(tool.ids);
   const wantsWalks = walks ?? (one ? onFoot([one.id]) : null);
   const placing = step === "actors";
+  // Where segments are what one points at.
+  const naming = step === "region" || step === "traffic";
+  const roads = useMemo(() => {
+    const kinds = new Map(graph.columns.segments.map(({ id, kind }) => [id, kind]));
+    return document.roi.filter((id) => kinds.get(id) !== "junction");
+  }, [graph, document.roi]);
+  const profiles = useMemo(() => profilesOf(document.demand, assets?.day_profiles ?? {}), [document.demand, assets]);
 
   const scene = useMemo<Scene>(() => ({
     segments: segmentStyles(graph, document.roi, roi.candidates, step === "region"),
-    hoverSegment: step === "region" ? hoverSegment : null,
+    hoverSegment: naming ? hoverSegment : null,
     nodes: {
       vehicles: step !== "region" && (!placing || wantsWalks !== true),
       walks: step !== "region" && (!placing || wantsWalks !== false),
@@ -85,7 +95,7 @@ export function Editor({ store, drawing, loaded, assets }: {
     hover: placing ? hover : null,
     hoverText: placing && hover ? laneFacts(graph, hover.id) : null,
     hoverCategory: tool?.does === "place" ? tool.category : null,
-  }), [graph, document.roi, roi.candidates, step, placing, hoverSegment, wantsWalks, inside, actors, flows, goals, one, path, hover, tool]);
+  }), [graph, document.roi, roi.candidates, step, placing, naming, hoverSegment, wantsWalks, inside, actors, flows, goals, one, path, hover, tool]);
 
   const openStep = (next: Step): void => {
     setStep(next);
@@ -93,8 +103,9 @@ export function Editor({ store, drawing, loaded, assets }: {
     setHover(null);
     if (next === "actors") showRegion();
   };
-  const showRegion = (): void => {
-    const bounds = segmentsBounds(graph, document.roi);
+  const showRegion = (): void => showSegments(document.roi);
+  const showSegments = (segments: readonly string[]): void => {
+    const bounds = segmentsBounds(graph, segments);
     if (bounds) handle.current?.show(bounds);
   };
   const arm = (next: Tool | null): void => {
@@ -139,7 +150,7 @@ export function Editor({ store, drawing, loaded, assets }: {
     else tell("No free point is left inside the region.");
   };
   const point = (at: Pointed | null): void => {
-    if (step === "region") setHoverSegment(at && picker.segment(at.x, at.y, Math.max(at.reach, SEGMENT_REACH)));
+    if (naming) setHoverSegment(at && picker.segment(at.x, at.y, Math.max(at.reach, SEGMENT_REACH)));
     else if (!at) setHover(null);
     else if (carried.current) setHover(starts.near(at.x, at.y, at.reach, onFoot([carried.current])));
     else setHover(walks === null ? null : starts.near(at.x, at.y, at.reach, walks));
@@ -156,7 +167,7 @@ export function Editor({ store, drawing, loaded, assets }: {
   const showProblem = (problem: Problem): void => {
     const about = ofProblem(problem, document);
     if (about) select([about.id]);
-    setStep(about ? "actors" : problem.where.startsWith("roi") ? "region" : step);
+    setStep(about ? "actors" : problem.where.startsWith("roi") ? "region" : problem.where.startsWith("demand") ? "traffic" : step);
     const bounds = boundsOfProblem(problem, graph, document);
     if (bounds) handle.current?.show(bounds);
   };
@@ -189,8 +200,9 @@ export function Editor({ store, drawing, loaded, assets }: {
   const errors = problems.filter((problem) => problem.severity === "error").length;
   const kept = step === "region" && hoverSegment !== null && roi.inside.includes(graph.segmentId(hoverSegment))
     && !roi.removable.includes(graph.segmentId(hoverSegment));
-  const hint = kept ? "This segment holds the region together and cannot be taken out"
-    : hintFor(step, document.roi.length, tool, hover, graph);
+  const pointed = step === "traffic" && hoverSegment !== null ? `Tables call this ${graph.segmentId(hoverSegment)}` : null;
+  const hint = pointed ?? (kept ? "This segment holds the region together and cannot be taken out"
+    : hintFor(step, document.roi.length, tool, hover, graph));
   return (
     <div className="editor">
       <HeadTools store={store} onKeys={() => setKeys(true)} onTour={() => setTour(true)} />
@@ -220,15 +232,20 @@ export function Editor({ store, drawing, loaded, assets }: {
               ? <><Text size="sm">Road users start inside the region. Choose the region first.</Text>
                 <Button onClick={() => openStep("region")}>Choose the region</Button></>
               : <><ActorStep assets={assets} graph={graph} starts={starts} selected={selected} tool={tool} goals={goals}
-                  actors={document.actors.length} filling={filling} onTool={arm} onPlaceSomewhere={placeSomewhere} onEdit={changes.change}
+                  actors={document.actors.length} profiles={profiles} filling={filling} onTool={arm} onPlaceSomewhere={placeSomewhere} onEdit={changes.change}
                   onStart={changes.setStart} onGoal={changes.setGoal} onRemove={() => changes.remove(selection)}
                   onSelect={select} onShowGoals={showGoals} onFill={fill} />
-                {ones.length > 0 && <Button variant="default" onClick={() => openStep("run")}>Next: run</Button>}</>,
+                {ones.length > 0 && <Button variant="default" onClick={() => openStep("traffic")}>Next: traffic</Button>}</>,
+          },
+          traffic: {
+            title: "Traffic", done: bringsSomebody(document.demand), note: trafficNote(document.demand),
+            body: <><TrafficStep store={store} document={document} roads={roads} profiles={profiles} onEdit={changes.change} onShow={showSegments} />
+              <Button onClick={() => openStep("run")}>Next: run</Button></>,
           },
           run: {
             title: "Run", done: false, note: errors ? count(errors, "problem") + " to solve first" : "Watch it live",
-            body: <RunStep key={`${document.simulation.duration} ${document.seed}`} document={document} lights={drawing.symbols.some(([kind]) => kind.includes("light"))}
-              blocked={errors > 0} busy={run.busy} empty={ones.length === 0} onEdit={changes.change} onRun={run.start} />,
+            body: <RunStep name={name} version={scenario.version} document={document} lights={drawing.symbols.some(([kind]) => kind.includes("light"))}
+              blocked={errors > 0} busy={run.busy} empty={ones.length === 0 && !bringsSomebody(document.demand)} onEdit={changes.change} onRun={run.start} />,
           },
         }} />
         <Problems problems={problems} onShow={showProblem} />
@@ -238,13 +255,13 @@ export function Editor({ store, drawing, loaded, assets }: {
           <MapCanvas
             drawing={drawing} graph={graph} picker={picker} scene={scene} handle={handle}
             label={`Map ${document.map.name}`} aim={tool !== null || step === "region"}
-            onPick={(at) => { if (step === "region") pickSegment(at); else { setStep("actors"); pickOne(at); } }}
+            onPick={(at) => { if (step === "region") pickSegment(at); else if (step !== "traffic") { setStep("actors"); pickOne(at); } }}
             onPoint={point} onDrop={drop}
             onGrab={(at) => {
-              carried.current = step === "region" || tool ? null : oneAt(at);
+              carried.current = naming || tool ? null : oneAt(at);
               return carried.current !== null;
             }}
-            onFrame={(frame) => { if (step !== "region") { setStep("actors"); select(inFrame([...actors, ...flows], frame)); } }}
+            onFrame={(frame) => { if (!naming) { setStep("actors"); select(inFrame([...actors, ...flows], frame)); } }}
           >
             {hint && <div className="map-hint" role="status">{hint}</div>}
             <Legend step={step} />

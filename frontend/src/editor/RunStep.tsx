@@ -1,27 +1,45 @@
-import { Button, Group, NumberInput, SegmentedControl, Text } from "@mantine/core";
+import { Button, NumberInput, SegmentedControl, Select, Text } from "@mantine/core";
 import { useState } from "react";
 
+import type { RunWish } from "../api/runs";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { CarlaChoice } from "../carla/CarlaChoice";
 import { IconPlay } from "../ui/icons";
+import { Duration } from "./Duration";
+import { Forecast } from "./Forecast";
 
 const CONTROLS = [{ value: "fixed", label: "By the clock" }, { value: "actuated", label: "By the traffic" }];
+const PACES = [{ value: "real", label: "Real time" }, { value: "fast", label: "As fast as it can" }];
+const RECORDINGS = [
+  { value: "step", label: "At every moment" }, { value: "1", label: "Every second" },
+  { value: "10", label: "Every 10 seconds" }, { value: "none", label: "Not at all" },
+];
+/** Longer runs are made in slices, and nobody watches them in real time. */
+const LONG = 3600;
 
-/** How long it lasts, how the lights work, and the start. */
-export function RunStep({ document, lights, blocked, empty, busy, onEdit, onRun }: {
-  document: ScenarioDocument; lights: boolean; blocked: boolean; empty: boolean; busy: boolean;
-  onEdit: (edit: Edit) => void; onRun: (inCarla: boolean) => void;
+/** How long it lasts, how the lights work, what is recorded, and the start. */
+export function RunStep({ name, version, document, lights, blocked, empty, busy, onEdit, onRun }: {
+  name: string; version: number; document: ScenarioDocument; lights: boolean; blocked: boolean; empty: boolean; busy: boolean;
+  onEdit: (edit: Edit) => void; onRun: (wish: RunWish) => void;
 }) {
-  const [inCarla, setInCarla] = useState(false);
   const { simulation: { duration }, seed, signals: { control } } = document;
+  const [inCarla, setInCarla] = useState(false);
+  const [recording, setRecording] = useState("step");
+  const [pace, setPace] = useState<string | null>(null);
+  const long = duration > LONG;
+  const chosenPace = pace ?? (long ? "fast" : "real");
+  const every = inCarla || recording === "step" || recording === "none" ? null : Number(recording);
+  const wish: RunWish = {
+    scenario: name, speed: chosenPace === "fast" ? null : 1, carla: inCarla, trajectories: inCarla || recording !== "none", every,
+  };
   return (
     <>
-      <Group grow align="flex-start">
-        <NumberInput label="Lasts" suffix=" s" min={1} max={1e6} defaultValue={duration}
-          onBlur={(event) => { const value = Number.parseFloat(event.currentTarget.value); if (value > 0 && value !== duration) onEdit({ kind: "set_simulation", duration: value }); }} />
-        <NumberInput label="Chance number" description="same number, same traffic" inputWrapperOrder={["label", "input", "description"]} min={0} allowDecimal={false} defaultValue={seed}
-          onBlur={(event) => { const value = Number.parseInt(event.currentTarget.value, 10); if (value >= 0 && value !== seed) onEdit({ kind: "set_seed", seed: value }); }} />
-      </Group>
+      <Duration key={duration} label="Lasts" seconds={duration} onCommit={(value) => onEdit({ kind: "set_simulation", duration: value })} />
+      {long && <Text size="xs" c="dimmed">A run of more than an hour is kept hour by hour: whatever breaks it off, it can go on from the last full hour.</Text>}
+      <NumberInput label="Chance number" description="same number, same traffic" inputWrapperOrder={["label", "input", "description"]} min={0} allowDecimal={false} defaultValue={seed} key={seed}
+        onBlur={(event) => { const value = Number.parseInt(event.currentTarget.value, 10); if (value >= 0 && value !== seed) onEdit({ kind: "set_seed", seed: value }); }} />
+      <Select label="Record where everybody is" description="for watching again, charts and counts" inputWrapperOrder={["label", "input", "description"]}
+        data={RECORDINGS} value={inCarla ? "step" : recording} disabled={inCarla} allowDeselect={false} onChange={(value) => setRecording(value ?? "step")} />
       {lights && (
         <div>
           <Text size="sm" fw={500}>Traffic lights change</Text>
@@ -31,10 +49,15 @@ export function RunStep({ document, lights, blocked, empty, busy, onEdit, onRun 
             ? "Every light keeps its own times." : "A green lasts longer while vehicles still come."}</Text>
         </div>
       )}
+      <div>
+        <Text size="sm" fw={500}>Begins</Text>
+        <SegmentedControl fullWidth data={PACES} value={chosenPace} aria-label="Pace at the start" onChange={setPace} />
+      </div>
       <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
-      {empty && <Text size="sm">Nobody is in the scenario yet. Place somebody in “Road users” first.</Text>}
+      {empty && <Text size="sm">Nobody is in the scenario yet. Place somebody in “Road users”, or add traffic in “Traffic”.</Text>}
       {blocked && <Text size="sm" c="red">Solve the problems listed below first.</Text>}
-      <Button size="md" leftSection={<IconPlay />} loading={busy} disabled={blocked || empty} onClick={() => onRun(inCarla)}>Run</Button>
+      {!blocked && !empty && <Forecast wish={wish} version={version} />}
+      <Button size="md" leftSection={<IconPlay />} loading={busy} disabled={blocked || empty} onClick={() => onRun(wish)}>Run</Button>
     </>
   );
 }

@@ -1,6 +1,7 @@
 import { useEffect, useMemo, useState } from "react";
 
 import { api } from "../api/client";
+import { runs, type RunWish } from "../api/runs";
 import type { Actor, Flow, Roi } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
@@ -57,13 +58,13 @@ export function useWays(name: string, one: Actor | Flow | null, roiKey: string, 
 }
 
 /** Starts a run and leads to it. */
-export function useStarter(name: string): { busy: boolean; start: (inCarla: boolean) => void } {
+export function useStarter(name: string): { busy: boolean; start: (wish: RunWish) => void } {
   const [busy, setBusy] = useState(false);
   return {
     busy,
-    start: (inCarla) => {
+    start: (wish) => {
       setBusy(true);
-      api.startRun(name, inCarla).then(
+      runs.start(wish).then(
         ({ run }) => go({ view: "run", scenario: name, run }),
         (error: unknown) => { setBusy(false); tellError(error); },
       );

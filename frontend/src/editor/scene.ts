@@ -3,8 +3,8 @@ import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
-export type Step = "map" | "region" | "environment" | "actors" | "run";
-export const STEPS: readonly Step[] = ["map", "region", "environment", "actors", "run"];
+export type Step = "map" | "region" | "environment" | "actors" | "traffic" | "run";
+export const STEPS: readonly Step[] = ["map", "region", "environment", "actors", "traffic", "run"];
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(

@@ -20,6 +20,8 @@ export interface EditorState {
    * document, or null if it was refused.
    */
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
+  /** Asks for a change that is no edit; a refusal is thrown, for whoever has asked to show it. */
+  take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
   select: (ids: readonly string[]) => void;
@@ -76,6 +78,25 @@ export function createEditorStore(name: string): EditorStore {
       queue = turn;
       return turn;
     };
+    const take = (call: (version: number) => Promise<ScenarioState>): Promise<ScenarioState> => {
+      const turn = queue.then(async () => {
+        const { scenario } = get();
+        if (!scenario) throw new Error("The scenario is not loaded yet.");
+        set({ saving: "saving", refusal: null });
+        try {
+          const next = await call(scenario.version);
+          accept(next);
+          return next;
+        } catch (error) {
+          set({ saving: "saved" });
+          if (!(error instanceof ApiError) || error.status !== 409) throw error;
+          await get().load();
+          throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+        }
+      });
+      queue = turn.catch(() => undefined);
+      return turn;
+    };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
       const message = error instanceof Error ? error.message : String(error);
@@ -107,6 +128,7 @@ export function createEditorStore(name: string): EditorStore {
         const edits = Array.isArray(edit) ? edit as readonly Edit[] : [edit as Edit];
         return ask((version) => api.edit(name, version, edits, label));
       },
+      take,
       undo: () => ask((version) => api.undo(name, version)),
       redo: () => ask((version) => api.redo(name, version)),
       select: (ids) => set({ selection: ids }),

@@ -54,4 +54,4 @@ export const CATEGORY_COLOR: Record<Category, string> = {
   motorcycle: "#c2255c", bicycle: "#2b8a3e", pedestrian: "#f2b600",
 };
 export const EGO = "#e03131";
-export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", lifted: "#5f3dc4" };
+export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", lifted: "#5f3dc4", met: "#0b7285", unmet: "#d9480f" };

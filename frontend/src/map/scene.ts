@@ -81,4 +81,4 @@ export interface Mark {
   fresh: boolean;
 }
 
-export type MarkKind = "collision" | "braking" | "lifted";
+export type MarkKind = "collision" | "braking" | "lifted" | "met" | "unmet";

@@ -33,7 +33,7 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
                   {one.run === current ? <Text size="sm" fw={600}>shown</Text>
-                    : <Anchor size="sm" href={hashOf({ view: "run", scenario, run: one.run })} aria-label={`Watch ${one.run}`}>Watch</Anchor>}
+                    : <Anchor size="sm" href={hashOf({ view: "run", scenario, run: one.run })} aria-label={`${watchWord(one)} ${one.run}`}>{one.state === "interrupted" ? "Go on" : "Watch"}</Anchor>}
                   {hasReport(one) && <Anchor size="sm" href={runs.reportUrl(one.run)} target="_blank" rel="noreferrer" aria-label={`Report of ${one.run}`}>Report</Anchor>}
                   {hasEnded(one.state) && (
                     <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${one.run}`} onClick={() => setRemoving(one.run)}><IconTrash /></ActionIcon>
@@ -55,4 +55,5 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
   );
 }
 
+const watchWord = ({ state }: RunInfo): string => state === "interrupted" ? "Go on:" : "Watch";
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

@@ -1,25 +1,31 @@
 import { Alert, Button, Group, Text, Title } from "@mantine/core";
 import { useState } from "react";
 
-import { api } from "../api/client";
 import { carla } from "../api/carla";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/route";
 import { Comparison } from "./Comparison";
 import { keyFigures } from "./figures";
+import { Files } from "./Files";
+import { Interrupted, SliceTable } from "./LongRun";
 
+/** Nobody watches a longer run in real time. */
+const LONG = 3600;
 const TITLE: Record<string, string> = { failed: "The run broke off", stopped: "The run was stopped" };
 
 /** What came of a run, in figures. */
-export function Result({ info, scenario, onBack }: { info: RunInfo; scenario: string; onBack: () => void }) {
+export function Result({ info, scenario, onBack, onGoOn }: {
+  info: RunInfo; scenario: string; onBack: () => void; onGoOn: () => void;
+}) {
   const [busy, setBusy] = useState(false);
   const again = (): void => {
     setBusy(true);
-    api.startRun(scenario).then(
+    runs.start({ scenario, speed: Number(info.summary?.until) > LONG ? null : 1 }).then(
       ({ run }) => go({ view: "run", scenario, run }),
       (error: unknown) => { setBusy(false); tellError(error); });
   };
+  if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onGoOn={onGoOn} />;
   const failed = info.state === "failed";
   return (
     <section aria-label="Result of the run">
@@ -36,7 +42,9 @@ export function Result({ info, scenario, onBack }: { info: RunInfo; scenario: st
         {compared(info.summary) && <Button variant="default" component="a" href={carla.comparisonUrl(info.run)} target="_blank" rel="noreferrer">Compared with CARLA</Button>}
         <Button variant="default" loading={busy} onClick={again}>Run again</Button>
       </Group>
+      {info.summary && !failed && <SliceTable summary={info.summary} />}
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
+      {info.summary && !failed && <Files run={info.run} />}
     </section>
   );
 }

@@ -3,31 +3,42 @@ import "./run.css";
 import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
 import { useEffect, useMemo, useRef, useState } from "react";
 
+import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { CameraPanel } from "../carla/CameraPanel";
 import { MapCanvas, type MapHandle } from "../map/MapCanvas";
 import { go } from "../ui/route";
+import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
 import { hasEnded } from "./figures";
+import { countMarks } from "./fit";
 import type { Crowd } from "./frames";
 import { IncidentLog } from "./IncidentLog";
 import { markKind, marksAt } from "./incidents";
 import { Legend } from "./Legend";
 import { lamps } from "./lights";
 import { Live } from "./live";
+import { SafeSlices } from "./LongRun";
 import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
 import { LiveStrip, ReplayStrip } from "./Strip";
+import { useCounts } from "./useCounts";
 import { useIncidents } from "./useIncidents";
 import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
 import { useGround, useRun } from "./useRun";
 
-type Tab = "result" | "charts" | "users" | "events" | "runs";
+type Tab = "result" | "charts" | "counts" | "users" | "events" | "runs";
 
-/** Watches one run from above, live or as it was recorded; the scenario itself is not touched. */
+/** Watches one run from above; one that goes on after an interruption is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
+  const [turn, setTurn] = useState(0);
+  return <Watched key={turn} scenario={scenario} run={run} onGoOn={() => setTurn(turn + 1)} />;
+}
+
+/** A run, live or as it was recorded; the scenario itself is not touched. */
+function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onGoOn: () => void }) {
   const handle = useRef<MapHandle | null>(null);
   const { info, failure, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
@@ -39,9 +50,11 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   // Whoever comes when all is over sees the recording; whoever was there keeps the last picture.
   const [mode, setMode] = useState<"live" | "replay" | null>(null);
   if (info && mode === null) setMode(ended ? "replay" : "live");
-  const replayable = complete && info.state !== "failed";
+  const replayable = complete && info.state !== "failed" && info.state !== "interrupted";
   const player = useReplay(run, mode === "replay" && replayable, show);
   const { incidents, add } = useIncidents(run, complete);
+  const counts = useCounts(run, replayable);
+  const [fit, setFit] = useState<readonly FitRow[] | null>(null);
   const [tab, setTab] = useState<Tab | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
 
@@ -72,9 +85,9 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const categories = useMemo(
     () => new Map<string, Category>(known?.everybody().map((one) => [one.id, one.category]) ?? []), [known]);
   const kinds = useMemo(() => new Set(categories.values()), [categories]);
-  const marks = useMemo(() => new Set(incidents.map(markKind)), [incidents]);
+  const marks = useMemo(() => new Set(fit ? countMarks(fit).map(({ kind }) => kind) : incidents.map(markKind)), [incidents, fit]);
   const time = mode === "replay" ? player.time : ended ? Infinity : now.time;
-  useEffect(() => { handle.current?.setMarks(marksAt(incidents, time)); }, [incidents, time, drawing, loaded]);
+  useEffect(() => { handle.current?.setMarks(fit ? countMarks(fit) : marksAt(incidents, time)); }, [incidents, fit, time, drawing, loaded]);
 
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
@@ -109,13 +122,15 @@ export function RunView({ scenario, run }: { scenario: string; run: string }) {
             <Tabs.List>
               {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}
               {replayable && <Tabs.Tab value="charts">Charts</Tabs.Tab>}
+              {counts > 0 && <Tabs.Tab value="counts">Counts</Tabs.Tab>}
               <Tabs.Tab value="users">Road users</Tabs.Tab>
               <Tabs.Tab value="events">Events{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}</Tabs.Tab>
               <Tabs.Tab value="runs">Runs</Tabs.Tab>
             </Tabs.List>
-            <Tabs.Panel value="result" className="run-panel"><Result info={info} scenario={scenario} onBack={back} /></Tabs.Panel>
+            <Tabs.Panel value="result" className="run-panel"><Result info={info} scenario={scenario} onBack={back} onGoOn={onGoOn} /></Tabs.Panel>
             <Tabs.Panel value="charts" className="run-panel"><Plots run={run} /></Tabs.Panel>
-            <Tabs.Panel value="users" className="run-panel"><RoadUsers picture={picture} wanted={shownTab === "users"} /></Tabs.Panel>
+            <Tabs.Panel value="counts" className="run-panel"><CountsFit run={run} onFit={setFit} onShow={(x, y) => { follow(null); handle.current?.centre(x, y); }} /></Tabs.Panel>
+            <Tabs.Panel value="users" className="run-panel">{!ended && <SafeSlices info={info} />}<RoadUsers picture={picture} wanted={shownTab === "users"} /></Tabs.Panel>
             <Tabs.Panel value="events" className="run-panel">
               <IncidentLog incidents={incidents} categories={categories} over={ended} onShow={({ x, y, time: at }) => {
                 follow(null);

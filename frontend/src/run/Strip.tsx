@@ -4,13 +4,15 @@ import { type Incident, type RunInfo, runs } from "../api/runs";
 import { MARK_COLOR } from "../map/colors";
 import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
 import { tellError } from "../ui/notices";
-import { clock } from "../ui/words";
+import { hoursMinutes, longClock } from "../ui/words";
 import { REPLAY_SPEEDS, type Speed, SPEEDS, STATE_WORD } from "./figures";
 import { markKind } from "./incidents";
 import type { Now } from "./usePicture";
 import type { Player } from "./useReplay";
 
 const STEP = 0.5;
+/** Simulated seconds from which on it is told how long a run will still take. */
+const LONG = 3600;
 
 /** Steers a run that goes on, and says how far it is. */
 export function LiveStrip({ info, now, onBack, learn }: {
@@ -22,6 +24,8 @@ export function LiveStrip({ info, now, onBack, learn }: {
   };
   const going = state === "running" || state === "paused";
   const until = info.progress?.until ?? 0;
+  // Told only where it matters; at a chosen pace it takes as long as one has chosen.
+  const left = until > LONG && info.speed == null ? info.progress?.time_left : null;
   return (
     <div className="strip" role="region" aria-label="The run">
       <Back onBack={onBack} />
@@ -29,15 +33,16 @@ export function LiveStrip({ info, now, onBack, learn }: {
         {state === "paused"
           ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Go on</Button>
           : <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>Pause</Button>}
-        <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>
+        {!info.slices && <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>}
         <Button variant="default" leftSection={<IconStop />} disabled={!going && state !== "preparing"} onClick={() => control("stop")}>Stop</Button>
+        {info.slices && <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>Go on later</Button>}
         <SpeedChoice speeds={SPEEDS} speed={info.speed ?? null} onChange={(speed) => control("speed", speed)} />
       </Group>
       <div className="time-line">
         <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="How much of the run is over" />
-        <Text size="sm" mt={4}>{STATE_WORD[state] ?? state}</Text>
+        <Text size="sm" mt={4}>{STATE_WORD[state] ?? state}{left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}</Text>
       </div>
-      <Shown label="Time" value={clock(now.time)} />
+      <Shown label="Time" value={longClock(now.time, until)} />
       <Shown label="Times real speed" value={now.pace.toFixed(1)} />
       <Shown label="On the road" value={String(now.running)} />
       <Shown label="Arrived" value={String(now.arrived)} />
@@ -73,10 +78,10 @@ export function ReplayStrip({ player, recorded, running, incidents, onBack, onPl
             ))}
           </div>
           <input type="range" aria-label="Moment of the run" min={begin} max={end} step={Math.min(STEP, (end - begin) / 2 || STEP)} value={time}
-            aria-valuetext={`${clock(time)} of ${clock(end)}`} onChange={(event) => { player.pause(); player.seek(Number(event.currentTarget.value)); }} />
+            aria-valuetext={`${longClock(time, end)} of ${longClock(end, end)}`} onChange={(event) => { player.pause(); player.seek(Number(event.currentTarget.value)); }} />
         </div>
       ) : <Text size="sm" className="time-line" c="dimmed">{!recorded || player.error ? "There is no recording of this run." : player.loading ? "Fetching the recording …" : "The run is over."}</Text>}
-      {replay && <Shown label={`of ${clock(end)}`} value={clock(time)} />}
+      {replay && <Shown label={`of ${longClock(end, end)}`} value={longClock(time, end)} />}
       {replay && <Shown label="On the road" value={String(running)} />}
     </div>
   );

@@ -1,4 +1,4 @@
-import { clock, kmh } from "../ui/words";
+import { clock, kmh, longClock } from "../ui/words";
 import type { Summary } from "../api/runs";
 
 export interface Figure {
@@ -23,7 +23,7 @@ interface Known {
 const plain = (n: number): string => n.toLocaleString("en");
 const seconds = (n: number): string => `${n.toFixed(1)} s`;
 const KNOWN: Known[] = [
-  { label: "Simulated time", path: ["sim_seconds"], say: clock, sayDifference: seconds },
+  { label: "Simulated time", path: ["sim_seconds"], say: (n) => longClock(n, n), sayDifference: seconds },
   { label: "Planned", path: ["actors", "planned"], say: plain },
   { label: "Arrived", path: ["actors", "arrived"], say: plain },
   { label: "Still on the way", path: ["actors", "running"], say: plain },

@@ -14,6 +14,7 @@ const KIND: Record<string, MarkKind> = {
 
 export const MARK_WORD: Record<MarkKind, string> = {
   collision: "Collision", braking: "Emergency braking", lifted: "Stuck, taken off the road",
+  met: "Count met", unmet: "Count not met",
 };
 
 export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "lifted";

@@ -46,6 +46,32 @@ export function clock(seconds: number): string {
   return `${minutes}:${(s - 60 * minutes).toFixed(1).padStart(4, "0")}`;
 }
 
+/** Hours and minutes, for times of which seconds say nothing: `1 h 05 min`. */
+export function hoursMinutes(seconds: number): string {
+  const minutes = Math.round(Math.max(0, seconds) / 60);
+  const [h, min] = [Math.floor(minutes / 60), minutes % 60];
+  if (h === 0) return `${min} min`;
+  return min === 0 ? `${h} h` : `${h} h ${String(min).padStart(2, "0")} min`;
+}
+
+/** Hours, minutes and seconds of a long run; the tenths of {@link clock} for a short one. */
+export function longClock(seconds: number, longest: number): string {
+  if (longest < 3600) return clock(seconds);
+  const s = Math.floor(Math.max(0, seconds));
+  return `${Math.floor(s / 3600)}:${String(Math.floor(s / 60) % 60).padStart(2, "0")}:${String(s % 60).padStart(2, "0")}`;
+}
+
+/** From when to when, as hours and minutes after the start. */
+export function span(begin: number, end: number): string {
+  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${String(Math.floor(seconds / 60) % 60).padStart(2, "0")}`;
+  return `${at(begin)}–${at(end)}`;
+}
+
+export function bytes(n: number): string {
+  const unit = n >= 1e9 ? { size: 1e9, word: "GB" } : n >= 1e6 ? { size: 1e6, word: "MB" } : { size: 1e3, word: "kB" };
+  return `${(n / unit.size).toLocaleString("en", { maximumFractionDigits: n >= 10 * unit.size ? 0 : 1 })} ${unit.word}`;
+}
+
 export const count = (n: number, one: string, many = `${one}s`): string =>
   `${n.toLocaleString("en")} ${n === 1 ? one : many}`;
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -111,6 +112,38 @@ def transitions(graph: MapGraph) -> dict[str, set[str]]:
     found: dict[str, set[str]] = defaultdict(set)
     for one, other in np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0).tolist():
         found[ids[one]].add(ids[other])
+    return found
+
+
+def place_points(graph: MapGraph, places: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """Where places of counting are on the map: x and y in metres, OpenDRIVE frame.
+
+    A segment is at the middle of its nodes; a stream where lanes lead from one segment into the
+    next; a turn in the middle of the streams that it is made of. Places with unknown segments, or
+    between which no lane leads, have none.
+    """
+    lanes, ids = graph.lanes, graph.segments.ids
+    rows = {str(name): row for row, name in enumerate(ids)}
+    x, y = np.asarray(lanes.x), np.asarray(lanes.y)
+    crosses = lanes.segment[lanes.source] != lanes.segment[lanes.target]
+    source, target = lanes.source[crosses], lanes.target[crosses]
+    ends = lanes.segment[source], lanes.segment[target]
+    found: dict[str, tuple[float, float]] = {}
+    for place in dict.fromkeys(places):
+        names = place_segments(place)
+        if not all(name in rows for name in names):
+            continue
+        one = [rows[name] for name in names]
+        groups = (
+            [np.flatnonzero(lanes.segment == one[0])]
+            if len(one) == 1
+            else [source[(ends[0] == a) & (ends[1] == b)] for a, b in pairwise(one)]
+        )
+        if all(len(group) for group in groups):
+            found[place] = (
+                float(np.mean([x[group].mean() for group in groups])),
+                float(np.mean([y[group].mean() for group in groups])),
+            )
     return found
 
 

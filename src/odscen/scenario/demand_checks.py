@@ -50,8 +50,8 @@ def matrix_problems(
     known = {str(name) for name in region.graph.segments.ids}
     inside = {str(name) for name in region.segments}
     for index, (origin, destination, _) in enumerate(matrix.trips):
-        for name in dict.fromkeys((origin, destination)):
-            here = f"{where}.trips[{index}]"
+        for end, name in enumerate(dict.fromkeys((origin, destination))):
+            here = f"{where}.trips[{index}][{end}]"
             if name not in zones and name not in known:
                 message = f"{name!r} is neither a zone nor a segment of the map"
                 yield error("unknown_zone", here, message)
@@ -60,11 +60,15 @@ def matrix_problems(
                     f"{name!r} is outside the region of interest; add its segment or drop the row"
                 )
                 yield error("zone_outside_roi", here, message, segments=segments_of(demand, name))
-    pairs = Counter((origin, destination) for origin, destination, _ in matrix.trips)
-    for (origin, destination), number in pairs.items():
-        if number > 1:
-            message = f"trips from {origin!r} to {destination!r} are given {number} times; add up"
-            yield error("row_twice", where, message)
+    pairs: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for index, (origin, destination, _) in enumerate(matrix.trips):
+        pairs[origin, destination].append(index)
+    for (origin, destination), rows in pairs.items():
+        if len(rows) > 1:
+            message = (
+                f"trips from {origin!r} to {destination!r} are given {len(rows)} times; add up"
+            )
+            yield error("row_twice", f"{where}.trips[{rows[1]}]", message)
 
 
 def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Problem]:
@@ -100,9 +104,9 @@ def _name_problems(demand: Demand, region: Region) -> Iterator[Problem]:
 def _zone_problems(demand: Demand, region: Region) -> Iterator[Problem]:
     known = {str(name) for name in region.graph.segments.ids}
     for index, zone in enumerate(demand.zones):
-        for name in zone.segments:
+        for row, name in enumerate(zone.segments):
             if name not in known:
-                where = f"demand.zones[{index}].segments"
+                where = f"demand.zones[{index}].segments[{row}]"
                 message = f"zone {zone.id!r} has segment {name!r}, which the map does not have"
                 yield error("unknown_segment", where, message, segments=[name])
 
@@ -145,7 +149,7 @@ def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Prob
     for index, row in enumerate(counts.rows):
         first_row.setdefault(row[0], index)
     for place, index in first_row.items():
-        here, names = f"{where}.rows[{index}]", place_segments(place)
+        here, names = f"{where}.rows[{index}][0]", place_segments(place)
         unknown = [name for name in names if name not in known]
         outside = [name for name in names if name not in inside]
         broken = [pair for pair in pairwise(names) if not _leads(onwards, pair)]
@@ -168,8 +172,8 @@ def _leads(onwards: dict[str, set[str]], pair: tuple[str, str]) -> bool:
 def _slice_problems(counts: Counts, where: str) -> Iterator[Problem]:
     begin, end = counts.rows[0][1:3]
     length = end - begin
-    numbers: dict[tuple[str, float], list[float]] = defaultdict(list)
-    for index, (place, start, stop, number) in enumerate(counts.rows):
+    rows: dict[tuple[str, float], list[int]] = defaultdict(list)
+    for index, (place, start, stop, _) in enumerate(counts.rows):
         offset = (start - begin) / length if length > 0 else 0.5
         if stop <= start or stop - start != length or abs(offset - round(offset)) > 1e-6:
             message = (
@@ -177,15 +181,16 @@ def _slice_problems(counts: Counts, where: str) -> Iterator[Problem]:
                 f"slices of {counts.id!r} are all as long as each other and follow one another"
             )
             yield error("slice_uneven", f"{where}.rows[{index}]", message)
-        numbers[place, start].append(number)
-    for (place, start), given in numbers.items():
+        rows[place, start].append(index)
+    for (place, start), given in rows.items():
         if len(given) > 1:
-            listed = " and ".join(f"{number:g}" for number in given)
+            listed = " and ".join(f"{counts.rows[index][3]:g}" for index in given)
             message = (
                 f"{place.replace(PLACE_SEPARATOR, ' > ')} from {start:g} s on was counted "
                 f"{len(given)} times: {listed}; keep one"
             )
-            yield error("counted_twice", where, message, segments=place_segments(place))
+            here = f"{where}.rows[{given[1]}]"
+            yield error("counted_twice", here, message, segments=place_segments(place))
 
 
 def _limited(problems: Iterable[Problem], where: str) -> Iterator[Problem]:

@@ -9,14 +9,16 @@ from __future__ import annotations
 import csv
 import io
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from odscen.errors import InputError
 from odscen.scenario.profiles import DAY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+"""As identifiers of the document."""
 _TIME_OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
 
 Trip = tuple[str, str, float]
@@ -26,8 +28,25 @@ Slice = tuple[float, float]
 CountRow = tuple[str, float, float, float]
 """Place, begin, end, number."""
 
+COLUMNS = {
+    "od": ("from", "to", "trips"),
+    "counts": ("place", "begin", "end", "count"),
+    "profile": ("share",),
+    "zones": ("segment",),
+}
+"""Columns that the values of a row come from, by the kind of table."""
 
-def read_matrix(text: str, *, clock: float = 0.0) -> dict[Slice | None, tuple[Trip, ...]]:
+_Row = TypeVar("_Row")
+
+
+class Rows(NamedTuple, Generic[_Row]):
+    """Rows of a table, and the line of the file that each stands in, so that errors can tell it."""
+
+    values: tuple[_Row, ...]
+    lines: tuple[int, ...]
+
+
+def read_matrix(text: str, *, clock: float = 0.0) -> dict[Slice | None, Rows[Trip]]:
     """Read an origin-destination matrix: columns ``from``, ``to``, ``trips``.
 
     Columns ``begin`` and ``end`` may say when; the trips are then those of each slice.
@@ -41,14 +60,15 @@ def read_matrix(text: str, *, clock: float = 0.0) -> dict[Slice | None, tuple[Tr
     InputError
         With the line and the value that cannot be used.
     """
-    found: dict[Slice | None, list[Trip]] = {}
-    for line in _lines(text, ("from", "to", "trips"), ("begin", "end")):
+    found: dict[Slice | None, list[tuple[Trip, int]]] = {}
+    for line in _lines(text, COLUMNS["od"], ("begin", "end")):
         slice_ = line.slice(clock) if line.has("begin") else None
-        found.setdefault(slice_, []).append((line["from"], line["to"], line.number("trips")))
-    return {slice_: tuple(rows) for slice_, rows in found.items()}
+        trip = line["from"], line["to"], line.number("trips")
+        found.setdefault(slice_, []).append((trip, line.line))
+    return {slice_: _rows(pairs) for slice_, pairs in found.items()}
 
 
-def read_counts(text: str, *, clock: float = 0.0) -> tuple[CountRow, ...]:
+def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
     """Read counts: columns ``place``, ``begin``, ``end``, ``count``.
 
     Raises
@@ -56,9 +76,9 @@ def read_counts(text: str, *, clock: float = 0.0) -> tuple[CountRow, ...]:
     InputError
         With the line and the value that cannot be used.
     """
-    return tuple(
-        (line["place"].replace(" ", ""), *line.slice(clock), line.number("count"))
-        for line in _lines(text, ("place", "begin", "end", "count"))
+    return _rows(
+        ((line["place"].replace(" ", ""), *line.slice(clock), line.number("count")), line.line)
+        for line in _lines(text, COLUMNS["counts"])
     )
 
 
@@ -72,7 +92,7 @@ def read_profile(text: str) -> tuple[float, ...]:
     InputError
         With the line and the value that cannot be used.
     """
-    lines = list(_lines(text, ("share",), ("time",)))
+    lines = list(_lines(text, COLUMNS["profile"], ("time",)))
     for index, line in enumerate(lines):
         due = index * DAY / len(lines)
         if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
@@ -84,7 +104,7 @@ def read_profile(text: str) -> tuple[float, ...]:
     return tuple(line.number("share") for line in lines)
 
 
-def read_zones(text: str) -> dict[str, tuple[str, ...]]:
+def read_zones(text: str) -> dict[str, Rows[str]]:
     """Read zones: columns ``zone`` and ``segment``, one line for each segment of a zone.
 
     Raises
@@ -92,14 +112,20 @@ def read_zones(text: str) -> dict[str, tuple[str, ...]]:
     InputError
         With the line and the value that cannot be used.
     """
-    found: dict[str, list[str]] = {}
-    for line in _lines(text, ("zone", "segment")):
-        found.setdefault(line["zone"], []).append(line["segment"])
-    return {zone: tuple(segments) for zone, segments in found.items()}
+    found: dict[str, list[tuple[str, int]]] = {}
+    for line in _lines(text, ("zone", *COLUMNS["zones"])):
+        found.setdefault(line.name("zone"), []).append((line["segment"], line.line))
+    return {zone: _rows(pairs) for zone, pairs in found.items()}
+
+
+def _rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
+    values, lines = zip(*pairs, strict=True)
+    return Rows(values, lines)
 
 
 class _Line:
     def __init__(self, number: int, cells: dict[str, str]) -> None:
+        self.line = number
         self.where = f"line {number}"
         self._cells = cells
 
@@ -112,6 +138,15 @@ class _Line:
             msg = f"column {column!r} is empty"
             raise InputError(msg, element=self.where)
         return value
+
+    def name(self, column: str) -> str:
+        if not _NAME.fullmatch(self[column]):
+            msg = (
+                f"{column} must be at most 64 letters from a to z, digits, '-', '_' and '.', not "
+                f"{self[column]!r}"
+            )
+            raise InputError(msg, element=self.where)
+        return self[column]
 
     def number(self, column: str) -> float:
         try:

@@ -13,7 +13,14 @@ from starlette.staticfiles import StaticFiles
 
 from odscen import __version__
 from odscen.carla.client import Address
-from odscen.web import carla_routes, map_routes, run_routes, scenario_routes
+from odscen.web import (
+    carla_routes,
+    demand_routes,
+    map_routes,
+    result_routes,
+    run_routes,
+    scenario_routes,
+)
 from odscen.web.errors import RESPONSES, add_error_handlers, error_response
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
@@ -89,7 +96,14 @@ def create_app(
         """Say that the server is there."""
         return Health(version=__version__, workspace=str(shared.workspace.root))
 
-    for routes in (map_routes, scenario_routes, run_routes, carla_routes):
+    for routes in (
+        map_routes,
+        scenario_routes,
+        demand_routes,
+        run_routes,
+        result_routes,
+        carla_routes,
+    ):
         app.include_router(routes.router)
 
     @app.get("/api", include_in_schema=False)

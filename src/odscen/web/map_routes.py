@@ -15,6 +15,7 @@ from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import check_name, name_from_file
 from odscen.categories import DEFAULT_BODY
 from odscen.errors import ConflictError
+from odscen.scenario.profiles import BUILT_IN
 from odscen.sumo.signals import scenario_lights
 from odscen.web.messages import (
     AssetsInfo,
@@ -176,6 +177,7 @@ def assets(shared: Shared) -> AssetsInfo:
             )
             for one in known.presets.values()
         ],
+        day_profiles={name: list(shares) for name, shares in BUILT_IN.items()},
     )
 
 

@@ -14,9 +14,6 @@ from odscen.scenario.document import Scenario
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Version = Annotated[int, Field(ge=0, lt=2**53)]
-RunState = Literal[
-    "preparing", "running", "paused", "finishing", "completed", "stopped", "failed", "interrupted"
-]
 
 
 class Body(BaseModel):
@@ -138,11 +135,12 @@ class WeatherInfo(Answer):
 
 
 class AssetsInfo(Answer):
-    """The asset catalogue."""
+    """The asset catalogue, and the built-in day profiles: relative shares of equal slices."""
 
     categories: list[CategoryInfo]
     blueprints: list[BlueprintInfo]
     weather: list[WeatherInfo]
+    day_profiles: dict[str, list[float]]
 
 
 class ProblemInfo(Answer):
@@ -228,23 +226,6 @@ class RoiInfo(Answer):
     removable: list[str]
 
 
-class NewRun(Body):
-    """Run a scenario as it is now.
-
-    ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
-    simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
-    With ``carla`` it is shown on the CARLA server too, step by step.
-    """
-
-    scenario: Name
-    until: Annotated[float, Field(gt=0, le=1e6)] | None = None
-    seed: Annotated[int, Field(ge=0, lt=2**31)] | None = None
-    step_length: Annotated[float, Field(ge=0.01, le=1)] | None = None
-    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
-    paused: bool = False
-    carla: bool = False
-
-
 class CarlaInfo(Answer):
     """Whether the CARLA server can be used, and what to do about it, in words."""
 
@@ -253,94 +234,27 @@ class CarlaInfo(Answer):
     message: str
 
 
-class RunStarted(Answer):
-    """The run's id."""
+class DayMade(Answer):
+    """A scenario that was given a day of traffic, and what that asks of the busiest junction.
 
-    run: str
-
-
-class Control(Body):
-    """Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`."""
-
-    action: Literal["pause", "resume", "step", "speed", "stop"]
-    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
-
-
-class RunProgress(Answer):
-    """How far a run is; ``time_left`` in wall seconds at full speed, if it can be told."""
-
-    time: float
-    until: float
-    running: int
-    departed: int
-    arrived: int
-    planned: int
-    time_left: float | None = None
-
-
-class RunInfo(Answer):
-    """A run, going on or finished; ``summary`` is that of ``summary.json``.
-
-    ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
-    shown on a CARLA server, whose camera can then be watched.
+    ``volume`` and ``capacity`` are vehicles per hour at ``place`` in the busiest hour, in which
+    ``peak_trips`` set out.
     """
 
-    run: str
-    state: RunState
-    scenario: str
-    map: str | None
-    speed: float | None = None
-    progress: RunProgress | None = None
-    summary: dict[str, Any] | None = None
-    error: str | None = None
-    finished: float | None = None
-    carla: bool = False
+    scenario: ScenarioState
+    trips: float
+    peak_trips: float
+    place: str
+    volume: float
+    capacity: float
 
 
-class RunCurve(Answer):
-    """How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds."""
+class WholeDay(Body):
+    """Give a scenario a day of traffic on its whole map."""
 
-    time: list[float]
-    running: list[float]
-    arrived: list[float]
-    waiting: list[float]
-
-
-class RunSpeeds(Answer):
-    """Speeds of all vehicles in m/s around each ``time``: mean, and 10th and 90th percentile."""
-
-    time: list[float]
-    mean: list[float | None]
-    low: list[float | None]
-    high: list[float | None]
-
-
-class RunShares(Answer):
-    """Share of all vehicle time spent between ``edges[i]`` and ``edges[i + 1]``, m/s."""
-
-    edges: list[float]
-    share: list[float]
-
-
-class RunCurves(Answer):
-    """What a finished run looked like over time."""
-
-    counts: RunCurve
-    speeds: RunSpeeds
-    shares: RunShares
-
-
-class RunContent(Answer):
-    """``digest`` is the same where scenarios differ at most in name and description."""
-
-    digest: str
-
-
-class RunEvents(Answer):
-    """Incidents of a finished run, as the live view tells them; ``left_off`` were too many."""
-
-    events: list[dict[str, Any]]
-    left_off: int
+    version: Version
+    day: Literal["weekday", "weekend"] = "weekday"
+    trips: Annotated[float, Field(ge=1, le=1e6)] = 51_000.0
 
 
 MapDetails.model_rebuild()

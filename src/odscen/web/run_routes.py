@@ -22,19 +22,21 @@ from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
 from odscen.sumo.recorded import read_trajectories
 from odscen.web.live import LiveView
-from odscen.web.messages import (
+from odscen.web.packed import answer, pack
+from odscen.web.run_messages import (
     Control,
+    GoOn,
     NewRun,
     RunContent,
     RunCurve,
     RunCurves,
     RunEvents,
+    RunForecast,
     RunInfo,
     RunShares,
     RunSpeeds,
     RunStarted,
 )
-from odscen.web.packed import answer, pack
 from odscen.web.services import Shared
 
 if TYPE_CHECKING:
@@ -63,6 +65,19 @@ def start(wish: NewRun, shared: Shared) -> RunStarted:
     """Run a scenario as it is now."""
     draft = shared.drafts.get(wish.scenario)
     return RunStarted(run=shared.runs.start(draft.name, draft.scenario, wish))
+
+
+@router.post("/forecast")
+def forecast(wish: NewRun, shared: Shared) -> RunForecast:
+    """What a run would need; takes as long as getting it ready."""
+    return shared.runs.forecast(shared.drafts.get(wish.scenario).scenario, wish)
+
+
+@router.post("/{run}/resume", status_code=202)
+def resume(run: str, wish: GoOn, shared: Shared) -> RunStarted:
+    """Go on with an interrupted run from its last complete slice."""
+    shared.runs.resume(run, wish)
+    return RunStarted(run=run)
 
 
 @router.get("/{run}")
@@ -98,7 +113,7 @@ def page_of_run(shared: Shared, run: str, name: str) -> Response:
 @router.get("/{run}/summary")
 def summary(run: str, shared: Shared) -> dict[str, Any]:
     """Key figures of a finished run: its ``summary.json``."""
-    path = shared.runs.folder(run) / layout.SUMMARY_FILE
+    path = shared.runs.kept.folder(run) / layout.SUMMARY_FILE
     if not path.is_file():
         what = "summary of run"
         raise NotFoundError(what, run, [])
@@ -109,7 +124,7 @@ def summary(run: str, shared: Shared) -> dict[str, Any]:
 @router.get("/{run}/content")
 def content(run: str, shared: Shared) -> RunContent:
     """Whether two runs are of the same scenario can be told from this."""
-    return RunContent(digest=shared.runs.content(run))
+    return shared.runs.kept.content(run)
 
 
 @router.get("/{run}/events")
@@ -161,7 +176,7 @@ def trajectories(
 
 def _kept(shared: Shared, run: str, name: str) -> Path:
     """A file of a finished run; :class:`NotFoundError` if it was never written."""
-    path = shared.runs.folder(run) / name
+    path = shared.runs.kept.folder(run) / name
     if not path.is_file():
         what = f"{name} of run"
         raise NotFoundError(what, run, [])
@@ -178,7 +193,7 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     plan = Plan.from_json(_kept(shared, run, layout.PLAN_FILE).read_text(encoding="utf-8"))
     what = "complete trajectories of run"
     try:
-        recorded = read_trajectories(shared.runs.folder(run), most=REPLAY_ROWS)
+        recorded = read_trajectories(shared.runs.kept.folder(run), most=REPLAY_ROWS)
     except pl.exceptions.PolarsError as error:
         raise NotFoundError(what, run, []) from error
     if recorded is None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 import re
+import shutil
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -16,30 +15,31 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.carla.served import ServedJob, run_served
 from odscen.catalog.folders import discard
-from odscen.catalog.store import check_name
-from odscen.durations import clock
 from odscen.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
+from odscen.results.records import Plan
 from odscen.scenario.files import dumps
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo import layout
 from odscen.sumo.live import Live
-from odscen.sumo.long_runs import about
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.progress import Command, Failed, Pace
+from odscen.sumo.recording import Recording
 from odscen.sumo.runner import run_prepared
 from odscen.sumo.snapshots import origin
 from odscen.sumo.status import going, read_status
-from odscen.web.messages import RunInfo, RunProgress, RunState
-from odscen.workflow import SUFFIX, check_scenario, load_map
+from odscen.web.kept_runs import KeptRuns
+from odscen.web.run_messages import RunForecast, RunInfo, RunProgress, RunState
+from odscen.workflow import SUFFIX, check_scenario, load_map, read_scenario, resume
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from odscen.carla.client import Address
     from odscen.catalog.store import Workspace
-    from odscen.results.records import Plan
     from odscen.scenario.document import Scenario
-    from odscen.web.messages import Control, NewRun
+    from odscen.sumo.runner import PreparedRun, RunResult
+    from odscen.web.run_messages import Control, GoOn, NewRun
+    from odscen.workflow import LoadedMap
 
 MOST = 8
 """Runs that can go on at a time."""
@@ -57,6 +57,8 @@ class Active:
         What is to happen; ``None`` while it is prepared.
     carla
         Whether a CARLA server shows it too.
+    interrupted
+        Whether its user has interrupted it, to go on later.
     """
 
     id: str
@@ -65,6 +67,7 @@ class Active:
     plan: Plan | None = None
     finishing: bool = False
     carla: bool = False
+    interrupted: bool = False
     error: str | None = None
     ended: RunState | None = None
     future: Future[None] = field(default_factory=Future)
@@ -80,6 +83,11 @@ class Active:
             return "preparing"
         return "paused" if self.live.pace.paused else "running"
 
+    @property
+    def long(self) -> bool:
+        """Whether it goes in slices, and can be interrupted."""
+        return self.plan is not None and self.plan.slice_length is not None
+
     def end(self, state: RunState, error: str | None = None) -> None:
         """Say how it has ended."""
         self.error = error
@@ -91,6 +99,7 @@ class Runs:
     """Runs in a workspace, going on and finished."""
 
     def __init__(self, workspace: Workspace, carla: Address) -> None:
+        self.kept = KeptRuns(workspace.runs)
         self._workspace = workspace
         self._carla = carla
         self._pool = ThreadPoolExecutor(max_workers=MOST, thread_name_prefix="run")
@@ -108,18 +117,63 @@ class Runs:
             If too many are going on, or CARLA shows another one.
         """
         refuse_errors(check_scenario(self._workspace, scenario))
+        if wish.carla and (wish.every is not None or not wish.trajectories):
+            msg = (
+                "a run that CARLA shows is recorded step by step; leave every and trajectories out"
+            )
+            raise InputError(msg)
         with self._lock:
-            if sum(one.ended is None for one in self._active.values()) >= MOST:
-                msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
-                raise ConflictError(msg)
+            self._refuse_more()
             if wish.carla and any(one.carla and one.ended is None for one in self._active.values()):
                 msg = "CARLA shows another run already; stop that one, or wait for its end"
                 raise ConflictError(msg)
             pace = Pace(paused=wish.paused, speed=wish.speed)
             active = Active(self._free_id(name), scenario, Live(pace), carla=wish.carla)
             self._active[active.id] = active
-        active.future = self._pool.submit(self._run, active, wish)
+        active.future = self._pool.submit(self._run, active, lambda: self._simulate(active, wish))
         return active.id
+
+    def resume(self, run: str, wish: GoOn) -> None:
+        """Go on with an interrupted run.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such run.
+        ConflictError
+            If it has ended, is going on, or too many are.
+        """
+        folder = self.kept.folder(run)
+        if (state := self.info(run).state) != "interrupted":
+            msg = f"run {run!r} is {state}; only an interrupted one can go on"
+            raise ConflictError(msg)
+        scenario = read_scenario(folder / layout.SCENARIO_FILE)
+        plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
+        with self._lock:
+            self._refuse_more()
+            active = Active(run, scenario, Live(Pace(speed=wish.speed)), plan=plan)
+            self._active[run] = active
+        active.future = self._pool.submit(self._run, active, lambda: self._go_on(active))
+
+    def forecast(self, scenario: Scenario, wish: NewRun) -> RunForecast:
+        """What a run will need; takes as long as getting it ready.
+
+        Raises
+        ------
+        ScenarioError
+            If the scenario has errors.
+        """
+        refuse_errors(check_scenario(self._workspace, scenario))
+        prepared = self._prepared(scenario, wish)
+        expected = prepared.expected
+        assert expected is not None
+        return RunForecast(
+            planned=len(prepared.plan.actors),
+            running=expected.running,
+            disk=expected.disk,
+            memory=expected.memory,
+            free=shutil.disk_usage(self._workspace.root).free,
+        )
 
     def active(self, run: str) -> Active:
         """Return a run that this server has started.
@@ -147,6 +201,13 @@ class Runs:
         if active.live.ended:
             msg = f"run {run!r} has ended"
             raise ConflictError(msg)
+        if control.action == "interrupt":
+            if not active.long:
+                msg = f"run {run!r} is not in slices and could not go on later; stop it"
+                raise ConflictError(msg)
+            active.interrupted = True
+            active.live.kill()
+            return self.info(run)
         active.live.command(Command(control.action, control.speed))
         return self.info(run)
 
@@ -155,7 +216,7 @@ class Runs:
         with self._lock:
             active = self._active.get(run)
         if active is None:
-            return self._finished(run)
+            return self.kept.info(run)
         progress = active.live.progress
         over = active.ended is not None
         return RunInfo(
@@ -166,9 +227,10 @@ class Runs:
             speed=active.live.pace.speed,
             carla=active.carla,
             progress=None if progress is None else RunProgress(**asdict(progress)),
-            summary=self._summary(run) if over else None,
+            summary=self.kept.summary(run) if over else None,
             error=active.error,
-            finished=self._end_time(run) if over else None,
+            finished=self.kept.end_time(run) if over else None,
+            slices=self.kept.slices(run),
         )
 
     def rows(self, *, scenario: str | None = None) -> list[RunInfo]:
@@ -179,45 +241,13 @@ class Runs:
         wanted = (lambda _run: True) if scenario is None else _names_of(scenario).fullmatch
         with self._lock:
             names = dict.fromkeys(filter(wanted, self._active))
-        folders = self._workspace.runs.iterdir() if self._workspace.runs.is_dir() else ()
-        found = [
-            (file.stat().st_mtime, path)
-            for path in folders
-            if wanted(path.name) and (file := _shown(path))
-        ]
-        done = [path for _, path in sorted(found)]
-        order = dict.fromkeys([*(p.name for p in done if p.name not in names), *names])
+        done = [name for name in self.kept.by_age() if wanted(name) and name not in names]
+        order = dict.fromkeys([*done, *names])
         rows = []
         for name in order:
             with suppress(InputError):  # not a name of ours, or just removed
                 rows.append(self.info(name).model_copy(update={"summary": None}))
         return rows
-
-    def folder(self, run: str) -> Path:
-        """Folder of a run that is finished, or in slices and interrupted.
-
-        Raises
-        ------
-        NotFoundError
-            If there is none.
-        """
-        folder = self._workspace.runs / check_name(run, what="run")
-        if _shown(folder) is None:
-            what = "finished run"
-            raise NotFoundError(what, run, [])
-        return folder
-
-    def content(self, run: str) -> str:
-        """Digest of what a finished run's scenario says, its name and description left out."""
-        try:
-            text = (self.folder(run) / layout.SCENARIO_FILE).read_text(encoding="utf-8")
-            said = json.loads(text)
-            said.pop("name", None)
-            said.pop("description", None)
-        except (OSError, ValueError, AttributeError) as error:
-            what = "scenario of run"
-            raise NotFoundError(what, run, []) from error
-        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
     def remove(self, run: str) -> None:
         """Remove a finished or interrupted run."""
@@ -229,7 +259,7 @@ class Runs:
             self._active.pop(run, None)
         if active is not None and not (self._workspace.runs / run).exists():
             return  # it failed before it had anything to keep
-        folder = self.folder(run)
+        folder = self.kept.folder(run)
         if going(folder) == "running":
             msg = f"run {run!r} is going on in another process"
             raise ConflictError(msg)
@@ -245,6 +275,8 @@ class Runs:
             going = [one for one in self._active.values() if one.ended is None]
         self._pool.shutdown(wait=False, cancel_futures=True)
         for one in going:
+            if one.long:  # can go on when there is a server again
+                one.live.kill()
             one.live.command(Command("stop"))
         for one in going:
             try:
@@ -252,9 +284,9 @@ class Runs:
             except TimeoutError:
                 one.live.kill()
 
-    def _run(self, active: Active, wish: NewRun) -> None:
+    def _run(self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]) -> None:
         try:
-            state, error = self._simulate(active, wish)
+            state, error = simulate()
         except OdscenError as wrong:
             active.end("failed", str(wrong))
         except BaseException as wrong:
@@ -264,18 +296,7 @@ class Runs:
             active.end(state, error)
 
     def _simulate(self, active: Active, wish: NewRun) -> tuple[RunState, str | None]:
-        scenario = active.scenario
-        entry = self._workspace.map_for(scenario.map.name, scenario.map.sha256)
-        loaded = load_map(entry)
-        prepared = prepare(
-            scenario,
-            loaded.sumo,
-            entry.path("net"),
-            self._workspace.assets(),
-            seed=wish.seed,
-            until=wish.until,
-            step_length=wish.step_length,
-        )
+        prepared = self._prepared(active.scenario, wish)
         active.plan = prepared.plan
         active.live.wake()
 
@@ -284,13 +305,36 @@ class Runs:
 
         def finish(folder: Path, summary: Mapping[str, Any]) -> None:
             active.finishing = True
+            loaded = self._loaded(active.scenario)
             write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
         out = self._workspace.runs / active.id
-        result = run_prepared(prepared, out, finish=finish, live=active.live)
-        if result.status == "failed":
-            return "failed", str(result.summary["error"])
-        return ("stopped" if result.summary["stopped"] else "completed"), None
+        return _end_of(run_prepared(prepared, out, finish=finish, live=active.live), active)
+
+    def _go_on(self, active: Active) -> tuple[RunState, str | None]:
+        folder = self._workspace.runs / active.id
+        return _end_of(resume(self._workspace, folder, live=active.live), active)
+
+    def _prepared(self, scenario: Scenario, wish: NewRun) -> PreparedRun:
+        loaded = self._loaded(scenario)
+        return prepare(
+            scenario,
+            loaded.sumo,
+            loaded.entry.path("net"),
+            self._workspace.assets(),
+            seed=wish.seed,
+            until=wish.until,
+            step_length=wish.step_length,
+            recording=Recording(trajectories=wish.trajectories, every=wish.every),
+        )
+
+    def _loaded(self, scenario: Scenario) -> LoadedMap:
+        return load_map(self._workspace.map_for(scenario.map.name, scenario.map.sha256))
+
+    def _refuse_more(self) -> None:
+        if sum(one.ended is None for one in self._active.values()) >= MOST:
+            msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
+            raise ConflictError(msg)
 
     def _mirror(self, active: Active, plan: Plan, wish: NewRun) -> tuple[RunState, str | None]:
         """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
@@ -323,35 +367,14 @@ class Runs:
                 return free
         raise AssertionError
 
-    def _finished(self, run: str) -> RunInfo:
-        folder = self.folder(run)
-        if not (folder / layout.SUMMARY_FILE).is_file():
-            return _unfinished(folder)
-        summary = self._summary(folder.name) or {}
-        failed = summary.get("status") != "completed"
-        return RunInfo(
-            run=run,
-            state="failed" if failed else "stopped" if summary.get("stopped") else "completed",
-            scenario=str(summary.get("scenario", run)),
-            map=summary.get("map"),
-            summary=summary,
-            error=summary.get("error"),
-            finished=self._end_time(folder.name),
-        )
 
-    def _end_time(self, run: str) -> float | None:
-        try:
-            return (self._workspace.runs / run / layout.SUMMARY_FILE).stat().st_mtime
-        except OSError:
-            return None
-
-    def _summary(self, run: str) -> dict[str, Any] | None:
-        try:
-            text = (self._workspace.runs / run / layout.SUMMARY_FILE).read_text(encoding="utf-8")
-            summary: dict[str, Any] = json.loads(text)
-        except (OSError, ValueError):
-            return None
-        return summary
+def _end_of(result: RunResult, active: Active) -> tuple[RunState, str | None]:
+    """How a run has ended, and why, if it has not ended as planned."""
+    if result.status == "completed":
+        return ("stopped" if result.summary["stopped"] else "completed"), None
+    if read_status(result.folder) is None:
+        return "failed", str(result.summary["error"])
+    return "interrupted", None if active.interrupted else str(result.summary["error"])
 
 
 def _stem(scenario: str) -> str:
@@ -362,29 +385,3 @@ def _stem(scenario: str) -> str:
 def _names_of(scenario: str) -> re.Pattern[str]:
     """Ids of a scenario's runs that a server has started."""
     return re.compile(rf"{re.escape(_stem(scenario))}-[1-9]\d*")
-
-
-def _shown(folder: Path) -> Path | None:
-    """Return the file that makes a folder a run: its summary, or its status if it has not ended."""
-    files = (folder / name for name in (layout.SUMMARY_FILE, layout.STATUS_FILE))
-    return next((file for file in files if file.is_file()), None)
-
-
-def _unfinished(folder: Path) -> RunInfo:
-    """Describe a run in slices that has not ended, from what it last said of itself."""
-    status = read_status(folder) or {}
-    at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))
-    state: RunState = going(folder) or "interrupted"
-    told = f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} goes on."
-    return RunInfo(
-        run=folder.name,
-        state=state,
-        scenario=str(status.get("scenario", folder.name)),
-        map=about(folder).get("map"),
-        progress=RunProgress(
-            time=at,
-            until=until,
-            **{key: status.get(key, 0) for key in ("running", "departed", "arrived", "planned")},
-        ),
-        error=told if state == "interrupted" else None,
-    )

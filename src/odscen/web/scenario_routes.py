@@ -55,7 +55,7 @@ def create(wish: NewScenario, shared: Shared) -> ScenarioState:
     entry = shared.workspace.map(wish.map)
     scenario = new_scenario(load_map(entry).sumo.graph, name=wish.name or wish.map)
     draft = shared.drafts.create(scenario, wish.name, stem=wish.map, label="New scenario")
-    return _state(shared, draft)
+    return state_of(shared, draft)
 
 
 @router.post("/upload", status_code=201)
@@ -71,13 +71,13 @@ def upload(
 
     stem = name_from_file(FilePath(given))
     draft = shared.drafts.create(scenario, name, stem=stem, label="Upload")
-    return _state(shared, draft)
+    return state_of(shared, draft)
 
 
 @router.get("/{name}")
 def show(name: str, shared: Shared) -> ScenarioState:
     """One scenario as it is now."""
-    return _state(shared, shared.drafts.get(name))
+    return state_of(shared, shared.drafts.get(name))
 
 
 @router.delete("/{name}", status_code=204)
@@ -89,7 +89,7 @@ def remove(name: str, shared: Shared) -> None:
 @router.put("/{name}/name")
 def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
     """Give a scenario's file another name."""
-    return _state(shared, shared.drafts.rename(name, new.name))
+    return state_of(shared, shared.drafts.rename(name, new.name))
 
 
 @router.post("/{name}/edits")
@@ -102,19 +102,19 @@ def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
             scenario = apply_edit(one, scenario, loaded)
         return scenario
 
-    return _state(shared, shared.drafts.change(name, request.version, request.words, change))
+    return state_of(shared, shared.drafts.change(name, request.version, request.words, change))
 
 
 @router.post("/{name}/undo")
 def undo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
     """Take the last edit back."""
-    return _state(shared, shared.drafts.undo(name, request.version))
+    return state_of(shared, shared.drafts.undo(name, request.version))
 
 
 @router.post("/{name}/redo")
 def redo(name: str, request: OfVersion, shared: Shared) -> ScenarioState:
     """Make the edit again that was taken back last."""
-    return _state(shared, shared.drafts.redo(name, request.version))
+    return state_of(shared, shared.drafts.redo(name, request.version))
 
 
 @router.post("/{name}/copy", status_code=201)
@@ -122,7 +122,7 @@ def copy(name: str, wish: CopyName, shared: Shared) -> ScenarioState:
     """Save a scenario under another name too; a free one is made if none is given."""
     scenario = shared.drafts.get(name).scenario
     draft = shared.drafts.create(scenario, wish.name, stem=name, label=f"Copy of {name}")
-    return _state(shared, draft)
+    return state_of(shared, draft)
 
 
 @router.get("/{name}/goals")
@@ -182,7 +182,8 @@ def download(name: str, shared: Shared, form: Literal["json", "graphml"] = "json
     return Response(content, media_type=media_type, headers=headers)
 
 
-def _state(shared: Services, draft: Draft) -> ScenarioState:
+def state_of(shared: Services, draft: Draft) -> ScenarioState:
+    """Answer with a scenario as it is now."""
     history = draft.history
     return ScenarioState(
         name=draft.name,

@@ -1,0 +1,30 @@
+import { Select } from "@mantine/core";
+
+import type { Background } from "../api/demand";
+import type { Edit } from "../api/types";
+import { Committed } from "./Committed";
+import { ProfileChoice, type Profiles } from "./DayProfiles";
+import { AMOUNTS, amountOf } from "./demand";
+import { MixFold, PartCard } from "./DemandParts";
+
+/** Vehicles that come and go anywhere: how many, when, and of which kinds. */
+export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
+  background: Background; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
+}) {
+  const amount = amountOf(background);
+  const change = (fields: object): void => onEdit({ kind: "set_background", background: background.id, ...fields });
+  return (
+    <PartCard name={background.id} what="Background traffic" onRemove={onRemove}>
+      <Select label="How much" data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))} value={amount.key} allowDeselect={false}
+        onChange={(key) => {
+          const chosen = AMOUNTS.find((one) => one.key === key);
+          if (chosen && chosen !== amount) change({ [chosen.key]: chosen.begin });
+        }} />
+      <Committed label={amount.unit} suffix={amount.suffix} min={amount.min} max={amount.max} digits={amount.digits}
+        value={(background[amount.key] ?? amount.begin) * amount.scale}
+        onCommit={(value) => { if (value !== null) change({ [amount.key]: value / amount.scale }); }} />
+      <ProfileChoice value={background.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
+      <MixFold mix={background.mix} onChange={(mix) => change({ mix })} />
+    </PartCard>
+  );
+}

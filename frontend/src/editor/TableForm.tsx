@@ -1,0 +1,86 @@
+import { Alert, Anchor, Button, FileButton, Group, List, Select, Text, TextInput } from "@mantine/core";
+import { useEffect, useRef, useState } from "react";
+
+import { ApiError } from "../api/client";
+import { type Demand, demand, type TableKind } from "../api/demand";
+import { tell } from "../ui/notices";
+import { exampleTable } from "./demand";
+import type { EditorStore } from "./store";
+
+const KINDS: readonly { value: TableKind; label: string; stem: string | null; text: string }[] = [
+  { value: "od", label: "Trips from where to where", stem: "trips", text: "How many go from one place to another. Columns “begin” and “end” may say when." },
+  { value: "counts", label: "Counts", stem: "counts", text: "How many vehicles passed a place. Traffic is made that reproduces them. A place is a segment, or segments one after another: r1>j2>r3." },
+  { value: "profile", label: "A day profile", stem: "my-day", text: "How much comes in each equal slice of a day, from midnight on." },
+  { value: "zones", label: "Zones", stem: null, text: "Names for several segments, which tables of trips can use." },
+];
+
+interface Refusal {
+  file: string;
+  problems: string[];
+}
+
+/** Reads a table into the scenario, all of it or nothing. */
+export function TableForm({ store, demand: known, roads }: {
+  store: EditorStore; demand: Demand;
+  /** Roads of the region, for the example. */
+  roads: readonly string[];
+}) {
+  const { name, take } = store();
+  const [kind, setKind] = useState<TableKind>("od");
+  const [part, setPart] = useState("trips");
+  const [busy, setBusy] = useState(false);
+  const [refusal, setRefusal] = useState<Refusal | null>(null);
+  const reset = useRef<() => void>(null);
+  const alert = useRef<HTMLDivElement>(null);
+  useEffect(() => { if (refusal) alert.current?.scrollIntoView({ block: "nearest" }); }, [refusal]);
+  const chosen = KINDS.find((one) => one.value === kind) ?? KINDS[0];
+  const example = exampleTable(kind, known, roads);
+  const choose = (next: string | null): void => {
+    const found = KINDS.find((one) => one.value === next);
+    if (!found) return;
+    setKind(found.value);
+    setPart(found.stem ?? "");
+    setRefusal(null);
+  };
+  const send = (file: File | null): void => {
+    reset.current?.();  // the same file can be chosen again once it is mended
+    if (!file) return;
+    setBusy(true);
+    setRefusal(null);
+    take((version) => demand.table(name, version, kind, file, chosen.stem && part.trim()))
+      .then(() => tell(`${file.name} is read in.`), (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }))
+      .finally(() => setBusy(false));
+  };
+  return (
+    <div className="fold">
+      <Select label="What the table has" data={KINDS.map(({ value, label }) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
+      <Text size="sm">{chosen.text}</Text>
+      <div>
+        <Text size="xs" c="dimmed">For example, as text with commas, semicolons or tabs:</Text>
+        <pre className="example" tabIndex={0} aria-label="An example">{example}</pre>
+        <Anchor size="sm" underline="always" href={`data:text/csv;charset=utf-8,${encodeURIComponent(example)}`} download={`${chosen.stem ?? "zones"}.csv`}>Download this example</Anchor>
+      </div>
+      {kind !== "profile" && <Text size="xs" c="dimmed">Point at a road or junction on the map to see what tables call it.</Text>}
+      {chosen.stem && <TextInput label="Name" description="what has this name already is replaced" inputWrapperOrder={["label", "input", "description"]}
+        value={part} onChange={(event) => setPart(event.currentTarget.value)} />}
+      {refusal && (
+        <Alert ref={alert} color="red" title={`${refusal.file} was not read in`} style={{ overflowWrap: "anywhere" }}>
+          {refusal.problems.length === 1 ? refusal.problems[0]
+            : <List size="sm">{refusal.problems.map((problem) => <List.Item key={problem}>{problem}</List.Item>)}</List>}
+        </Alert>
+      )}
+      <Group>
+        <FileButton accept=".csv,.tsv,.txt,text/csv" resetRef={reset} onChange={send}>
+          {(props) => <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>Choose a table</Button>}
+        </FileButton>
+      </Group>
+    </div>
+  );
+}
+
+/** All reasons for a refusal; each begins with a capital letter. */
+function problemsOf(error: unknown): string[] {
+  const body = error instanceof ApiError ? error.body : null;
+  const told = body?.problems?.map((one) => typeof one === "string" ? one : one.message) ?? [];
+  return (told.length > 0 ? told : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
+}

@@ -1,0 +1,84 @@
+import type { Background, Demand, Matrix, Mix, TableKind } from "../api/demand";
+import { CATEGORIES } from "../api/types";
+import { CATEGORY_WORD, count } from "../ui/words";
+
+/** Ways to say how much background traffic there is, with what to begin with. */
+export const AMOUNTS = [
+  { key: "fill", word: "Share of the room on the roads", unit: "Percent", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
+  { key: "per_km", word: "Vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
+  { key: "trips", word: "Trips in all", unit: "Trips", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
+] as const;
+export type Amount = (typeof AMOUNTS)[number];
+
+export const amountOf = (one: Background): Amount =>
+  AMOUNTS.find(({ key }) => one[key] !== null) ?? AMOUNTS[0];
+
+/** Whether anybody comes by the demand of a scenario. */
+export const bringsSomebody = ({ matrices, counts, background }: Demand): boolean =>
+  matrices.length + counts.length + background.length > 0;
+
+export const tripsOf = (matrix: Matrix): number => matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
+
+/** What a scenario's traffic is, in a line. */
+export function trafficNote(demand: Demand): string {
+  const { matrices, counts, background } = demand;
+  if (!bringsSomebody(demand)) return "Who else is on the road?";
+  const trips = Math.round(matrices.reduce((sum, one) => sum + tripsOf(one), 0));
+  const counted = counts.reduce((sum, one) => sum + one.rows.length, 0);
+  return [
+    ...(matrices.length ? [count(trips, "trip")] : []),
+    ...(counts.length ? [count(counted, "count")] : []),
+    ...(background.length ? ["background traffic"] : []),
+  ].join(", ");
+}
+
+/** Shares of the kinds, the largest first. */
+export function mixWords(mix: Mix): string {
+  const total = Object.values(mix).reduce((sum, share) => sum + share, 0);
+  return CATEGORIES.filter((one) => mix[one])
+    .sort((a, b) => (mix[b] ?? 0) - (mix[a] ?? 0))
+    .map((one) => `${CATEGORY_WORD[one]} ${Math.round((100 * (mix[one] ?? 0)) / total)} %`)
+    .join(", ");
+}
+
+/** A name that no part of the demand has yet. */
+export function freeName(demand: Demand, stem: string): string {
+  const taken = new Set([demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background].flat().map(({ id }) => id));
+  for (let n = 1; ; n++) {
+    const name = n === 1 ? stem : `${stem}-${n}`;
+    if (!taken.has(name)) return name;
+  }
+}
+
+/** Time of day as a field shows it: `07:05`. */
+export function timeOfDay(seconds: number): string {
+  const minutes = Math.floor(seconds / 60) % (24 * 60);
+  return `${String(Math.floor(minutes / 60)).padStart(2, "0")}:${String(minutes % 60).padStart(2, "0")}`;
+}
+
+/** Inverse of {@link timeOfDay}; null for what is no time. */
+export function secondsOfDay(text: string): number | null {
+  const found = /^(\d{1,2}):(\d{2})$/.exec(text);
+  const seconds = found ? Number(found[1]) * 3600 + Number(found[2]) * 60 : Infinity;
+  return seconds < 86_400 ? seconds : null;
+}
+
+/** When most and fewest come. */
+export function peakWords(shares: readonly number[]): string {
+  const at = (n: number): string => timeOfDay((n * 86_400) / shares.length);
+  return `most from ${at(shares.indexOf(Math.max(...shares)))}, fewest from ${at(shares.indexOf(Math.min(...shares)))}`;
+}
+
+/** What a table looks like, with roads of the scenario's own; it can be read in as it is. */
+export function exampleTable(kind: TableKind, demand: Demand, roads: readonly string[]): string {
+  const [a, b] = [roads[0] ?? "r1", roads[1] ?? roads[0] ?? "r2"];
+  const start = demand.clock;
+  const slice = (n: number): string => `${timeOfDay(start + 900 * n)},${timeOfDay(start + 900 * (n + 1))}`;
+  const rows: Record<TableKind, string[]> = {
+    od: ["from,to,trips", `${a},${b},120`, `${b},${a},90`],
+    counts: ["place,begin,end,count", `${a},${slice(0)},48`, `${a},${slice(1)},55`],
+    profile: ["time,share", "0:00,1", "6:00,6", "12:00,5", "18:00,3"],
+    zones: ["zone,segment", `centre,${a}`, ...(b === a ? [] : [`centre,${b}`])],
+  };
+  return `${rows[kind].join("\n")}\n`;
+}

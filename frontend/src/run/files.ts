@@ -1,0 +1,33 @@
+import type { RunFile } from "../api/runs";
+
+const WORD: Record<string, string> = {
+  "report.html": "Full report", "parity.html": "Compared with CARLA", "summary.json": "Key figures", "figures.json": "Figures by place",
+  "actors.json": "What became of each road user", "events.json": "What happened on the road", "plan.json": "What was planned",
+  "scenario.json": "The scenario as it was run", "sumo.log": "What the simulator said", "trajectories.parquet": "Where everybody was",
+  "figures/network.csv": "The whole road network over time", "figures/segments.csv": "Each road over time",
+  "figures/junctions.csv": "Each junction over time", "figures/movements.csv": "Each turn over time",
+};
+
+interface Group {
+  title: string;
+  text: string;
+  files: (RunFile & { word: string })[];
+}
+
+const GROUPS: readonly { title: string; text: string; holds: (name: string) => boolean }[] = [
+  { title: "To read", text: "Open in any browser; they need nothing else.", holds: (name) => name.endsWith(".html") },
+  { title: "Tables", text: "Open in a spreadsheet.", holds: (name) => name.endsWith(".csv") },
+  { title: "Figures and lists", text: "As data, for programs (JSON).", holds: (name) => name.endsWith(".json") },
+  { title: "Recordings", text: "Large tables, for programs (Parquet).", holds: (name) => name.endsWith(".parquet") },
+  { title: "The rest", text: "If something went wrong.", holds: () => true },
+];
+
+/** Files by what one does with them, in plain words where they are known. */
+export function fileGroups(files: readonly RunFile[]): Group[] {
+  let left = [...files];
+  return GROUPS.flatMap(({ title, text, holds }) => {
+    const mine = left.filter(({ name }) => holds(name));
+    left = left.filter((file) => !mine.includes(file));
+    return mine.length > 0 ? [{ title, text, files: mine.map((file) => ({ ...file, word: WORD[file.name] ?? file.name })) }] : [];
+  });
+}

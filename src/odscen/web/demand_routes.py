@@ -1,0 +1,56 @@
+"""Routes for demand that is more than one edit: tables, and a whole day."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, File, Form, UploadFile
+
+from odscen import demands
+from odscen.errors import InputError
+from odscen.scenario.document import Identifier, Scenario
+from odscen.web.messages import DayMade, ScenarioState, Version, WholeDay
+from odscen.web.scenario_routes import state_of
+from odscen.web.services import Shared
+
+router = APIRouter(prefix="/api/scenarios/{name}/demand")
+
+_WORDS = {"od": "trips", "counts": "counts", "profile": "a day profile", "zones": "zones"}
+
+
+@router.post("/table")
+def table(
+    name: str,
+    shared: Shared,
+    file: Annotated[UploadFile, File(description="Comma, semicolon or tab separated.")],
+    version: Annotated[Version, Form()],
+    kind: Annotated[Literal["od", "counts", "profile", "zones"], Form()],
+    part: Annotated[Identifier | None, Form(description="Name of what is read in.")] = None,
+    day: Annotated[Identifier | None, Form(description="Day profile of trips.")] = None,
+) -> ScenarioState:
+    """Read a table into a scenario, all of it or nothing; see ``docs/demand.md``."""
+    try:
+        text = file.file.read().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        msg = "this is not a text file in UTF-8; save the table as CSV (UTF-8)"
+        raise InputError(msg, file=file.filename) from error
+
+    def change(scenario: Scenario) -> Scenario:
+        loaded = shared.map_of(scenario)
+        return demands.import_text(loaded, scenario, text, kind=kind, name=part, day=day)
+
+    label = f"Table of {_WORDS[kind]}"
+    return state_of(shared, shared.drafts.change(name, version, label, change))
+
+
+@router.post("/day")
+def day(name: str, wish: WholeDay, shared: Shared) -> DayMade:
+    """Give a scenario 24 hours of traffic on its whole map; takes seconds."""
+    scenario = shared.drafts.get(name).scenario
+    # Made before the drafts are locked; a change meanwhile is another version, and refused.
+    made, load = demands.with_whole_day(
+        shared.map_of(scenario), scenario, trips=wish.trips, day=wish.day
+    )
+    label = f"A {wish.day} of the whole town"
+    draft = shared.drafts.change(name, wish.version, label, lambda _: made)
+    return DayMade(scenario=state_of(shared, draft), **load._asdict())

@@ -1,0 +1,161 @@
+"""Runs whose folder is there: what they say of themselves, and their files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, Any
+
+from odscen.catalog.store import check_name
+from odscen.durations import clock
+from odscen.errors import NotFoundError
+from odscen.sumo import layout
+from odscen.sumo.long_runs import about
+from odscen.sumo.status import going, read_status
+from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+SUFFIXES = (".html", ".json", ".csv", ".parquet", ".log")
+"""Of files that can be downloaded."""
+_INNER = {layout.SETTINGS_FILE, layout.STATUS_FILE}
+_INNER_FOLDERS = {layout.SUMO_FOLDER, layout.SLICES_FOLDER}
+
+
+class KeptRuns:
+    """Folders of runs, of this server or of anybody else."""
+
+    def __init__(self, runs: Path) -> None:
+        self._runs = runs
+
+    def folder(self, run: str) -> Path:
+        """Folder of a run that is finished, or in slices and not.
+
+        Raises
+        ------
+        NotFoundError
+            If there is none.
+        """
+        folder = self._runs / check_name(run, what="run")
+        if _shown(folder) is None:
+            what = "finished run"
+            raise NotFoundError(what, run, [])
+        return folder
+
+    def by_age(self) -> list[str]:
+        """Names of all runs, the newest last."""
+        folders = self._runs.iterdir() if self._runs.is_dir() else ()
+        found = [(file.stat().st_mtime, path.name) for path in folders if (file := _shown(path))]
+        return [name for _, name in sorted(found)]
+
+    def info(self, run: str) -> RunInfo:
+        """What a run says of itself."""
+        folder = self.folder(run)
+        if read_status(folder) is not None or not (folder / layout.SUMMARY_FILE).is_file():
+            return _unfinished(folder, self.summary(run))
+        summary = self.summary(run) or {}
+        failed = summary.get("status") != "completed"
+        return RunInfo(
+            run=run,
+            state="failed" if failed else "stopped" if summary.get("stopped") else "completed",
+            scenario=str(summary.get("scenario", run)),
+            map=summary.get("map"),
+            summary=summary,
+            error=summary.get("error"),
+            finished=self.end_time(run),
+        )
+
+    def summary(self, run: str) -> dict[str, Any] | None:
+        """Key figures; ``None`` until there are some."""
+        try:
+            text = (self._runs / run / layout.SUMMARY_FILE).read_text(encoding="utf-8")
+            summary: dict[str, Any] = json.loads(text)
+        except (OSError, ValueError):
+            return None
+        return summary
+
+    def end_time(self, run: str) -> float | None:
+        """When the summary was written, seconds since 1970."""
+        try:
+            return (self._runs / run / layout.SUMMARY_FILE).stat().st_mtime
+        except OSError:
+            return None
+
+    def slices(self, run: str) -> RunSlices | None:
+        """How much of a long run that has not ended is complete; ``None`` for others."""
+        status = read_status(self._runs / run)
+        if status is None:
+            return None
+        return RunSlices(
+            done=status.get("slices", 0),
+            length=status.get("slice_length") or 0.0,
+            time=status.get("time", 0.0),
+        )
+
+    def content(self, run: str) -> RunContent:
+        """What a run's scenario says: a digest without its name and description, and its counts."""
+        try:
+            text = (self.folder(run) / layout.SCENARIO_FILE).read_text(encoding="utf-8")
+            said = json.loads(text)
+            said.pop("name", None)
+            said.pop("description", None)
+            counts = sum(len(part["rows"]) for part in said.get("demand", {}).get("counts", ()))
+        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+            what = "scenario of run"
+            raise NotFoundError(what, run, []) from error
+        digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        return RunContent(digest=digest, counts=counts)
+
+    def files(self, run: str) -> list[RunFile]:
+        """Files of a run that can be downloaded, by name."""
+        folder = self.folder(run)
+        return [
+            RunFile(name=path.relative_to(folder).as_posix(), size=path.stat().st_size)
+            for path in sorted(_files(folder))
+        ]
+
+    def file(self, run: str, name: str) -> Path:
+        """One of :meth:`files`; :class:`NotFoundError` for any other name."""
+        known = [one.name for one in self.files(run)]
+        if name not in known:
+            what = f"file of run {run!r}"
+            raise NotFoundError(what, name, known)
+        return self.folder(run) / name
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in (*folder.glob("*"), *folder.glob("*/*")):
+        inner = path.name in _INNER or path.parent.name in _INNER_FOLDERS
+        if path.is_file() and path.suffix in SUFFIXES and not inner:
+            yield path
+
+
+def _shown(folder: Path) -> Path | None:
+    """Return the file that makes a folder a run: its summary, or its status if it has not ended."""
+    files = (folder / name for name in (layout.SUMMARY_FILE, layout.STATUS_FILE))
+    return next((file for file in files if file.is_file()), None)
+
+
+def _unfinished(folder: Path, summary: dict[str, Any] | None) -> RunInfo:
+    """Describe a run in slices that has not ended, from what it last said of itself."""
+    status = read_status(folder) or {}
+    at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))
+    state: RunState = going(folder) or "interrupted"
+    told = f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} goes on."
+    if summary is not None and summary.get("error"):
+        told = f"{told}\n{summary['error']}"
+    return RunInfo(
+        run=folder.name,
+        state=state,
+        scenario=str(status.get("scenario", folder.name)),
+        map=about(folder).get("map"),
+        progress=RunProgress(
+            time=at,
+            until=until,
+            **{key: status.get(key, 0) for key in ("running", "departed", "arrived", "planned")},
+        ),
+        error=told if state == "interrupted" else None,
+        slices=KeptRuns(folder.parent).slices(folder.name),
+    )

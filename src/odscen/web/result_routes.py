@@ -1,0 +1,50 @@
+"""Routes for what a run has left: its files, and how well it meets counts of vehicles."""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+
+from fastapi import APIRouter
+from starlette.responses import FileResponse, Response
+
+from odscen import demands
+from odscen.scenario.counting import place_points
+from odscen.sumo.layout import SCENARIO_FILE
+from odscen.web.run_messages import FitRow, RunFile, RunFit
+from odscen.web.services import Shared
+from odscen.workflow import read_scenario
+
+router = APIRouter(prefix="/api/runs/{run}")
+
+
+@router.get("/files")
+def files(run: str, shared: Shared) -> list[RunFile]:
+    """Files that can be downloaded: report, figures, tables, recordings."""
+    return shared.runs.kept.files(run)
+
+
+@router.get("/files/{name:path}", response_class=Response)
+def file(run: str, name: str, shared: Shared) -> Response:
+    """Download one of them."""
+    path = shared.runs.kept.file(run, name)
+    return FileResponse(path, filename=f"{run}-{PurePosixPath(name).name}")
+
+
+@router.get("/fit")
+def fit(run: str, shared: Shared) -> RunFit:
+    """How well a finished run meets the counts of its scenario."""
+    folder = shared.runs.kept.folder(run)
+    found = demands.fit(shared.workspace, folder)
+    scenario = read_scenario(folder / SCENARIO_FILE)
+    graph = shared.map_of(scenario).sumo.graph
+    points = place_points(graph, [row.place for row in found.rows])
+    rows = []
+    for row in found.rows:
+        x, y = points.get(row.place, (None, None))
+        rows.append(FitRow(**row._asdict(), met=row.met, x=x, y=y))
+    return RunFit(
+        rows=rows,
+        met=sum(row.met for row in found.rows),
+        rmse=found.rmse,
+        contradictions=list(found.contradictions),
+    )

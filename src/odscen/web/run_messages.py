@@ -1,0 +1,198 @@
+"""What goes over the wire about runs; see :mod:`odscen.web.messages`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from odscen.web.messages import Answer, Body, Name
+
+RunState = Literal[
+    "preparing", "running", "paused", "finishing", "completed", "stopped", "failed", "interrupted"
+]
+
+
+class NewRun(Body):
+    """Run a scenario as it is now.
+
+    ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
+    simulated seconds per second, ``None`` as fast as it can; a ``paused`` run makes one step.
+    Places of road users are recorded ``every`` so many seconds, ``None`` with each step, unless
+    ``trajectories`` is false. With ``carla`` it is shown on the CARLA server too, step by step, and
+    recorded whole.
+    """
+
+    scenario: Name
+    until: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**31)] | None = None
+    step_length: Annotated[float, Field(ge=0.01, le=1)] | None = None
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+    paused: bool = False
+    trajectories: bool = True
+    every: Annotated[float, Field(gt=0, le=3600)] | None = None
+    carla: bool = False
+
+
+class GoOn(Body):
+    """Go on with an interrupted run; ``speed`` as in :class:`NewRun`."""
+
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+
+
+class RunForecast(Answer):
+    """What a run will need, roughly: bytes, and how many will be on the road at a time at most.
+
+    ``free`` is what the disk has; ``planned`` is how many set out in all.
+    """
+
+    planned: int
+    running: int
+    disk: int
+    memory: int
+    free: int
+
+
+class RunSlices(Answer):
+    """Slices of a long run: what was simulated up to ``time`` cannot be lost any more.
+
+    ``done`` is how many are complete, of ``length`` seconds each.
+    """
+
+    done: int
+    length: float
+    time: float
+
+
+class RunStarted(Answer):
+    """The run's id."""
+
+    run: str
+
+
+class Control(Body):
+    """Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
+
+    ``interrupt`` ends a long run at once, so that it can go on later.
+    """
+
+    action: Literal["pause", "resume", "step", "speed", "stop", "interrupt"]
+    speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
+
+
+class RunProgress(Answer):
+    """How far a run is; ``time_left`` in wall seconds at full speed, if it can be told."""
+
+    time: float
+    until: float
+    running: int
+    departed: int
+    arrived: int
+    planned: int
+    time_left: float | None = None
+
+
+class RunInfo(Answer):
+    """A run, going on or finished; ``summary`` is that of ``summary.json``.
+
+    ``finished`` is when its results were written, in seconds since 1970. ``carla`` says that it is
+    shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
+    ``slices``; one that is ``interrupted`` can go on from the last of them.
+    """
+
+    run: str
+    state: RunState
+    scenario: str
+    map: str | None
+    speed: float | None = None
+    progress: RunProgress | None = None
+    summary: dict[str, Any] | None = None
+    error: str | None = None
+    finished: float | None = None
+    carla: bool = False
+    slices: RunSlices | None = None
+
+
+class RunFile(Answer):
+    """A file of a run that can be downloaded; ``size`` in bytes."""
+
+    name: str
+    size: int
+
+
+class FitRow(Answer):
+    """One count of vehicles from ``begin`` to ``end`` (seconds) and what a run made of it.
+
+    ``x`` and ``y`` are where it was counted, metres; ``why`` says why it is not met.
+    """
+
+    counts: str
+    place: str
+    begin: float
+    end: float
+    counted: float
+    modelled: int
+    geh: float
+    met: bool
+    why: str
+    x: float | None = None
+    y: float | None = None
+
+
+class RunFit(Answer):
+    """All counts of a run's scenario against the run; ``rmse`` in vehicles per slice."""
+
+    rows: list[FitRow]
+    met: int
+    rmse: float | None
+    contradictions: list[str]
+
+
+class RunCurve(Answer):
+    """How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds."""
+
+    time: list[float]
+    running: list[float]
+    arrived: list[float]
+    waiting: list[float]
+
+
+class RunSpeeds(Answer):
+    """Speeds of all vehicles in m/s around each ``time``: mean, and 10th and 90th percentile."""
+
+    time: list[float]
+    mean: list[float | None]
+    low: list[float | None]
+    high: list[float | None]
+
+
+class RunShares(Answer):
+    """Share of all vehicle time spent between ``edges[i]`` and ``edges[i + 1]``, m/s."""
+
+    edges: list[float]
+    share: list[float]
+
+
+class RunCurves(Answer):
+    """What a finished run looked like over time."""
+
+    counts: RunCurve
+    speeds: RunSpeeds
+    shares: RunShares
+
+
+class RunContent(Answer):
+    """``digest`` is the same where scenarios differ at most in name and description.
+
+    ``counts`` is how many counts of vehicles the scenario has.
+    """
+
+    digest: str
+    counts: int
+
+
+class RunEvents(Answer):
+    """Incidents of a finished run, as the live view tells them; ``left_off`` were too many."""
+
+    events: list[dict[str, Any]]
+    left_off: int

@@ -1,0 +1,136 @@
+"""Tables, whole days and the fit to counts, over the wire."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from odscen import demands, workflow
+from odscen.catalog.store import Workspace
+from odscen.scenario.counting import place_points
+from odscen.scenario.files import loads
+from tests.web.conftest import CROSSING, finished
+
+
+@pytest.fixture
+def state(client: TestClient) -> dict[str, Any]:
+    """A scenario on the whole crossing, empty."""
+    answer = client.post("/api/scenarios", json={"map": CROSSING, "name": "mine"})
+    segments = ["j10001", "r1", "r2", "r3", "r4"]
+    edits = [{"kind": "grow_roi", "segment": segment} for segment in segments]
+    body = {"version": answer.json()["version"], "edits": edits}
+    made: dict[str, Any] = client.post("/api/scenarios/mine/edits", json=body).json()
+    assert made["document"]["roi"] == segments
+    return made
+
+
+def send(client: TestClient, version: int, kind: str, text: str | bytes, **fields: str) -> Any:
+    return client.post(
+        "/api/scenarios/mine/demand/table",
+        files={"file": ("table.csv", text)},
+        data={"version": str(version), "kind": kind, **fields},
+    )
+
+
+def test_tables_are_read_in_and_taken_back(client: TestClient, state: dict[str, Any]) -> None:
+    zones = send(client, state["version"], "zones", "zone,segment\nwest,r1\n").json()
+    day = send(client, zones["version"], "profile", "share\n1\n3\n", part="market").json()
+    trips = send(
+        client, day["version"], "od", "from;to;trips\nwest;r2;30\n", part="am", day="market"
+    ).json()
+    counts = send(
+        client, trips["version"], "counts", "place,begin,end,count\nr1>j10001,0,900,12\n"
+    ).json()
+    demand = counts["document"]["demand"]
+    assert demand["matrices"][0]["trips"] == [["west", "r2", 30]]
+    assert (demand["matrices"][0]["id"], demand["matrices"][0]["profile"]) == ("am", "market")
+    assert demand["counts"][0]["rows"] == [["r1>j10001", 0, 900, 12]]
+    assert counts["undo"] == "Table of counts"
+    undone = client.post("/api/scenarios/mine/undo", json={"version": counts["version"]}).json()
+    assert undone["document"] == trips["document"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "told"),
+    [
+        (
+            "od",
+            "from,to,trips\nr1,r2,3\nr1,gone,3\n",
+            ["line 3, column 'to': 'gone' is neither a zone nor a segment of the map"],
+        ),
+        (
+            "counts",
+            "place,begin,end,count\nr1>r2,0,900,3\nr9,0,900,3\nr2,0,600,3\n",
+            ["line 2, column 'place'", "line 3, column 'place'", "line 4: the slice"],
+        ),
+        ("zones", "zone,segment\nin,r1\nout,r7\n", ["line 3, column 'segment'"]),
+        ("profile", "share\n0\n0\n", ["at least one share must be above 0"]),
+        ("od", "from,to,trips\nr1,r2,-3\n", ["line 2: trips must be a number from 0 on"]),
+        ("od", "from,to,trips\nr1,r2,3\n".encode("utf-16"), ["not a text file in UTF-8"]),
+        ("od", "", ["needed are from, to, trips"]),
+    ],
+)
+def test_a_wrong_table_is_refused_by_line_and_column_and_changes_nothing(
+    client: TestClient, state: dict[str, Any], kind: str, text: str | bytes, told: list[str]
+) -> None:
+    answer = send(client, state["version"], kind, text)
+    assert answer.status_code == 422
+    error = answer.json()["error"]
+    said = "\n".join([error["message"], *error["problems"]])
+    for words in told:
+        assert words in said
+    assert client.get("/api/scenarios/mine").json() == state
+
+
+def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
+    client: TestClient, state: dict[str, Any], workspace: Workspace
+) -> None:
+    wish = {"version": state["version"], "trips": 400}
+    answer = client.post("/api/scenarios/mine/demand/day", json=wish)
+    assert answer.status_code == 200, answer.text
+    made = answer.json()
+    document = made["scenario"]["document"]
+    ids = workflow.load_map(workspace.map(CROSSING)).sumo.graph.segments.ids
+    assert set(document["roi"]) == set(ids)
+    assert document["simulation"]["duration"] == 86_400
+    (matrix,) = document["demand"]["matrices"]
+    assert (matrix["profile"], matrix["begin"], matrix["end"]) == ("weekday", 0, 86_400)
+    assert sum(row[2] for row in matrix["trips"]) == pytest.approx(made["trips"], rel=0.02)
+    assert made["volume"] < made["capacity"]
+    assert not [one for one in made["scenario"]["problems"] if one["severity"] == "error"]
+    again = client.post("/api/scenarios/mine/demand/day", json=wish)
+    assert again.status_code == 409
+    body = {"version": made["scenario"]["version"]}
+    undone = client.post("/api/scenarios/mine/undo", json=body).json()
+    assert undone["document"] == state["document"]
+
+
+def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(
+    client: TestClient, state: dict[str, Any], workspace: Workspace
+) -> None:
+    text = "place,begin,end,count\nr1>j10001,0,300,25\nr1>j10001>r2,0,300,900\n"
+    version = send(client, state["version"], "counts", text).json()["version"]
+    edit = {"kind": "set_simulation", "duration": 300}
+    client.post("/api/scenarios/mine/edits", json={"version": version, "edits": [edit]})
+    run = client.post("/api/runs", json={"scenario": "mine"}).json()["run"]
+    assert finished(client, run)["state"] == "completed"
+    assert client.get(f"/api/runs/{run}/content").json()["counts"] == 2
+    found = client.get(f"/api/runs/{run}/fit").json()
+    ours = demands.fit(workspace, workspace.runs / run)
+    assert [row["modelled"] for row in found["rows"]] == [row.modelled for row in ours.rows]
+    assert found["met"] == sum(row.met for row in ours.rows) < 2
+    assert "add up to 900" in found["rows"][1]["why"]
+    scenario = loads(json.dumps(client.get("/api/scenarios/mine").json()["document"]))
+    graph = workflow.load_map(workspace.map(CROSSING)).sumo.graph
+    points = place_points(graph, [row[0] for row in scenario.demand.counts[0].rows])
+    assert [(row["x"], row["y"]) for row in found["rows"]] == list(points.values())
+
+
+def test_a_run_without_counts_has_no_fit(client: TestClient, sampled: str) -> None:
+    run = client.post("/api/runs", json={"scenario": sampled, "until": 5}).json()["run"]
+    finished(client, run)
+    assert client.get(f"/api/runs/{run}/content").json()["counts"] == 0
+    assert client.get(f"/api/runs/{run}/fit").status_code == 422
