@@ -10,6 +10,7 @@ ALL = (
     "lane_graph",
     "maps_add",
     "recording",
+    "long_run",
     "live_view",
     "carla_mirror",
     "canvas",
