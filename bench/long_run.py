@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import statistics
 import subprocess
 import tempfile
@@ -81,6 +82,8 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
         times: dict[str, list[Spent]] = {"odscen": [], "sumo": [], "silent": []}
         for _ in range(rounds):
             times["sumo"].append(timed(lambda: bare(config)))
+            for left in (layout.SLICES_FOLDER, layout.TRAJECTORIES_FOLDER):
+                shutil.rmtree(run / left, ignore_errors=True)  # else it goes on from there
             start = spent()
             ended = run_worker(run)
             times["odscen"].append(since(start))
