@@ -10,6 +10,7 @@ from odscen.frames import (
     SumoPose,
     XodrPose,
     angle_deg_from_hdg,
+    body_centre,
     carla_to_xodr,
     hdg_from_angle_deg,
     sumo_to_xodr,
@@ -53,6 +54,13 @@ def test_sumo_angles_count_clockwise_from_north(hdg, angle_deg):
 def test_the_bumper_of_a_four_metre_car_heading_east_is_two_metres_east_of_its_centre():
     pose = xodr_to_sumo(XodrPose(10.0, 5.0, 1.0, 0.0), length=4.0, net_offset=(100.0, 200.0))
     np.testing.assert_allclose(pose, SumoPose(112.0, 205.0, 1.0, 90.0, 0.0))
+
+
+@given(poses, st.floats(0.3, 20.0), st.tuples(coordinate, coordinate))
+def test_one_body_has_its_centre_where_whole_columns_have(pose, length, net_offset):
+    front = xodr_to_sumo(pose._replace(pitch=0.0), length=length, net_offset=net_offset)
+    x, y = body_centre(front.x, front.y, front.angle_deg, length=length, net_offset=net_offset)
+    assert (x, y) == pytest.approx((pose.x, pose.y), abs=1e-6)
 
 
 def test_carla_turns_north_into_minus_y():

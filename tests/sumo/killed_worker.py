@@ -1,6 +1,7 @@
 """The worker, killed with signal 9 just before the ``KILL_AT``-th time it changes the run folder.
 
-Run in place of :mod:`odscen.sumo.worker`. ``FILE_LIMIT`` makes every file longer than so many bytes
+Run in place of :mod:`odscen.sumo.worker`. With ``KILL_AFTER_SLICE`` it is the first time after that
+slice is complete. ``FILE_LIMIT`` makes every file longer than so many bytes
 fail as on a full disk.
 """
 
@@ -11,31 +12,37 @@ import os
 import resource
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+from odscen.sumo.checkpoint import slice_folder
 from odscen.sumo.worker import main
 
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "open")
 
 
-def kill_before_change(run: str, number: int) -> None:
-    """Install what kills this process."""
-    left = itertools.count(1)
+def kill_before_change(run: str, due: Callable[[], bool]) -> None:
+    """Install what kills this process before a change for which ``due`` says so."""
 
     def hook(event: str, args: tuple[object, ...]) -> None:
         if event not in CHANGES or not str(args[0]).startswith(run):
             return
         if event == "open" and "w" not in str(args[1]):
             return
-        if next(left) == number:
+        if due():
             os.kill(os.getpid(), signal.SIGKILL)
 
     sys.addaudithook(hook)
 
 
 if __name__ == "__main__":
+    folder = Path(sys.argv[1]).parent
     if "KILL_AT" in os.environ:
-        kill_before_change(str(Path(sys.argv[1]).parent), int(os.environ["KILL_AT"]))
+        left = itertools.count(1)
+        kill_before_change(str(folder), lambda: next(left) == int(os.environ["KILL_AT"]))
+    if "KILL_AFTER_SLICE" in os.environ:
+        last = slice_folder(folder, int(os.environ["KILL_AFTER_SLICE"]))
+        kill_before_change(str(folder), last.is_dir)
     if "FILE_LIMIT" in os.environ:
         limit = int(os.environ["FILE_LIMIT"])
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

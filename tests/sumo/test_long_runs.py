@@ -12,7 +12,7 @@ from odscen.errors import ConflictError, NotFoundError, SimulationError, Workspa
 from odscen.results.expectations import parse_expectation
 from odscen.results.records import EventKind, events_from_json
 from odscen.results.summary import actors_from_json
-from odscen.sumo import checkpoint, forecast, process, status
+from odscen.sumo import checkpoint, forecast, layout, process, status
 from odscen.sumo.layout import RECORDED
 from odscen.sumo.live import Live
 from odscen.sumo.long_runs import resume
@@ -119,9 +119,9 @@ def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = tmp_path / "run"
-    killed(long, run, monkeypatch, KILL_AT=30)
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=2)
     last = checkpoint.last_number(run)
-    assert last > 1
+    assert last == 2
     state = checkpoint.slice_folder(run, last) / checkpoint.STATE_FILE
     content = bytearray(state.read_bytes())
     content[len(content) // 2] ^= 0xFF
@@ -149,14 +149,22 @@ def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
 
 
 def test_a_disk_without_room_for_another_slice_stops_the_run_before_anything_is_torn(
-    tmp_path: Path,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = checkpoint.Checkpoint(
-        number=4, time=240.0, last=False, stopped=False, routes=0, steps=0, wall_seconds=0.0,
-        memory=0, running=0, present=[], recorder={}, files={"x": [1 << 60, 0]},
-    )  # fmt: skip
-    with pytest.raises(SimulationError, match=r"slice 5 needs about .* MB, .* MB are free"):
-        check_room(tmp_path, one)
+    folder = checkpoint.slice_folder(tmp_path, 4)
+    folder.mkdir(parents=True)
+    (folder / checkpoint.STATE_FILE).write_bytes(bytes(2_000_000))
+    part = checkpoint.recorded_part(tmp_path, layout.LANES_FILE, 4)
+    part.parent.mkdir()
+    part.write_bytes(bytes(4_000_000))
+    usage = shutil.disk_usage(tmp_path)
+    for free, room in ((9_000_000, True), (8_999_999, False)):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: usage._replace(free=free))
+        if room:
+            check_room(tmp_path, 4)
+        else:
+            with pytest.raises(SimulationError, match="slice 5 needs about 9 MB, 9 MB are free"):
+                check_room(tmp_path, 4)
 
 
 def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
@@ -267,7 +275,7 @@ def test_whoever_does_not_come_back_with_a_saved_state_is_told(
 ) -> None:
     """SUMO is made to forget a car; the run is resumed in a worker that is told so."""
     run = tmp_path / "run"
-    killed(long, run, monkeypatch, KILL_AT=13)
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
     assert checkpoint.last_number(run) == 1
     on_road = checkpoint.read_checkpoint(run, 1).present
     car = next(name for name in on_road if name.startswith("car"))

@@ -67,7 +67,12 @@ class JamWatch:
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
-        return {"next": self.due, "since": self._since, "seen": self._seen, "stuck": self._stuck}
+        return {
+            "next": self.due,
+            "since": dict(self._since),
+            "seen": dict(self._seen),
+            "stuck": dict(self._stuck),
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""

@@ -10,11 +10,10 @@ import shutil
 from typing import TYPE_CHECKING
 
 from odscen.errors import SimulationError
+from odscen.sumo.checkpoint import slice_size
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from odscen.sumo.checkpoint import Checkpoint
 
 RESERVE = 1.5
 """Room that a slice must find, as a multiple of what the one before it took."""
@@ -48,21 +47,24 @@ def tidy_part(path: Path) -> None:
         renamed.replace(path)
 
 
-def check_room(run: Path, before: Checkpoint | None) -> None:
+def check_room(run: Path, before: int) -> None:
     """Make sure that the disk holds another slice like the one before.
+
+    Parameters
+    ----------
+    before
+        Number of the slice before.
 
     Raises
     ------
     SimulationError
         If not; nothing is torn then.
     """
-    if before is None:
-        return
-    needed = int(RESERVE * sum(size for size, _ in before.files.values()))
+    needed = int(RESERVE * slice_size(run, before))
     free = shutil.disk_usage(run).free
     if free < needed:
         msg = (
-            f"the disk is nearly full: slice {before.number + 1} needs about "
+            f"the disk is nearly full: slice {before + 1} needs about "
             f"{needed / 1e6:,.0f} MB, {free / 1e6:,.0f} MB are free"
         )
         raise SimulationError(msg)

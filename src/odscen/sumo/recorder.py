@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from odscen.frames import SumoPose, sumo_to_xodr
+from odscen.frames import body_centre
 from odscen.results.records import Event, EventKind, Plan
 from odscen.sumo.jams import JamWatch
 
@@ -68,7 +68,7 @@ class Recorder:
             "drained": self.drained,
             "departed": self.departed,
             "arrived": self.arrived,
-            "departures": self._departures,
+            "departures": dict(self._departures),
             "touching": sorted(self._touching),
             "stopping": sorted(self._stopping),
             "jams": self._jams.state(),
@@ -127,8 +127,9 @@ class Recorder:
             return
         planned = self._planned.get(name)
         length = planned.length if planned else 0.0
-        centre = sumo_to_xodr(SumoPose(*front), length=length, net_offset=self._offset)
-        x, y = float(centre.x), float(centre.y)
+        x, y = body_centre(
+            front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
+        )
         error = math.hypot(x - planned.x, y - planned.y) if planned else None
         self.events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
 

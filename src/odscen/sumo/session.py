@@ -175,14 +175,19 @@ class Session:
     def lists(self) -> StepLists:
         """Id lists of the last step: one call each, whatever the number of vehicles running."""
         simulation = self._simulation
+        # A list costs far more than its length, and most are empty.
         return StepLists(
-            simulation.getDepartedIDList(),
-            simulation.getArrivedIDList(),
-            simulation.getDepartedPersonIDList(),
-            simulation.getArrivedPersonIDList(),
-            simulation.getStartingTeleportIDList(),
-            simulation.getEndingTeleportIDList(),
-            simulation.getEmergencyStoppingVehiclesIDList(),
+            simulation.getDepartedIDList() if simulation.getDepartedNumber() else (),
+            simulation.getArrivedIDList() if simulation.getArrivedNumber() else (),
+            simulation.getDepartedPersonIDList() if simulation.getDepartedPersonNumber() else (),
+            simulation.getArrivedPersonIDList() if simulation.getArrivedPersonNumber() else (),
+            simulation.getStartingTeleportIDList()
+            if simulation.getStartingTeleportNumber()
+            else (),
+            simulation.getEndingTeleportIDList() if simulation.getEndingTeleportNumber() else (),
+            simulation.getEmergencyStoppingVehiclesIDList()
+            if simulation.getEmergencyStoppingVehiclesNumber()
+            else (),
         )
 
     def collisions(self) -> list[Collision]:

@@ -3,14 +3,19 @@
 Going on after loading a state is not what SUMO would have done without saving: so every long run
 goes through the same reloads, interrupted or not, and one that goes on from slice ``k`` ends with
 the same results as one that was never interrupted. At each boundary SUMO closes its outputs.
+
+A slice is tidied and completed while the next one runs: that work is not SUMO's, and most of it is
+writing to the disk.
 """
 
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from odscen.errors import SimulationError
 from odscen.results.records import Plan, event_from_line, event_line
@@ -26,6 +31,7 @@ from odscen.sumo.checkpoint import (
     part_folder,
     read_checkpoint,
     slice_folder,
+    written_folder,
 )
 from odscen.sumo.conflict_files import tidy_conflicts
 from odscen.sumo.outputs import outputs_to, tidy_outputs
@@ -36,7 +42,8 @@ from odscen.sumo.session import open_session
 from odscen.sumo.status import write_status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
+    from concurrent.futures import Future
 
     from odscen.results.records import Event
     from odscen.sumo.session import Session
@@ -66,9 +73,11 @@ def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
         stepper.recorder.restore(done.recorder)
         stepper.steps = done.steps
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
-    while done is None or not done.last:
-        done = _Slice(plan, run, done, routes).run(stepper)
-        write_status(run, plan, done, stepper)
+    with _Completion(plan, run) as completion:
+        while done is None or not done.last:
+            written = _Slice(plan, run, done, routes).run(stepper, completion)
+            completion.take(written)
+            done = written.checkpoint
     return Done(done.time, done.steps, done.wall_seconds, done.stopped)
 
 
@@ -85,6 +94,87 @@ def event_lines(run: Path) -> Iterator[str]:
                 yield line.rstrip("\n")
 
 
+@dataclass(frozen=True, slots=True)
+class _Written:
+    """A slice that SUMO has written into ``part``, and that is not complete.
+
+    Attributes
+    ----------
+    checkpoint
+        Without ``files``.
+    events
+        What has happened in it.
+    lengths
+        Of lanes, metres.
+    lanes
+        How many vehicles came in on each lane with the state.
+    """
+
+    part: Path
+    checkpoint: Checkpoint
+    events: list[Event]
+    lengths: Mapping[str, float]
+    lanes: Mapping[str, int]
+
+    def complete(self, plan: Plan, run: Path) -> None:
+        """Tidy what SUMO has written and make the slice complete."""
+        part, last = self.part, self.checkpoint.last
+        with (part / EVENTS_LINES).open("w", encoding="utf-8") as out:
+            out.writelines(event_line(event) + "\n" for event in self.events)
+        if not last:
+            check_state(part / STATE_FILE)
+        tidy_part(part / layout.TRAJECTORIES_FILE)
+        tidy_outputs(part, self.lengths, present=self.lanes, last=last)
+        tidy_conflicts(part, plan)
+        checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))
+        complete(run, part, checkpoint)
+        write_status(run, plan, checkpoint)
+
+
+class _Completion:
+    """Completes each slice while the next one runs, in a thread of its own."""
+
+    def __init__(self, plan: Plan, run: Path) -> None:
+        self._plan = plan
+        self._run = run
+        self._pool = ThreadPoolExecutor(1)
+        self._written: _Written | None = None
+        self._going: Future[None] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self.begin()
+            self.wait()
+        finally:
+            self._pool.shutdown()
+
+    def take(self, written: _Written) -> None:
+        """Take a slice, once the one before is complete.
+
+        Raises
+        ------
+        SimulationError, OSError
+            If the one before could not be completed.
+        """
+        self.wait()
+        self._written = written
+
+    def begin(self) -> None:
+        """Begin: SUMO has read the state, so that it may be moved."""
+        if self._written is not None:
+            self._going = self._pool.submit(self._written.complete, self._plan, self._run)
+            self._written = None
+
+    def wait(self) -> None:
+        """Wait until the slice that has been begun is complete."""
+        if self._going is not None:
+            going, self._going = self._going, None
+            going.result()
+
+
 class _Slice:
     """One slice: begun from ``before``, the slice before it."""
 
@@ -99,15 +189,17 @@ class _Slice:
         length = plan.slice_length or plan.until
         self._end = min(self._number * length, plan.until)
 
-    def run(self, stepper: Stepper) -> Checkpoint:
-        """Simulate it and make it complete."""
+    def run(self, stepper: Stepper, completion: _Completion) -> _Written:
+        """Simulate it; the one before is completed meanwhile."""
         before, start = self._before, time.perf_counter()
-        check_room(self._run, before)
+        if before is not None:
+            check_room(self._run, before.number)
         part = part_folder(self._run, self._number)
         routes = part / layout.ROUTES_FILE
         offset = self._routes.cut(before.routes if before else 0, self._end, routes)
         more = self._end < self._plan.until and self._routes.more(offset)
         with _session(self._arguments(part), self._number) as session:
+            completion.begin()
             self._compare(session, stepper)
             now = stepper.run(session, self._end, more=more)
             last = self._is_last(session, stepper, now, more=more)
@@ -118,12 +210,7 @@ class _Slice:
                 # SUMO puts a state where it puts outputs, relative to the folder that it is given.
                 session.save(self._run / layout.SUMO_FOLDER / STATE_FILE)
         routes.unlink()
-        self._write_events(part, stepper)
-        if not last:
-            check_state(part / STATE_FILE)
-        tidy_part(part / layout.TRAJECTORIES_FILE)
-        tidy_outputs(part, lengths, present=before.lanes if before else {}, last=last)
-        tidy_conflicts(part, self._plan)
+        events = stepper.recorder.drain()
         seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)
         checkpoint = Checkpoint(
             number=self._number,
@@ -138,10 +225,9 @@ class _Slice:
             present=sorted(present),
             recorder=stepper.recorder.state(),
             lanes=lanes,
-            files=fingerprints(part, _CONTENTS),
+            files={},
         )
-        complete(self._run, part, checkpoint)
-        return checkpoint
+        return _Written(part, checkpoint, events, lengths, before.lanes if before else {})
 
     def _arguments(self, part: Path) -> list[str]:
         sumo = self._run / layout.SUMO_FOLDER
@@ -149,7 +235,7 @@ class _Slice:
         arguments += ["--route-files", str(part / layout.ROUTES_FILE), *_SAVING]
         arguments += outputs_to(part, sumo)
         if self._before is not None:
-            state = slice_folder(self._run, self._before.number) / STATE_FILE
+            state = written_folder(self._run, self._before.number) / STATE_FILE
             arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]
         return arguments
 
@@ -166,10 +252,6 @@ class _Slice:
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
         nobody = not more and session.expected() == 0
         return now >= self._plan.until or nobody or stepper.stopped
-
-    def _write_events(self, part: Path, stepper: Stepper) -> None:
-        with (part / EVENTS_LINES).open("w", encoding="utf-8") as out:
-            out.writelines(event_line(event) + "\n" for event in stepper.recorder.drain())
 
 
 @contextmanager

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from odscen.results.records import Plan
     from odscen.sumo.checkpoint import Checkpoint
-    from odscen.sumo.stepping import Stepper
 
 FORMAT = "odscen-status"
 VERSION = 1
@@ -31,9 +30,7 @@ PATIENCE = 3.0
 """Wall seconds to wait for a worker that is about to notice that its runner is gone."""
 
 
-def write_status(
-    run: Path, plan: Plan, done: Checkpoint | None, stepper: Stepper | None = None
-) -> None:
+def write_status(run: Path, plan: Plan, done: Checkpoint | None) -> None:
     """Say how far a run is; written at its start and at each boundary."""
     status = {
         "format": FORMAT,
@@ -44,8 +41,8 @@ def write_status(
         "slice_length": plan.slice_length,
         "slices": done.number if done else 0,
         "running": done.running if done else 0,
-        "departed": stepper.recorder.departed if stepper else 0,
-        "arrived": stepper.recorder.arrived if stepper else 0,
+        "departed": done.recorder["departed"] if done else 0,
+        "arrived": done.recorder["arrived"] if done else 0,
         "planned": len(plan.actors),
         "wall_seconds": round(done.wall_seconds, 3) if done else 0.0,
     }
