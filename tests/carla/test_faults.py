@@ -6,6 +6,7 @@ Every run is the command line in a process of its own: the client is C++, and mi
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -74,9 +75,10 @@ def start(workspace: Workspace, sample: Sample, tmp_path: Path) -> Start:
     return started
 
 
-def shown(server: StandIn) -> list[str]:
+def shown(server: StandIn, *, below: float = math.inf) -> list[str]:
     kinds = ("vehicle.", "walker.")
-    return [a["type_id"] for a in server.actors() if a["type_id"].startswith(kinds)]
+    there = [a for a in server.actors() if a["type_id"].startswith(kinds)]
+    return [a["type_id"] for a in there if a["transform"][0][2] < below]
 
 
 def is_as_before(server: StandIn) -> bool:
@@ -94,8 +96,9 @@ def is_as_before(server: StandIn) -> bool:
 
 
 def wait_for_actors(server: StandIn, run: Run) -> None:
+    """Wait for road users; one of each model is made aloft to be measured before the run."""
     deadline = time.monotonic() + PATIENCE
-    while len(shown(server)) < 5:
+    while len(shown(server, below=100.0)) < 5:
         assert time.monotonic() < deadline
         assert run.process.status() != psutil.STATUS_ZOMBIE, "the run has ended early"
         time.sleep(0.05)

@@ -131,6 +131,8 @@ def test_carla_drives_a_scenario_into_a_run_folder(options: Any, sample: Sample)
     )
     assert moved["vehicle_x"].median() > 20.0
     assert Path(told["files"]["report"]).is_file()
+    assert told["figures"]["mean_travel_time"] > 0.0
+    assert told["figures"]["mean_delay"] is None, "only SUMO measures what was lost"
     assert not [note for note in told["carla"]["notes"] if "left its way" in note]
 
 

@@ -12,8 +12,8 @@ from odscen.results.report_emissions import emission_section
 from odscen.results.report_flow import diagram_section, flow_section
 from odscen.results.report_service import level_strip, service_section
 from odscen.results.report_words import stretch
-from odscen.results.traffic import TrafficFigures
-from tests.results.made_traffic import NOBODY, made_figures
+from odscen.results.traffic import TrafficFigures, traffic_figures
+from tests.results.made_traffic import NOBODY, PLACES, lane_rows, made_figures
 from tests.results.test_report import EVIL, Reader, report
 
 SHAPES = PlaceShapes(
@@ -58,6 +58,14 @@ def test_the_map_colours_places_and_leaves_those_without_traffic_grey():
     # The busiest time is the third quarter of an hour, and worse than the whole.
     assert "The busiest time, 0:30 to 0:45 h" in section
     assert "j10: level F, 90 s lost by each vehicle" in section
+
+
+def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
+    # Two vehicles stand before it for a quarter of an hour.
+    stuck = lane_rows(0, "a_0", 2, length=0.0, lost=900.0, co2=20.0, source=True, sink=False)
+    rows = pl.DataFrame([stuck | {"waiting": 1800.0}])
+    section = str(service_section(traffic_figures(rows, PLACES, end=900.0), SHAPES))
+    assert "<title>j10: level F, nobody gets into it</title>" in section
 
 
 def test_a_place_with_few_vehicles_is_not_among_the_worst():

@@ -238,7 +238,10 @@ def _layer(
         row = busy.get(name)
         if row is None:
             continue
-        words = f"{name}: level {row['level']}, {number(row['delay'], 0)} s lost by each vehicle"
+        lost = "nobody gets into it"
+        if row["delay"] is not None:
+            lost = f"{number(row['delay'], 0)} s lost by each vehicle"
+        words = f"{name}: level {row['level']}, {lost}"
         cx, cy = round(x * 100), round(-y * 100)
         disc = element("circle", cx=cx, cy=cy, r=radius, class_=_style(row["level"]))
         letter = element("text", row["level"], x=cx, y=cy, font_size=round(radius * 1.4),

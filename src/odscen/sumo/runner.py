@@ -8,7 +8,7 @@ log; nothing that goes wrong inside SUMO raises here.
 from __future__ import annotations
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +31,7 @@ from odscen.sumo.run_folder import (
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from concurrent.futures import Future
     from pathlib import Path
 
     from odscen.results.expectations import Expectation
@@ -114,6 +115,10 @@ def run_prepared(
     return RunResult(out, summary)
 
 
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks for Ctrl-C."""
+
+
 class _StoppedError(Exception):
     """Another run of the same call has failed to start, or the user has interrupted."""
 
@@ -169,8 +174,22 @@ def run_many(
     with ThreadPoolExecutor(max_workers=max(1, processes)) as pool:
         futures = [pool.submit(one, job) for job in jobs]
         try:
+            _wait(futures)
             return tuple(future.result() for future in futures)
         except BaseException:
             stopping.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _wait(futures: Sequence[Future[RunResult]]) -> None:
+    """Wait until all have ended, or raise what the first of them raises.
+
+    Polars has system calls go on after Ctrl-C (https://github.com/pola-rs/polars/issues/21739): a
+    wait without a timeout would hear of it when it is over.
+    """
+    running = set(futures)
+    while running:
+        ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_EXCEPTION)
+        for future in ended:
+            future.result()
