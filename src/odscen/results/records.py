@@ -11,6 +11,8 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+import orjson
+
 from odscen.errors import InputError
 
 if TYPE_CHECKING:
@@ -130,7 +132,7 @@ class Plan:
             If it is not a plan of this version.
         """
         try:
-            data = json.loads(text)
+            data = orjson.loads(text)
             if (data["format"], data["version"]) != (PLAN_FORMAT, VERSION):
                 msg = f"format {data['format']!r} version {data['version']!r} is not a plan"
                 raise InputError(msg)
@@ -218,7 +220,7 @@ def event_line(event: Event) -> str:
 
 def event_from_line(line: str) -> Event:
     """Inverse of :func:`event_line`."""
-    data = json.loads(line)
+    data = orjson.loads(line)
     data["kind"] = EventKind(data["kind"])
     return Event(**data)
 
@@ -242,7 +244,7 @@ def events_from_json(text: str) -> tuple[Event, ...]:
         If it is not a list of events of this version.
     """
     try:
-        data = json.loads(text)
+        data = orjson.loads(text)
         if (data["format"], data["version"]) != (EVENTS_FORMAT, VERSION):
             msg = f"format {data['format']!r} version {data['version']!r} is not a list of events"
             raise InputError(msg)

@@ -13,6 +13,8 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+import orjson
+
 from odscen.errors import InputError
 from odscen.results.records import (
     ACTORS_FORMAT,
@@ -203,7 +205,7 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
         If it is not a list of actors of this version.
     """
     try:
-        data = json.loads(text)
+        data = orjson.loads(text)
         if (data["format"], data["version"]) != (ACTORS_FORMAT, VERSION):
             msg = f"format {data['format']!r} version {data['version']!r} is not a list of actors"
             raise InputError(msg)
