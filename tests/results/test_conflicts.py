@@ -111,8 +111,8 @@ def test_conflicts_are_told_the_worst_first():
     page = html.fromstring(str(section))
     told = [[cell.text_content() for cell in row] for row in page.findall(".//tbody/tr")]
     assert told == [
-        ["5", "c", "d", "ways that cross", "0.75", "", "", "3, -4"],
-        ["1", "<b>", "a", "one behind the other", "2.50", "", "", "3, -4"],
+        ["5", "c", "d", "crossing", "0.75", "", "", "3, -4"],
+        ["1", "<b>", "a", "in a line", "2.50", "", "", "3, -4"],
     ]
     text = page.text_content()
     assert "1serious conflictsof 2 seen" in text

@@ -25,10 +25,10 @@ SHOWN = 15
 """Rows of the table at most."""
 
 KINDS = {
-    "following": "one behind the other",
-    "merging": "into the same lane",
-    "crossing": "ways that cross",
-    "walking": "with somebody on foot",
+    "following": "in a line",
+    "merging": "merging",
+    "crossing": "crossing",
+    "walking": "on foot",
 }
 
 
