@@ -33,12 +33,6 @@ if TYPE_CHECKING:
 
 WORKER = "odscen.sumo.worker"
 _SURROUNDINGS = {
-    # SUMO allocates and frees small blocks all the time: a tenth of its seconds. glibc keeps seven
-    # of a size at hand for a thread; more, and room that is not given back, save some of that.
-    "GLIBC_TUNABLES": (
-        "glibc.malloc.tcache_count=4000:glibc.malloc.trim_threshold=268435456:"
-        "glibc.malloc.top_pad=16777216"
-    ),
     # One thread simulates; those that NumPy would start only wait, and burn time in doing so.
     "OPENBLAS_NUM_THREADS": "1",
 }
