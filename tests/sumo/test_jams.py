@@ -31,6 +31,7 @@ class Street:
     ("head", "reason"),
     [
         (FREE._replace(onwards=False), jams.NO_WAY_ON),
+        (FREE._replace(onwards=False, beside=True), jams.WRONG_LANE),
         (FREE._replace(light="r", open=False), jams.RED),
         (FREE._replace(light="g", open=False), jams.GIVES_WAY),
         (FREE._replace(open=False, people=True), jams.PEOPLE),
@@ -95,3 +96,25 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
     if dissolved:
         lifted = places["moved_on"]
         assert lifted["until"] - lifted["time"] == pytest.approx(300.0, abs=1.0)
+
+
+def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
+    prepare: Prepare, tmp_path: Path
+) -> None:
+    """The left lane is full of parked cars, and the one on the right is to turn left."""
+    parked = "\n".join(
+        f'<vehicle id="parked{k}" type="car" depart="0" departLane="2" departPos="{x}"'
+        ' departSpeed="0" insertionChecks="none"><route edges="A1B1 B1C1"/>'
+        f'<stop lane="A1B1_2" endPos="{x + 0.1}" duration="1000"/></vehicle>'
+        for k, x in enumerate(range(25, 100, 6))
+    )
+    left = (
+        '<vehicle id="car0" type="car" depart="1" departLane="1" departPos="80">'
+        '<route edges="A1B1 B1B2"/></vehicle>'
+    )
+    run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{parked}\n{left}\n</routes>")
+    result = run_prepared(replace(run, plan=replace(run.plan, until=260.0)), tmp_path / "run")
+    assert result.status == "completed", result.summary["error"]
+    (place,) = result.summary["gridlock"]["places"]
+    assert (place["kind"], place["actor"]) == ("jam", "car0")
+    assert place["reason"] == jams.WRONG_LANE

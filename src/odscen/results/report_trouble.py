@@ -36,8 +36,8 @@ def trouble_section(found: Sequence[Trouble]) -> Markup | None:
         "each line is a place where traffic did not go on; its number is on the map above. Jams "
         "come first, and first of all those that did not dissolve. The reason is what the first "
         "vehicle of the queue had ahead of it. A red light that holds people for minutes asks for "
-        "another signal plan, a lane that does not lead on for a look at the map, a full start "
-        "for less traffic there."
+        "another signal plan, a lane that does not lead on for a look at the map, one that was not "
+        "reached for longer lanes to turn from, a full start for less traffic there."
     )
     places = html_table(heads, rows)
     return report_section(

@@ -32,6 +32,7 @@ RELEASE = 60.0
 
 CIRCLE = "vehicles wait for each other in a circle"
 NO_WAY_ON = "its lane does not lead on along its way"
+WRONG_LANE = "it did not get to the lane that its way needs"
 RED = "a red light"
 PEOPLE = "people on a crossing"
 GIVES_WAY = "it has to give way to traffic that does not end"
@@ -157,7 +158,7 @@ def explain(session: Session, vehicle: str) -> tuple[str, str]:
 def _own_reason(ahead: Ahead) -> str | None:
     """Return the reason that is not just the vehicle ahead."""
     if not ahead.onwards:
-        return NO_WAY_ON
+        return WRONG_LANE if ahead.beside else NO_WAY_ON
     if ahead.leader is not None:
         return None
     if ahead.light in ("r", "u"):

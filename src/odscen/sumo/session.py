@@ -114,6 +114,8 @@ class Ahead(NamedTuple):
         behind the junction, which must be kept clear.
     people
         Whether somebody is on a crossing that its next link runs over.
+    beside
+        Where its own lane does not lead on: whether another lane of the road does.
     """
 
     onwards: bool
@@ -121,6 +123,7 @@ class Ahead(NamedTuple):
     open: bool
     leader: str | None
     people: bool
+    beside: bool = False
 
 
 class Session:
@@ -350,10 +353,26 @@ class Session:
             return None
         if not links:
             return Ahead(at_end, "", at_end, leader, people=False)
+        if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
+            return Ahead(False, "", False, None, people=False, beside=wrong)
         link = links[0]
         # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
         people = bool(link[3]) and self._people_cross(link[4])
         return Ahead(True, str(link[5]), bool(link[2]), leader, people)
+
+    def _leads_astray(self, name: str) -> bool | None:
+        """Whether another lane leads on along a vehicle's way; ``None`` if its own lane does."""
+        vehicle, lanes = self._sumo.vehicle, self._sumo.lane
+        lane, index = vehicle.getLaneID(name), vehicle.getRouteIndex(name)
+        if not lane or lane.startswith(":"):
+            return None
+        edge, following = lanes.getEdgeID(lane), vehicle.getRoute(name)[index + 1]
+        leading = {
+            one
+            for one in (f"{edge}_{k}" for k in range(self._sumo.edge.getLaneNumber(edge)))
+            if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(one))
+        }
+        return None if lane in leading else bool(leading)
 
     def _standing_leader(self, name: str, junction: float) -> str | None:
         """Return who leaves no room for the vehicle behind ``junction`` metres of junction."""
