@@ -57,9 +57,9 @@ def following(folder: Path) -> dict[frozenset[str], float]:
     """Smallest gap over closing speed of two behind each other on one lane, by the trajectories."""
     recorded = read_trajectories(folder)
     assert recorded is not None
-    rows = recorded.rows.rename(
-        lambda name: name.removeprefix("vehicle_").removeprefix("person_")
-    ).filter(~col("id").str.starts_with("walker"))
+    rows = recorded.rows.rename(lambda name: name.removeprefix("vehicle_")).filter(
+        ~col("id").str.starts_with("walker")
+    )
     ahead = rows.sort("timestep_time", "lane", "pos").with_columns(
         leader=col("id").shift(-1).over("timestep_time", "lane"),
         gap=(col("pos").shift(-1) - LENGTH - col("pos")).over("timestep_time", "lane"),

@@ -13,7 +13,7 @@ from odscen.sumo.parts import tidy_part
 from odscen.sumo.recording import Recording, parse_recording, region_xml
 from odscen.sumo.route_slices import RouteSlices
 from odscen.sumo.runner import run_prepared
-from tests.sumo.conftest import Prepare
+from tests.sumo.conftest import TYPES, WALK, Prepare
 
 
 @pytest.mark.parametrize(
@@ -159,3 +159,17 @@ def test_routes_out_of_order_are_refused(tmp_path: Path) -> None:
     routes.write_text(ROUTES.replace('depart="59.5"', 'depart="61"'))
     with pytest.raises(SimulationError, match="not in order of departure at 60 s"):
         RouteSlices(routes).cut(0, 200.0, tmp_path / "t.xml")
+
+
+def test_columns_have_one_name_whoever_comes_first(prepare: Prepare, tmp_path: Path) -> None:
+    """SUMO names them after a walker who is on the road before any vehicle."""
+    car = (
+        '<vehicle id="car0" type="car" depart="10" departLane="1">'
+        '<route edges="A0B0 B0C0"/></vehicle>'
+    )
+    routes = f"<routes>{TYPES}\n{WALK}\n{car}\n</routes>"
+    result = run_prepared(prepare(cars=1, until=30.0, routes=routes), tmp_path / "run")
+    rows = pl.read_parquet(result.folder / "trajectories.parquet")
+    assert rows["vehicle_id"][0] == "walker"
+    assert set(rows["vehicle_id"]) == {"walker", "car0"}
+    assert not [name for name in rows.columns if name.startswith("person_")]

@@ -57,11 +57,8 @@ def _walking(folder: Path, plan: Plan) -> list[dict[str, object]]:
 def _traces(rows: pl.LazyFrame, offset: tuple[float, float]) -> pl.DataFrame:
     import polars as pl
 
-    known = rows.collect_schema().names()
-    prefix = "vehicle_" if "vehicle_id" in known else "person_"
-    names = {old.replace("vehicle_", prefix): new for old, new in _NAMES.items()}
     return (
-        rows.select(pl.col(old).alias(new) for old, new in names.items())
+        rows.select(pl.col(old).alias(new) for old, new in _NAMES.items())
         .filter(pl.col("x").is_finite())
         .with_columns(
             pl.col("time").cast(pl.Float64), pl.col("x") - offset[0], pl.col("y") - offset[1]

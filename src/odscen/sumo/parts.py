@@ -1,4 +1,4 @@
-"""Parquet parts of a long run: made alike, so that they read as one table; and room for the next.
+"""Trajectories made alike, so that the parts of a long run read as one table; room for a part.
 
 SUMO names the columns after whatever comes first in a file, ``vehicle_x`` or ``person_x``, and
 writes a file without columns if nobody is there.
@@ -20,7 +20,7 @@ RESERVE = 1.5
 
 
 def tidy_part(path: Path) -> None:
-    """Give a part the columns that every part has; remove one in which nobody is.
+    """Give trajectories the columns that all have; remove a file in which nobody is.
 
     Raises
     ------

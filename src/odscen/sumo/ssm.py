@@ -12,6 +12,7 @@ from lxml import etree
 
 from odscen.errors import SimulationError
 from odscen.results.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC
+from odscen.sumo.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,13 +53,8 @@ def logged_conflicts(
         If the log is not whole.
     """
     try:
-        for _, conflict in etree.iterparse(
-            str(file), tag="conflict", resolve_entities=False, no_network=True, load_dtd=False
-        ):
+        for conflict in elements(file, "conflict"):
             yield _row(conflict, net_offset)
-            conflict.clear()
-            while conflict.getprevious() is not None:
-                del conflict.getparent()[0]
     except etree.XMLSyntaxError as error:
         msg = f"{file.name} is not whole: {error}"
         raise SimulationError(msg) from error

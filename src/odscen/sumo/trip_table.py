@@ -21,6 +21,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from odscen.sumo.xml_rows import elements
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -61,13 +63,8 @@ def trip_table(tripinfo: Path, *, unfinished: bool) -> pl.DataFrame:
 
 
 def _rows(tripinfo: Path) -> Iterator[tuple[Any, ...]]:
-    from lxml import etree
-
-    for _, element in etree.iterparse(tripinfo, tag=("tripinfo", "personinfo")):
+    for element in elements(tripinfo, "tripinfo", "personinfo"):
         yield _walk(element) if element.tag == "personinfo" else _drive(element)
-        element.clear()
-        while element.getprevious() is not None:  # a day has many
-            del element.getparent()[0]
 
 
 def _drive(trip: Any) -> tuple[Any, ...]:

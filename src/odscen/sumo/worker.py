@@ -21,9 +21,17 @@ from odscen.errors import OdscenError
 from odscen.results.records import Plan, event_line, events_text
 from odscen.results.summary import actor_outcomes, actors_to_json
 from odscen.sumo.conflict_files import tidy_conflicts
-from odscen.sumo.layout import ACTORS_FILE, CONFIG_FILE, EVENTS_FILE, LOG_FILE, SUMO_FOLDER
+from odscen.sumo.layout import (
+    ACTORS_FILE,
+    CONFIG_FILE,
+    EVENTS_FILE,
+    LOG_FILE,
+    SUMO_FOLDER,
+    TRAJECTORIES_FILE,
+)
 from odscen.sumo.lockstep import LockstepWatch
 from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_by_id
+from odscen.sumo.parts import tidy_part
 from odscen.sumo.progress import Done, Failed, Lockstep, Message, Pace, decode, encode
 from odscen.sumo.session import captured_output, open_session
 from odscen.sumo.slices import event_lines, recorded_events, run_slices
@@ -94,6 +102,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
     with open_session(arguments) as session:
         now = stepper.run(session, plan.until)
         lengths = session.lane_lengths()
+    tidy_part(folder / TRAJECTORIES_FILE)
     tidy_outputs(folder, lengths, present={}, last=True)
     tidy_conflicts(folder, plan)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
