@@ -10,8 +10,8 @@ import pytest
 from odscen.results.records import EventKind, events_from_json
 from odscen.sumo import jams
 from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.observed import Ahead
 from odscen.sumo.runner import run_prepared
-from odscen.sumo.session import Ahead
 from tests.sumo.conftest import TYPES, Prepare
 
 FREE = Ahead(True, "M", True, None, people=False)

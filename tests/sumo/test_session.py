@@ -15,7 +15,8 @@ PRELUDE = """
 import json, sys
 from pathlib import Path
 from odscen.errors import SimulationError
-from odscen.sumo.session import captured_output, open_session
+from odscen.sumo.output_capture import captured_output
+from odscen.sumo.session import open_session
 net = sys.argv[1]
 """
 

@@ -22,8 +22,8 @@ from odscen.carla.pictures import Wish
 from odscen.carla.server import Server
 from odscen.carla.traffic import Traffic
 from odscen.errors import OdscenError
+from odscen.sumo.output_capture import captured_output
 from odscen.sumo.progress import Done, Failed
-from odscen.sumo.session import captured_output
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

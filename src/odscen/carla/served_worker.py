@@ -19,8 +19,8 @@ from odscen.carla.cosim import CosimOptions, cosim
 from odscen.carla.served import ServedJob
 from odscen.catalog.store import Workspace
 from odscen.errors import OdscenError
+from odscen.sumo.output_capture import captured_output
 from odscen.sumo.progress import Done, Failed, Frame, Incidents, Lights, Shot, encode
-from odscen.sumo.session import captured_output
 from odscen.sumo.snapshots import frame_bytes, frame_rows
 from odscen.sumo.steering import Steering
 

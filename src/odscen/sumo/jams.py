@@ -15,7 +15,8 @@ from odscen.results.records import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.sumo.session import Ahead, Session, Standing
+    from odscen.sumo.observed import Ahead, Standing
+    from odscen.sumo.session import Session
 
 PERIOD = 15.0
 """Simulated seconds between two looks."""

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.results.records import Plan
+    from odscen.sumo.observed import Poses
     from odscen.sumo.progress import Lockstep, Message
     from odscen.sumo.recorder import Recorder
-    from odscen.sumo.session import Poses, Session
+    from odscen.sumo.session import Session
 
 COLUMNS = 8
 

@@ -18,7 +18,8 @@ from odscen.sumo.jams import JamWatch
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.sumo.session import Collision, Front, Session
+    from odscen.sumo.observed import Collision, Front
+    from odscen.sumo.session import Session
 
 
 class Recorder:

@@ -3,7 +3,7 @@
 libsumo keeps its simulation in the process, and a second ``libsumo.start`` silently drops the
 first. :func:`open_session` is therefore a context manager that refuses a second one. Only the
 worker process (:mod:`odscen.sumo.worker`) opens a session; SUMO's own words appear on that
-process's file descriptors 1 and 2, which :func:`captured_output` sends to a file.
+process's file descriptors 1 and 2, see :mod:`odscen.sumo.output_capture`.
 """
 
 from __future__ import annotations
@@ -12,17 +12,16 @@ import os
 import sys
 from collections import Counter
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.errors import SimulationError
+from odscen.sumo.observed import Ahead, Collision, Front, Poses, Standing, StepLists
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
-
-    from numpy.typing import NDArray
 
     from odscen.sumo.progress import Place
 
@@ -39,91 +38,6 @@ _CLOSE = 5.0
 """Metres that a standing vehicle ahead may be away and be the reason for standing."""
 _STANDS = 0.1
 """Speed, m/s, below which SUMO counts a vehicle as waiting."""
-
-
-class Front(NamedTuple):
-    """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
-
-    x: float
-    y: float
-    z: float
-    angle_deg: float
-
-
-class Poses(NamedTuple):
-    """Where all vehicles, or all persons, are: centre of the front, arrays of shape ``(n,)``.
-
-    Those that are not on the road have SUMO's INVALID_DOUBLE_VALUE, -2^30, as x. ``signals`` are
-    SUMO's bits for indicators and lights, 0 for persons.
-    """
-
-    ids: Sequence[str]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    angle_deg: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    signals: NDArray[np.int64]
-
-
-class Collision(NamedTuple):
-    """One collision that SUMO reports in a step; ``pos`` in metres along ``lane``."""
-
-    collider: str
-    victim: str
-    type: str
-    lane: str
-    pos: float
-    collider_speed: float
-    victim_speed: float
-
-
-class StepLists(NamedTuple):
-    """What happened in one step: ids, in SUMO's order."""
-
-    departed: Sequence[str]
-    arrived: Sequence[str]
-    departed_persons: Sequence[str]
-    arrived_persons: Sequence[str]
-    teleports_started: Sequence[str]
-    teleports_ended: Sequence[str]
-    emergency_stops: Sequence[str]
-
-
-class Standing(NamedTuple):
-    """A vehicle that stands: where its front is, metres along ``lane``, and for how long, s."""
-
-    vehicle: str
-    lane: str
-    pos: float
-    waited: float
-
-
-class Ahead(NamedTuple):
-    """What a vehicle has before it.
-
-    Attributes
-    ----------
-    onwards
-        Whether its lane leads on along its way.
-    light
-        Letter of the next link: ``r`` red, ``y`` yellow, ``G``, ``g`` green; others without light.
-    open
-        Whether right of way and light let it pass.
-    leader
-        Vehicle that stands so close ahead that there is no room to go on: right in front, or just
-        behind the junction, which must be kept clear.
-    people
-        Whether somebody is on a crossing that its next link runs over.
-    beside
-        Where its own lane does not lead on: whether another lane of the road does.
-    """
-
-    onwards: bool
-    light: str
-    open: bool
-    leader: str | None
-    people: bool
-    beside: bool = False
 
 
 class Session:
@@ -483,25 +397,3 @@ def import_libsumo() -> Any:
         os.dup2(kept, 1)
         os.close(kept)
     return libsumo
-
-
-@contextmanager
-def captured_output(log: Path) -> Iterator[TextIO]:
-    """Send the process's file descriptors 1 and 2 to ``log``; yield the real stdout.
-
-    C++ code writes to the descriptors, not to ``sys.stdout``, so these are what is redirected.
-    """
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = os.dup(1), os.dup(2)
-    with log.open("ab") as target, os.fdopen(os.dup(1), "w", encoding="utf-8") as real:
-        os.dup2(target.fileno(), 1)
-        os.dup2(target.fileno(), 2)
-        try:
-            yield real
-        finally:
-            sys.stdout.flush()
-            sys.stderr.flush()
-            for descriptor, copy in zip((1, 2), kept, strict=True):
-                os.dup2(copy, descriptor)
-                os.close(copy)

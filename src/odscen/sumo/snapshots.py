@@ -24,7 +24,8 @@ from odscen.frames import SumoPose, sumo_to_xodr
 
 if TYPE_CHECKING:
     from odscen.results.records import Plan
-    from odscen.sumo.session import Poses, Session
+    from odscen.sumo.observed import Poses
+    from odscen.sumo.session import Session
 
 HEADER = 5
 COLUMNS = 6

@@ -30,10 +30,11 @@ from odscen.sumo.layout import (
     TRAJECTORIES_FILE,
 )
 from odscen.sumo.lockstep import LockstepWatch
+from odscen.sumo.output_capture import captured_output
 from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_by_id
 from odscen.sumo.parts import tidy_part
 from odscen.sumo.progress import Done, Failed, Lockstep, Message, Pace, decode, encode
-from odscen.sumo.session import captured_output, open_session
+from odscen.sumo.session import open_session
 from odscen.sumo.slices import event_lines, recorded_events, run_slices
 from odscen.sumo.steering import Steering
 from odscen.sumo.stepping import Stepper

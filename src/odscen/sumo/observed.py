@@ -1,0 +1,96 @@
+"""What a running simulation says of itself: the values that a session hands out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Front(NamedTuple):
+    """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
+
+    x: float
+    y: float
+    z: float
+    angle_deg: float
+
+
+class Poses(NamedTuple):
+    """Where all vehicles, or all persons, are: centre of the front, arrays of shape ``(n,)``.
+
+    Those that are not on the road have SUMO's INVALID_DOUBLE_VALUE, -2^30, as x. ``signals`` are
+    SUMO's bits for indicators and lights, 0 for persons.
+    """
+
+    ids: Sequence[str]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    angle_deg: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    signals: NDArray[np.int64]
+
+
+class Collision(NamedTuple):
+    """One collision that SUMO reports in a step; ``pos`` in metres along ``lane``."""
+
+    collider: str
+    victim: str
+    type: str
+    lane: str
+    pos: float
+    collider_speed: float
+    victim_speed: float
+
+
+class StepLists(NamedTuple):
+    """What happened in one step: ids, in SUMO's order."""
+
+    departed: Sequence[str]
+    arrived: Sequence[str]
+    departed_persons: Sequence[str]
+    arrived_persons: Sequence[str]
+    teleports_started: Sequence[str]
+    teleports_ended: Sequence[str]
+    emergency_stops: Sequence[str]
+
+
+class Standing(NamedTuple):
+    """A vehicle that stands: where its front is, metres along ``lane``, and for how long, s."""
+
+    vehicle: str
+    lane: str
+    pos: float
+    waited: float
+
+
+class Ahead(NamedTuple):
+    """What a vehicle has before it.
+
+    Attributes
+    ----------
+    onwards
+        Whether its lane leads on along its way.
+    light
+        Letter of the next link: ``r`` red, ``y`` yellow, ``G``, ``g`` green; others without light.
+    open
+        Whether right of way and light let it pass.
+    leader
+        Vehicle that stands so close ahead that there is no room to go on: right in front, or just
+        behind the junction, which must be kept clear.
+    people
+        Whether somebody is on a crossing that its next link runs over.
+    beside
+        Where its own lane does not lead on: whether another lane of the road does.
+    """
+
+    onwards: bool
+    light: str
+    open: bool
+    leader: str | None
+    people: bool
+    beside: bool = False
