@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.markup import Markup, element, number
-from odscen.results.plots import Series, line_chart
+from odscen.results.plots import Series
 from odscen.results.report_figures import Card, card_grid
-from odscen.results.report_flow import column, middles
+from odscen.results.report_flow import column, network_chart
 from odscen.results.report_tables import html_table, report_section
 from odscen.results.traffic import over_run
 
@@ -60,7 +60,6 @@ def emission_section(figures: TrafficFigures) -> Markup | None:
 
 
 def _charts(network: pl.DataFrame) -> list[Markup]:
-    time = middles(network)
     hours = (column(network, "end") - column(network, "begin")) / 3600.0
     charts = []
     for label, unit, names, text in _CHARTS:
@@ -70,16 +69,7 @@ def _charts(network: pl.DataFrame) -> list[Markup]:
             if name in network.columns and network[name].is_not_null().any()
         ]
         charts.append(element("h3", text))
-        charts.append(
-            line_chart(
-                time,
-                series,
-                y_label=label,
-                description=text,
-                height=210.0,
-                end=float(network["end"][-1]),
-            )
-        )
+        charts.append(network_chart(network, series, y_label=label, description=text))
     return charts
 
 

@@ -13,7 +13,7 @@ from odscen.results.report_tables import report_section
 from odscen.results.report_words import stretch
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import polars as pl
 
@@ -37,12 +37,25 @@ def middles(table: pl.DataFrame) -> FloatArray:
     return (column(table, "begin") + column(table, "end")) / 2.0
 
 
+def network_chart(
+    network: pl.DataFrame, series: Sequence[Series], *, y_label: str, description: str
+) -> Markup:
+    """Low chart over the intervals of ``network``, one value of each line for each."""
+    return line_chart(
+        middles(network),
+        series,
+        y_label=y_label,
+        description=description,
+        height=210.0,
+        end=float(network["end"][-1]),
+    )
+
+
 def flow_section(network: pl.DataFrame) -> Markup | None:
     """Three charts over time; ``None`` for a run too short to have a course."""
     network = network.sort("begin")
     if network.height < 2:
         return None
-    time = middles(network)
     charts: list[Markup | None] = []
     for name, factor, label in (
         ("flow", 1.0, FLOW),
@@ -53,14 +66,7 @@ def flow_section(network: pl.DataFrame) -> Markup | None:
         text = f"{name.capitalize()} of the network over time"
         charts += [
             element("h3", name.capitalize()),
-            line_chart(
-                time,
-                series,
-                y_label=label,
-                description=text,
-                height=210.0,
-                end=float(network["end"][-1]),
-            ),
+            network_chart(network, series, y_label=label, description=text),
         ]
     width = number((network["end"][0] - network["begin"][0]) / 60.0, 1)
     explained = (
