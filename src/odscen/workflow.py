@@ -28,7 +28,7 @@ from odscen.scenario.sampling import choose_map, sample_scenario
 from odscen.sumo import long_runs
 from odscen.sumo.ended import read_summary
 from odscen.sumo.layout import NET_FILE
-from odscen.sumo.prepare import SLICE, prepare, write_report
+from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.recording import Recording
 from odscen.sumo.runner import RunJob, run_many, write_sumo_files
 from odscen.sumo.signals import scenario_lights
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from odscen.scenario.supply import Usable
     from odscen.sumo.process import Companion
     from odscen.sumo.progress import Progress
+    from odscen.sumo.realize import SliceLength
     from odscen.sumo.runner import RunResult
 
 SUFFIX = ".scenario.json"
@@ -205,7 +206,7 @@ def run(
     done: Callable[[RunJob, RunResult], None] | None = None,
     recording: Recording | None = None,
     meso: bool = False,
-    slice_length: float | None = SLICE,
+    slice_length: SliceLength = "auto",
     tell: Callable[[str], None] | None = None,
 ) -> tuple[RunResult, ...]:
     """Check scenarios, run them in SUMO, and write their reports.

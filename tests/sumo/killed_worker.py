@@ -1,8 +1,9 @@
 """The worker, killed with signal 9 just before the ``KILL_AT``-th time it changes the run folder.
 
 Run in place of :mod:`odscen.sumo.worker`. With ``KILL_AFTER_SLICE`` it is the first time after that
-slice is complete. ``FILE_LIMIT`` makes every file longer than so many bytes
-fail as on a full disk.
+slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that completes
+slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many bytes fail as
+on a full disk.
 """
 
 from __future__ import annotations
@@ -15,14 +16,15 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from odscen.sumo import completion
 from odscen.sumo.checkpoint import slice_folder
 from odscen.sumo.worker import main
 
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "open")
 
 
-def kill_before_change(run: str, due: Callable[[], bool]) -> None:
-    """Install what kills this process before a change for which ``due`` says so."""
+def kill_before_change(run: str, due: Callable[[], bool], *, both: bool = False) -> None:
+    """Install what kills this process, or all, before a change for which ``due`` says so."""
 
     def hook(event: str, args: tuple[object, ...]) -> None:
         if event not in CHANGES or not str(args[0]).startswith(run):
@@ -30,7 +32,7 @@ def kill_before_change(run: str, due: Callable[[], bool]) -> None:
         if event == "open" and "w" not in str(args[1]):
             return
         if due():
-            os.kill(os.getpid(), signal.SIGKILL)
+            (os.killpg if both else os.kill)(0 if both else os.getpid(), signal.SIGKILL)
 
     sys.addaudithook(hook)
 
@@ -43,6 +45,8 @@ if __name__ == "__main__":
     if "KILL_AFTER_SLICE" in os.environ:
         last = slice_folder(folder, int(os.environ["KILL_AFTER_SLICE"]))
         kill_before_change(str(folder), last.is_dir)
+    if "KILL_COMPLETER_AT" in os.environ or "KILL_BOTH_AT" in os.environ:
+        completion.COMPLETER = "tests.sumo.killed_completer"
     if "FILE_LIMIT" in os.environ:
         limit = int(os.environ["FILE_LIMIT"])
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

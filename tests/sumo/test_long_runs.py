@@ -94,16 +94,24 @@ def test_a_table_with_too_many_rows_is_read_with_every_nth_record(
     assert sorted(set(some.rows["timestep_time"])) == times[:: some.every]
 
 
-@pytest.mark.parametrize("kill_at", [3, 13, 16, 18, 20, 31, 44, 56, 66, 72])
+KILLS = [
+    *(("KILL_AT", change) for change in (3, 6, 9, 13)),
+    *(("KILL_BOTH_AT", change) for change in (1, 7, 14, 20, 33, 47, 55, 58)),
+]
+"""The worker makes 14 changes, the process that completes slices 59."""
+
+
+@pytest.mark.parametrize(("who", "change"), KILLS)
 def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_bytes(
     long: PreparedRun,
     whole: dict[str, bytes],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    kill_at: int,
+    who: str,
+    change: int,
 ) -> None:
     run = tmp_path / "run"
-    error = killed(long, run, monkeypatch, KILL_AT=kill_at)
+    error = killed(long, run, monkeypatch, **{who: change})
     assert "SIGKILL" in error
     assert f"odscen resume {run}" in error
     before = {file.name: file.read_bytes() for file in trajectory_files(run)}
@@ -113,6 +121,31 @@ def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_
     assert results(run) == whole
     assert all(whole[f"trajectories/{name}"] == content for name, content in before.items())
     assert len(told) == 1
+
+
+@pytest.mark.parametrize("change", [8, 40, 59])
+def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resumes(
+    long: PreparedRun,
+    whole: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    change: int,
+) -> None:
+    run = tmp_path / "run"
+    error = killed(long, run, monkeypatch, KILL_COMPLETER_AT=change)
+    assert "the process that completes what was recorded has ended with exit code -9" in error
+    assert f"odscen resume {run}" in error
+    resume(run)
+    assert results(run) == whole
+
+
+def test_what_was_written_is_completed_when_the_simulation_crashes(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed when the third slice has been simulated; the second may not be complete then."""
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=11)
+    assert checkpoint.last_number(run) == 2
 
 
 def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
@@ -171,7 +204,7 @@ def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
     long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = tmp_path / "run"
-    killed(long, run, monkeypatch, KILL_AT=20)
+    killed(long, run, monkeypatch, KILL_AT=9)
     assert status.going(run) == "interrupted"
     monkeypatch.setattr(status, "PATIENCE", 0.1)
     with status.locked(run):

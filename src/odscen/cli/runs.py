@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from odscen.sumo.progress import Progress
+    from odscen.sumo.realize import SliceLength
     from odscen.sumo.runner import RunJob, RunResult
 
 
@@ -101,9 +102,10 @@ def run(
         typer.Option(
             "--slice",
             metavar="TIME",
-            help="A longer run goes in slices of this length and can be resumed; none: never.",
+            help="A longer run goes in slices of this length and can be resumed; auto: 1h, from 6h "
+            "on a sixth of the run, at most 4h; none: never.",
         ),
-    ] = "1h",
+    ] = "auto",
     meso: Annotated[
         bool,
         typer.Option(
@@ -125,7 +127,9 @@ def run(
     from odscen.sumo.recording import Recording, parse_recording
 
     recording = Recording() if trajectories is None else parse_recording(trajectories)
-    slice_length = None if slice_ == "none" else parse_duration(slice_)
+    slice_length: SliceLength = "auto" if slice_ == "auto" else None
+    if slice_ not in ("auto", "none"):
+        slice_length = parse_duration(slice_)
     expectations = [parse_expectation(text) for text in expect or ()]
     paths = workflow.scenario_files(scenarios)
     store = Workspace.open(workspace)

@@ -215,7 +215,7 @@ def event_row(event: Event) -> dict[str, Any]:
 
 def event_line(event: Event) -> str:
     """One event as it stands in ``events.json``, without indentation and comma."""
-    return _row_text(_without_defaults(event))
+    return row_text(_without_defaults(event))
 
 
 def event_from_line(line: str) -> Event:
@@ -232,7 +232,7 @@ def events_to_json(events: Iterable[Event]) -> str:
 
 def events_text(lines: Iterable[str]) -> Iterator[str]:
     """``events.json`` piece by piece, from what :func:`event_line` gives."""
-    return _text_with_rows({"format": EVENTS_FORMAT, "version": VERSION}, "events", lines)
+    return text_with_rows({"format": EVENTS_FORMAT, "version": VERSION}, "events", lines)
 
 
 def events_from_json(text: str) -> tuple[Event, ...]:
@@ -261,10 +261,11 @@ def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str
 
     Numbers are rounded to 1e-6: far below what is physical, and free of rounding noise.
     """
-    return "".join(_text_with_rows(head, key, map(_row_text, rows)))
+    return "".join(text_with_rows(head, key, map(row_text, rows)))
 
 
-def _text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:
+def text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:
+    """Text of :func:`json_with_rows` piece by piece, from what :func:`row_text` gives."""
     yield "{\n"
     for name, value in head.items():
         yield f"  {json.dumps(name)}: {json.dumps(value)},\n"
@@ -276,7 +277,8 @@ def _text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> I
     yield "]\n}\n" if before == "\n    " else "\n  ]\n}\n"
 
 
-def _row_text(row: Mapping[str, Any]) -> str:
+def row_text(row: Mapping[str, Any]) -> str:
+    """One row as it stands in such a text."""
     return _encode(rounded(row))
 
 

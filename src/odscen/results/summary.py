@@ -23,12 +23,13 @@ from odscen.results.records import (
     EventKind,
     Plan,
     PlannedActor,
-    json_with_rows,
     rounded,
+    row_text,
+    text_with_rows,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 ActorStatus = Literal["arrived", "running", "waiting"]
 """``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
@@ -101,6 +102,9 @@ class ActorOutcome:
     stops: int | None = None
 
 
+_COLUMNS = tuple(field.name for field in fields(ActorOutcome))
+
+
 @dataclass(slots=True)
 class _Fate:
     """What has been heard of an actor so far."""
@@ -129,26 +133,57 @@ _NO_TRIPS: Mapping[str, Trip] = MappingProxyType({})
 _NO_TRIP = Trip(None, None, None)
 
 
+class Fates:
+    """What becomes of the actors of a plan, told bit by bit."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._actors = {actor.id: actor for actor in plan.actors}
+        self._fates: defaultdict[str, _Fate] = defaultdict(_Fate)
+        self._trips: dict[str, Trip] = {}
+        self._rows: dict[str, str] = {}
+
+    def hear(self, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS) -> None:
+        """Take in what has happened, in order of time, and what was measured, by id."""
+        fates = self._fates
+        for event in events:
+            fates[event.actor].hear(event)
+            if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
+                fates[str(event.partner)].hear(event)
+        self._trips.update(trips)
+
+    def settle(self) -> None:
+        """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker."""
+        for name, fate in self._fates.items():
+            if fate.arrival is not None and name in self._actors and name not in self._rows:
+                self._rows[name] = outcome_row(self._outcome(name))
+
+    def outcomes(self) -> tuple[ActorOutcome, ...]:
+        """One outcome per planned actor, in the plan's order."""
+        return tuple(map(self._outcome, self._actors))
+
+    def rows(self) -> Iterator[str]:
+        """The same as rows of ``actors.json``."""
+        for name in self._actors:
+            yield self._rows.get(name) or outcome_row(self._outcome(name))
+
+    def _outcome(self, name: str) -> ActorOutcome:
+        fate = self._fates.get(name) or _Fate()
+        return _outcome(self._actors[name], fate, self._trips.get(name, _NO_TRIP))
+
+
 def actor_outcomes(
     plan: Plan, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS
 ) -> tuple[ActorOutcome, ...]:
-    """One outcome per planned actor, in the plan's order; events are taken one by one.
+    """One outcome per planned actor, in the plan's order.
 
     Parameters
     ----------
     trips
         By id; whoever has none has no delay, waiting time and stops.
     """
-    fates: defaultdict[str, _Fate] = defaultdict(_Fate)
-    for event in events:
-        fates[event.actor].hear(event)
-        if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
-            fates[str(event.partner)].hear(event)
-    nothing = _Fate()
-    return tuple(
-        _outcome(actor, fates.get(actor.id, nothing), trips.get(actor.id, _NO_TRIP))
-        for actor in plan.actors
-    )
+    fates = Fates(plan)
+    fates.hear(events, trips)
+    return fates.outcomes()
 
 
 def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
@@ -188,12 +223,19 @@ def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
     )
 
 
-def actors_to_json(outcomes: Sequence[ActorOutcome]) -> str:
+def actors_to_json(outcomes: Iterable[ActorOutcome]) -> str:
     """``actors.json``: one actor per line."""
-    head = {"format": ACTORS_FORMAT, "version": VERSION}
-    names = [field.name for field in fields(ActorOutcome)]
-    rows = ({name: getattr(outcome, name) for name in names} for outcome in outcomes)
-    return json_with_rows(head, "actors", rows)
+    return "".join(actors_text(map(outcome_row, outcomes)))
+
+
+def actors_text(rows: Iterable[str]) -> Iterator[str]:
+    """``actors.json`` piece by piece, from what :func:`outcome_row` gives."""
+    return text_with_rows({"format": ACTORS_FORMAT, "version": VERSION}, "actors", rows)
+
+
+def outcome_row(outcome: ActorOutcome) -> str:
+    """One actor as it stands in ``actors.json``, without indentation and comma."""
+    return row_text({name: getattr(outcome, name) for name in _COLUMNS})
 
 
 def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:

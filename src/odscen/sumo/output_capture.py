@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def captured_output(log: Path) -> Iterator[TextIO]:
     """Send the process's file descriptors 1 and 2 to ``log``; yield the real stdout.
 
-    C++ code writes to the descriptors, not to ``sys.stdout``, so these are what is redirected.
+    C++ code writes to the descriptors, not to ``sys.stdout``, so these are what is redirected. The
+    real stdout is inheritable: a process that helps can hold it open, too.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -24,6 +25,7 @@ def captured_output(log: Path) -> Iterator[TextIO]:
     with log.open("ab") as target, os.fdopen(os.dup(1), "w", encoding="utf-8") as real:
         os.dup2(target.fileno(), 1)
         os.dup2(target.fileno(), 2)
+        os.set_inheritable(real.fileno(), True)
         try:
             yield real
         finally:

@@ -9,19 +9,21 @@ import os
 from typing import TYPE_CHECKING
 
 from odscen.errors import SimulationError
-from odscen.results.summary import Trip
+from odscen.results.records import events_text
+from odscen.results.summary import Trip, actors_text
 from odscen.sumo.lane_table import lane_table
 from odscen.sumo.layout import (
+    ACTORS_FILE,
     EMISSIONS_FILE,
+    EVENTS_FILE,
     LANES_FILE,
     TRIPINFO_FILE,
     TRIPS_FILE,
 )
-from odscen.sumo.recorded import read_trips
 from odscen.sumo.trip_table import trip_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
 
@@ -75,10 +77,19 @@ def tidy_outputs(
         raise SimulationError(msg) from error
 
 
-def trips_by_id(run: Path) -> dict[str, Trip]:
-    """What the trips say of each actor; empty if none were recorded."""
-    table = read_trips(run)
-    if table is None:
+def trips_in(file: Path) -> dict[str, Trip]:
+    """What a table of trips says of each actor; empty if there is none."""
+    import polars as pl
+
+    if not file.is_file():
         return {}
-    columns = table.select("id", "time_loss", "waiting_time", "waiting_count")
-    return {name: Trip(*values) for name, *values in columns.iter_rows()}
+    table = pl.read_parquet(file, columns=["id", "time_loss", "waiting_time", "waiting_count"])
+    return {name: Trip(*values) for name, *values in table.iter_rows()}
+
+
+def write_results(run: Path, events: Iterable[str], actors: Iterable[str]) -> None:
+    """Write ``events.json`` and ``actors.json`` from their rows."""
+    with (run / EVENTS_FILE).open("w", encoding="utf-8") as out:
+        out.writelines(events_text(events))
+    with (run / ACTORS_FILE).open("w", encoding="utf-8") as out:
+        out.writelines(actors_text(actors))

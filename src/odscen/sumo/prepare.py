@@ -24,12 +24,10 @@ if TYPE_CHECKING:
     from odscen.catalog.drawing import MapDrawing
     from odscen.results.corridors import Corridor
     from odscen.scenario.document import Scenario
-    from odscen.sumo.realize import Assets
+    from odscen.sumo.realize import Assets, SliceLength
     from odscen.sumo.recording import Recording
     from odscen.sumo.sumo_map import SumoMap
 
-SLICE = 3600.0
-"""Seconds of a slice, unless somebody wishes otherwise."""
 MESO_NOTE = (
     "meso: queues on sections of road instead of vehicles that follow each other. No lanes, lane "
     "changes, places across the lane, exact starts, collisions or hard braking; people on foot "
@@ -51,7 +49,7 @@ def prepare(
     weather: bool = True,
     recording: Recording | None = None,
     meso: bool = False,
-    slice_length: float | None = SLICE,
+    slice_length: SliceLength = "auto",
 ) -> PreparedRun:
     """Realize a scenario and put together what its run folder will hold.
 

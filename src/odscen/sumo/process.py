@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -128,7 +129,7 @@ def run_worker(
         try:
             last = _follow(process, progress, live)
         except BaseException:  # an interrupt, or the caller's progress function
-            process.kill()
+            _kill(process)
             raise
         finally:
             if timer is not None:
@@ -193,12 +194,18 @@ def _kill_after(
 
     def kill() -> None:
         late.set()
-        process.kill()
+        _kill(process)
 
     timer = threading.Timer(seconds, kill)
     timer.daemon = True
     timer.start()
     return timer
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End the worker and whatever it has started: its session is its own."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def _exit_words(code: int) -> str:

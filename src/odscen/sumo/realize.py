@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -55,6 +55,11 @@ if TYPE_CHECKING:
 UNKNOWN_LIMIT = 13.89
 """Speed (m/s) that free-flow times assume where the map gives no limit: 50 km/h."""
 
+SliceLength = float | Literal["auto"] | None
+"""Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
+_HOUR = 3600.0
+_SLICES, _MOST_HOURS = 6, 4
+
 
 class Assets(Protocol):
     """What realization asks of the asset catalogue."""
@@ -94,7 +99,7 @@ def realize(
     weather: bool = True,
     recording: Recording | None = None,
     meso: bool = False,
-    slice_length: float | None = None,
+    slice_length: SliceLength = None,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -112,7 +117,8 @@ def realize(
     meso
         Queues on road sections instead of single vehicles that follow each other.
     slice_length
-        Seconds; a longer run goes in slices of this length. ``None`` for one piece, however long.
+        Seconds; a longer run goes in slices of this length, or of what suits it, see
+        :func:`slices_of`. ``None`` for one piece, however long.
 
     Raises
     ------
@@ -173,8 +179,14 @@ def realize(
     return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
 
 
-def slices_of(until: float, length: float | None, step_length: float) -> float | None:
-    """Seconds of the slices of a run: whole steps; ``None`` if it goes in one piece."""
+def slices_of(until: float, length: SliceLength, step_length: float) -> float | None:
+    """Seconds of the slices of a run: whole steps; ``None`` if it goes in one piece.
+
+    What suits is an hour, and of a run of more than six hours a sixth, in whole hours and at most
+    four: each slice costs a start of SUMO, and an interruption what is done of one.
+    """
+    if length == "auto":
+        length = _HOUR * min(max(math.ceil(until / _HOUR / _SLICES), 1), _MOST_HOURS)
     if length is None or until <= length:
         return None
     return max(1, round(length / step_length)) * step_length

@@ -4,52 +4,41 @@ Going on after loading a state is not what SUMO would have done without saving: 
 goes through the same reloads, interrupted or not, and one that goes on from slice ``k`` ends with
 the same results as one that was never interrupted. At each boundary SUMO closes its outputs.
 
-A slice is tidied and completed while the next one runs: that work is not SUMO's, and most of it is
-writing to the disk.
+A slice is tidied and completed while the next one runs, in another process.
 """
 
 from __future__ import annotations
 
 import time
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from odscen.errors import SimulationError
-from odscen.results.records import Plan, event_from_line, event_line
 from odscen.sumo import layout
 from odscen.sumo.checkpoint import (
-    EVENTS_LINES,
     STATE_FILE,
     Checkpoint,
-    check_state,
-    complete,
-    fingerprints,
     last_number,
     part_folder,
     read_checkpoint,
-    slice_folder,
     written_folder,
 )
-from odscen.sumo.conflict_files import tidy_conflicts
-from odscen.sumo.outputs import outputs_to, tidy_outputs
-from odscen.sumo.parts import check_room, tidy_part
+from odscen.sumo.completer import Written
+from odscen.sumo.completion import Completion
+from odscen.sumo.outputs import outputs_to
+from odscen.sumo.parts import check_room
 from odscen.sumo.progress import Done
 from odscen.sumo.route_slices import RouteSlices
 from odscen.sumo.session import open_session
-from odscen.sumo.status import write_status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from concurrent.futures import Future
+    from collections.abc import Iterator
 
-    from odscen.results.records import Event
+    from odscen.results.records import Plan
     from odscen.sumo.session import Session
     from odscen.sumo.stepping import Stepper
 
-_CONTENTS = (STATE_FILE, EVENTS_LINES, *layout.RECORDED)
 _SAVING = (
     "--save-state.rng", "true",
     "--save-state.transportables", "true",
@@ -58,7 +47,7 @@ _SAVING = (
 
 
 def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
-    """Run what is left of a long run, from its last complete slice on.
+    """Run what is left of a long run, from its last complete slice on, and write its results.
 
     Raises
     ------
@@ -73,106 +62,13 @@ def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
         stepper.recorder.restore(done.recorder)
         stepper.steps = done.steps
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
-    with _Completion(plan, run) as completion:
+    with Completion(run) as completion:
         while done is None or not done.last:
             written = _Slice(plan, run, done, routes).run(stepper, completion)
             completion.take(written)
             done = written.checkpoint
+        completion.write_results()
     return Done(done.time, done.steps, done.wall_seconds, done.stopped)
-
-
-def recorded_events(run: Path) -> Iterator[Event]:
-    """Events of all complete slices, one by one."""
-    return map(event_from_line, event_lines(run))
-
-
-def event_lines(run: Path) -> Iterator[str]:
-    """Yield the same as lines, for a file."""
-    for number in range(1, last_number(run) + 1):
-        with (slice_folder(run, number) / EVENTS_LINES).open(encoding="utf-8") as lines:
-            for line in lines:
-                yield line.rstrip("\n")
-
-
-@dataclass(frozen=True, slots=True)
-class _Written:
-    """A slice that SUMO has written into ``part``, and that is not complete.
-
-    Attributes
-    ----------
-    checkpoint
-        Without ``files``.
-    events
-        What has happened in it.
-    lengths
-        Of lanes, metres.
-    lanes
-        How many vehicles came in on each lane with the state.
-    """
-
-    part: Path
-    checkpoint: Checkpoint
-    events: list[Event]
-    lengths: Mapping[str, float]
-    lanes: Mapping[str, int]
-
-    def complete(self, plan: Plan, run: Path) -> None:
-        """Tidy what SUMO has written and make the slice complete."""
-        part, last = self.part, self.checkpoint.last
-        with (part / EVENTS_LINES).open("w", encoding="utf-8") as out:
-            out.writelines(event_line(event) + "\n" for event in self.events)
-        if not last:
-            check_state(part / STATE_FILE)
-        tidy_part(part / layout.TRAJECTORIES_FILE)
-        tidy_outputs(part, self.lengths, present=self.lanes, last=last)
-        tidy_conflicts(part, plan)
-        checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))
-        complete(run, part, checkpoint)
-        write_status(run, plan, checkpoint)
-
-
-class _Completion:
-    """Completes each slice while the next one runs, in a thread of its own."""
-
-    def __init__(self, plan: Plan, run: Path) -> None:
-        self._plan = plan
-        self._run = run
-        self._pool = ThreadPoolExecutor(1)
-        self._written: _Written | None = None
-        self._going: Future[None] | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        try:
-            self.begin()
-            self.wait()
-        finally:
-            self._pool.shutdown()
-
-    def take(self, written: _Written) -> None:
-        """Take a slice, once the one before is complete.
-
-        Raises
-        ------
-        SimulationError, OSError
-            If the one before could not be completed.
-        """
-        self.wait()
-        self._written = written
-
-    def begin(self) -> None:
-        """Begin: SUMO has read the state, so that it may be moved."""
-        if self._written is not None:
-            self._going = self._pool.submit(self._written.complete, self._plan, self._run)
-            self._written = None
-
-    def wait(self) -> None:
-        """Wait until the slice that has been begun is complete."""
-        if self._going is not None:
-            going, self._going = self._going, None
-            going.result()
 
 
 class _Slice:
@@ -189,7 +85,7 @@ class _Slice:
         length = plan.slice_length or plan.until
         self._end = min(self._number * length, plan.until)
 
-    def run(self, stepper: Stepper, completion: _Completion) -> _Written:
+    def run(self, stepper: Stepper, completion: Completion) -> Written:
         """Simulate it; the one before is completed meanwhile."""
         before, start = self._before, time.perf_counter()
         if before is not None:
@@ -227,7 +123,7 @@ class _Slice:
             lanes=lanes,
             files={},
         )
-        return _Written(part, checkpoint, events, lengths, before.lanes if before else {})
+        return Written(part, checkpoint, events, lengths, before.lanes if before else {})
 
     def _arguments(self, part: Path) -> list[str]:
         sumo = self._run / layout.SUMO_FOLDER

@@ -18,32 +18,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.errors import OdscenError
-from odscen.results.records import Plan, event_line, events_text
-from odscen.results.summary import actor_outcomes, actors_to_json
+from odscen.results.records import Plan, event_line
+from odscen.results.summary import Fates
 from odscen.sumo.conflict_files import tidy_conflicts
 from odscen.sumo.layout import (
-    ACTORS_FILE,
     CONFIG_FILE,
-    EVENTS_FILE,
     LOG_FILE,
     SUMO_FOLDER,
     TRAJECTORIES_FILE,
+    TRIPS_FILE,
 )
 from odscen.sumo.lockstep import LockstepWatch
 from odscen.sumo.output_capture import captured_output
-from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_by_id
+from odscen.sumo.outputs import outputs_to, tidy_outputs, trips_in, write_results
 from odscen.sumo.parts import tidy_part
 from odscen.sumo.progress import Done, Failed, Lockstep, Message, Pace, decode, encode
 from odscen.sumo.session import open_session
-from odscen.sumo.slices import event_lines, recorded_events, run_slices
+from odscen.sumo.slices import run_slices
 from odscen.sumo.steering import Steering
 from odscen.sumo.stepping import Stepper
 from odscen.sumo.watch import Watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from odscen.results.records import Event
+    from collections.abc import Callable
 
 
 def main() -> int:
@@ -80,19 +77,13 @@ def simulate(
         If SUMO refuses to start or stops with an error.
     """
     stepper = Stepper(plan, send, watch)
-    lines: Iterable[str]
-    events: Iterable[Event]
-    if plan.slice_length is None:
-        done = _in_one_piece(plan, folder, stepper)
-        events = stepper.recorder.events
-        lines = map(event_line, events)
-    else:
-        done = run_slices(plan, folder, stepper)
-        lines, events = event_lines(folder), recorded_events(folder)
-    with (folder / EVENTS_FILE).open("w", encoding="utf-8") as out:
-        out.writelines(events_text(lines))
-    outcomes = actor_outcomes(plan, events, trips_by_id(folder))
-    (folder / ACTORS_FILE).write_text(actors_to_json(outcomes), encoding="utf-8")
+    if plan.slice_length is not None:
+        return run_slices(plan, folder, stepper)
+    done = _in_one_piece(plan, folder, stepper)
+    events = stepper.recorder.events
+    fates = Fates(plan)
+    fates.hear(events, trips_in(folder / TRIPS_FILE))
+    write_results(folder, map(event_line, events), fates.rows())
     return done
 
 
