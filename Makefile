@@ -10,14 +10,14 @@ PAGE_SOURCES := $(shell find frontend/src frontend/public -type f) \
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test regression test-page chromium page check format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test regression test-page chromium allocator page check format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
 	$(BIN)/odscen demo --workspace demo
 
 # Set-up plus the tests, the suite of scenarios on the shipped maps among them.
-test: test-page $(READY) $(QC) $(PAGE) chromium
+test: test-page $(READY) $(QC) $(PAGE) chromium allocator
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 	$(MAKE) regression
 
@@ -33,7 +33,12 @@ page: $(PAGE)
 
 # For the tests in a browser, which are skipped without; ODSCEN_REQUIRE_BROWSER=1 and CI forbid that.
 chromium:
-	$(PYTHON) tools/chromium.py
+	$(PYTHON) -m tools.chromium
+
+# SUMO runs faster with it, see docs/runs.md; everything works without.
+allocator:
+	@PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q libtcmalloc_minimal.so.4 || \
+	$(PYTHON) -m tools.debian libtcmalloc-minimal4 "with which SUMO is faster"
 
 check: $(READY) $(MODULES)
 	$(NPM) run check
@@ -47,7 +52,7 @@ format: $(READY)
 	$(BIN)/ruff format .
 
 # Benchmarks print ratios against a named peer, measured in the same run.
-bench: $(READY) $(PAGE) chromium
+bench: $(READY) $(PAGE) chromium allocator
 	$(BIN)/python -m bench
 
 # The wheel from a clone of what is committed, on a machine without Node.

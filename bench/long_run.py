@@ -5,23 +5,26 @@ and recorded output, whatever the run folder's sumocfg names. Aim: at most 1.15.
 midnight on the large town and, where the shared maps are, on carla-2019/Town05, at least 50,000
 trips each; name one of them to run it alone. ``--rounds N`` for more than one round.
 
-Wall and CPU seconds of each, in turn, and the median of the ratios of each round. Everything is
-made from scratch. Preparation and report, which ``sumo`` does not have, are told apart. Memory is
-what the worker holds at each boundary between slices.
+Wall and CPU seconds of each, in turn, and the median of the ratios of each round. Each round has
+another seed, as traffic is chance: a run in slices and one in one piece have the same demand, but
+not the same jams, and the one with more of them takes longer. How many records of road users the
+one made for each of the other is told beside the ratio. Preparation and report, which ``sumo`` does
+not have, are told apart. Memory is what the worker holds at each boundary between slices.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import statistics
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections import defaultdict
 from pathlib import Path
 from typing import NamedTuple
+
+import polars as pl
 
 from bench.common import shared_maps, without_output
 from odscen import demands, workflow
@@ -31,6 +34,7 @@ from odscen.sumo import layout
 from odscen.sumo.checkpoint import last_number, read_checkpoint
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.process import run_worker
+from odscen.sumo.recorded import trajectory_files
 from odscen.sumo.run_folder import make_summary, write_run_folder
 from tools.make_maps.__main__ import map_text
 
@@ -68,28 +72,27 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
         entry = workspace.add_map(path)
         scenario, _ = demands.whole_day(workspace, entry.name, trips=trips, day="weekday", seed=0)
         loaded = workflow.load_map(entry)
-        run = Path(name) / "run"
-        run.mkdir()
-        start = spent()
-        prepared = prepare(
-            scenario, loaded.sumo, entry.path("net"), workspace.assets(), until=until
-        )
-        write_run_folder(prepared, run)
-        preparation = since(start)
-        sumo_folder = run / layout.SUMO_FOLDER
-        config = sumo_folder / layout.CONFIG_FILE
-        silent = without_output(config)
-        times: dict[str, list[Spent]] = {"odscen": [], "sumo": [], "silent": []}
-        for _ in range(rounds):
-            times["sumo"].append(timed(lambda: bare(config)))
-            for left in (layout.SLICES_FOLDER, layout.TRAJECTORIES_FOLDER):
-                shutil.rmtree(run / left, ignore_errors=True)  # else it goes on from there
+        net, assets = entry.path("net"), workspace.assets()
+        times: defaultdict[str, list[Spent]] = defaultdict(list)
+        records = []
+        for seed in range(rounds):
+            run = Path(name) / f"run{seed}"
+            run.mkdir()
+            start = spent()
+            prepared = prepare(scenario, loaded.sumo, net, assets, seed=seed, until=until)
+            write_run_folder(prepared, run)
+            times["preparation"].append(since(start))
+            config = run / layout.SUMO_FOLDER / layout.CONFIG_FILE
+            silent = without_output(config)
+            times["sumo"].append(timed(config))
+            alone = rows([config.parent / layout.TRAJECTORIES_FILE])
             start = spent()
             ended = run_worker(run)
             times["odscen"].append(since(start))
             if ended.done is None:
                 raise SystemExit(ended.error)
-            times["silent"].append(timed(lambda: bare(silent)))
+            records.append(rows(trajectory_files(run)) / alone)
+            times["silent"].append(timed(silent))
         start = spent()
         summary = make_summary(prepared, run, ended, ())
         write_report(run, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
@@ -100,26 +103,28 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             f"{summary['actors']['arrived']:,} arrived, {rounds} rounds, wall (CPU) seconds:\n"
             f"  odscen {told(times['odscen'])}\n"
             f"  sumo with the same output {told(times['sumo'])}, "
-            f"ratio {ratios(times['odscen'], times['sumo'])} (aim 1.15)\n"
+            f"ratio {ratios(times['odscen'], times['sumo'])} (aim 1.15), "
+            f"records {' '.join(f'{one:.3f}' for one in records)}\n"
             f"  sumo without output {told(times['silent'])}, "
             f"ratio {ratios(times['odscen'], times['silent'])}\n"
-            f"  apart: preparation {told([preparation])}, report {told([report])}\n"
+            f"  apart: preparation {told(times['preparation'])}, report {told([report])}\n"
             f"  memory, MB, at the end of each slice: {' '.join(f'{m:.0f}' for m in memory)}; "
             f"after the first {max(memory[1:], default=0.0) / memory[0]:.2f} times as much at most",
             flush=True,
         )
 
 
-def bare(config: Path) -> None:
+def rows(files: list[Path]) -> int:
+    return int(pl.scan_parquet(files).select(pl.len()).collect().item())
+
+
+def timed(config: Path) -> Spent:
+    """Time of bare ``sumo``."""
     import sumo
 
     binary = Path(sumo.SUMO_HOME) / "bin" / "sumo"
-    subprocess.run([binary, "-c", config], check=True, capture_output=True)
-
-
-def timed(work: Callable[[], object]) -> Spent:
     start = spent()
-    work()
+    subprocess.run([binary, "-c", config], check=True, capture_output=True)
     return since(start)
 
 

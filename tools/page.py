@@ -67,7 +67,7 @@ def launched() -> Iterator[Browser]:
     """A headless Chromium that draws in software."""
     path = chromium.find()
     if path is None:
-        raise RuntimeError("no Chromium here; `python tools/chromium.py` says what to do")
+        raise RuntimeError("no Chromium here; `python -m tools.chromium` says what to do")
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=path, args=list(chromium.FLAGS))
         try:

@@ -30,7 +30,7 @@ _report = pytest.StashKey[pytest.TestReport]()
 
 def _missing() -> str:
     if chromium.find() is None:
-        return "there is no Chromium; `python tools/chromium.py` says what to do"
+        return "there is no Chromium; `python -m tools.chromium` says what to do"
     if not tool.BUILT.is_file():
         return "the page is not built; `make page` does it"
     return ""

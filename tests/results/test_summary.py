@@ -120,6 +120,7 @@ def test_plan_events_and_actors_come_back_from_their_files() -> None:
             x=st.none() | st.integers(-(10**6), 10**6).map(lambda n: n / 1000),
             error=st.none() | st.floats(0, 1).map(lambda e: round(e, 6)),
             partner=st.none() | st.text(),
+            **dict.fromkeys(("y", "lane", "travel_time", "detail", "waited", "queue"), st.none()),
         )
     ).map(tuple)
 )

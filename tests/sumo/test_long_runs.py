@@ -13,6 +13,7 @@ from odscen.results.expectations import parse_expectation
 from odscen.results.records import EventKind, events_from_json
 from odscen.results.summary import actors_from_json
 from odscen.sumo import checkpoint, forecast, layout, process, status
+from odscen.sumo.allocator import fast_allocator
 from odscen.sumo.layout import RECORDED
 from odscen.sumo.live import Live
 from odscen.sumo.long_runs import resume
@@ -319,3 +320,12 @@ def test_whoever_does_not_come_back_with_a_saved_state_is_told(
     events = events_from_json((run / "events.json").read_text())
     lost = [event for event in events if event.kind is EventKind.LOST]
     assert [(event.actor, event.time) for event in lost] == [(car, SLICE)]
+
+
+@pytest.mark.skipif(fast_allocator() is None, reason="there is no faster allocator here")
+def test_the_allocator_makes_no_difference_to_results(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LD_PRELOAD", "")
+    run_prepared(long, tmp_path / "run")
+    assert results(tmp_path / "run") == whole

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import orjson
 
@@ -170,9 +170,8 @@ class EventKind(StrEnum):
     LOST = "lost"
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened to ``actor``.
+class Event(NamedTuple):
+    """Something that happened to ``actor``; a tuple, as a long run makes very many.
 
     Attributes
     ----------
@@ -298,7 +297,7 @@ def _without_defaults(value: PlannedActor | Event) -> dict[str, Any]:
 
 
 _DEFAULTS: dict[type, tuple[tuple[str, Any], ...]] = {
-    kind: tuple((field.name, field.default) for field in fields(kind))
-    for kind in (PlannedActor, Event)
+    PlannedActor: tuple((field.name, field.default) for field in fields(PlannedActor)),
+    Event: tuple((name, Event._field_defaults.get(name, ...)) for name in Event._fields),
 }
 """Names and defaults of the fields; asked for every row of a long run."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,20 +35,17 @@ class Poses(NamedTuple):
     signals: NDArray[np.int64]
 
 
-class Collision(NamedTuple):
-    """One collision that SUMO reports in a step; ``pos`` in metres along ``lane``."""
+class Collision(Protocol):
+    """One collision that lasts, as libsumo tells of it."""
 
     collider: str
     victim: str
     type: str
     lane: str
-    pos: float
-    collider_speed: float
-    victim_speed: float
 
 
 class StepLists(NamedTuple):
-    """What happened in one step: ids, in SUMO's order."""
+    """What happened in one step: ids, and collisions that lasted, in SUMO's order."""
 
     departed: Sequence[str]
     arrived: Sequence[str]
@@ -57,6 +54,11 @@ class StepLists(NamedTuple):
     teleports_started: Sequence[str]
     teleports_ended: Sequence[str]
     emergency_stops: Sequence[str]
+    collisions: Sequence[Collision]
+
+
+NOTHING = StepLists(*((),) * 8)
+"""A step in which nothing happened."""
 
 
 class Standing(NamedTuple):

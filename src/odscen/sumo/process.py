@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from odscen.sumo.allocator import fast_allocator
 from odscen.sumo.layout import LOG_FILE, PLAN_FILE
 from odscen.sumo.progress import (
     Command,
@@ -33,11 +34,6 @@ if TYPE_CHECKING:
     from odscen.sumo.progress import Lockstep, Message, OnProgress, Pace
 
 WORKER = "odscen.sumo.worker"
-_SURROUNDINGS = {
-    # One thread simulates; those that NumPy would start only wait, and burn time in doing so.
-    "OPENBLAS_NUM_THREADS": "1",
-}
-"""Environment of the worker where the user's own does not say otherwise."""
 
 
 class Companion(Protocol):
@@ -121,7 +117,7 @@ def run_worker(
             # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
             # a failed run, and the folder of a run that was called off would appear.
             start_new_session=True,
-            env={**_SURROUNDINGS, **os.environ},
+            env={**_surroundings(), **os.environ},
             pass_fds=keep,
         ) as process,
     ):
@@ -144,6 +140,16 @@ def run_worker(
     reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
     words = sumo_words(folder)
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
+
+
+def _surroundings() -> dict[str, str]:
+    """Environment of the worker where the user's own does not say otherwise."""
+    # One thread simulates; those that NumPy would start only wait, and burn time in doing so.
+    variables = {"OPENBLAS_NUM_THREADS": "1"}
+    allocator = fast_allocator()
+    if allocator is not None:
+        variables["LD_PRELOAD"] = allocator
+    return variables
 
 
 def _follow(

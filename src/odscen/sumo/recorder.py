@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 from odscen.frames import body_centre
 from odscen.results.records import Event, EventKind, Plan
 from odscen.sumo.jams import JamWatch
+from odscen.sumo.observed import NOTHING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.sumo.observed import Collision, Front
+    from odscen.sumo.observed import Collision, Front, StepLists
     from odscen.sumo.session import Session
 
 
@@ -95,13 +96,13 @@ class Recorder:
 
     def record(self, session: Session, time: float) -> None:
         """Record the step that began at ``time`` and has just been made."""
-        if session.eventful() or self._touching or self._stopping:
-            self._record_events(session, time)
+        happened = session.happened()
+        if happened is not None or self._touching or self._stopping:
+            self._record_events(session, time, happened or NOTHING)
         elif self._jams.due <= time:  # a quiet step, as most are: all that costs is saved there
             self.events += self._jams.look(session, time)
 
-    def _record_events(self, session: Session, time: float) -> None:
-        lists = session.lists()
+    def _record_events(self, session: Session, time: float, lists: StepLists) -> None:
         for vehicle in lists.departed:
             self._depart(time, vehicle, session.vehicle_front(vehicle))
         for person in lists.departed_persons:
@@ -111,11 +112,15 @@ class Recorder:
         for vehicle in lists.teleports_ended:
             front = session.vehicle_front(vehicle)
             self._place(time, EventKind.TELEPORT_END, vehicle, front)
-        self._stops(time, lists.emergency_stops, session)
-        self._collisions(time, session.collisions())
+        if lists.emergency_stops or self._stopping:
+            self._stops(time, lists.emergency_stops, session)
+        if lists.collisions or self._touching:
+            self._collisions(time, lists.collisions)
         if self._jams.due <= time:
             self.events += self._jams.look(session, time)
-        for name in (*lists.arrived, *lists.arrived_persons):
+        for name in lists.arrived:
+            self._arrive(time, name)
+        for name in lists.arrived_persons:
             self._arrive(time, name)
 
     def _depart(self, time: float, name: str, front: Front | None) -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.errors import SimulationError
-from odscen.sumo.observed import Ahead, Collision, Front, Poses, Standing, StepLists
+from odscen.sumo.observed import Ahead, Front, Poses, Standing, StepLists
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -40,6 +40,19 @@ _STANDS = 0.1
 """Speed, m/s, below which SUMO counts a vehicle as waiting."""
 
 
+_HAPPENINGS = (
+    ("getDepartedNumber", "getDepartedIDList"),
+    ("getArrivedNumber", "getArrivedIDList"),
+    ("getDepartedPersonNumber", "getDepartedPersonIDList"),
+    ("getArrivedPersonNumber", "getArrivedPersonIDList"),
+    ("getStartingTeleportNumber", "getStartingTeleportIDList"),
+    ("getEndingTeleportNumber", "getEndingTeleportIDList"),
+    ("getEmergencyStoppingVehiclesNumber", "getEmergencyStoppingVehiclesIDList"),
+    ("getCollisions", "getCollisions"),
+)
+"""Getters of numbers and lists, as in :class:`StepLists`."""
+
+
 class Session:
     """A running simulation. Made by :func:`open_session` only."""
 
@@ -47,11 +60,18 @@ class Session:
         self._sumo = sumo
         self._simulation = sumo.simulation
         self._errors = sumo_errors(sumo)
+        self._step = _native(sumo, "simulation", "step")
+        self._time = _native(sumo, "simulation", "getTime")
+        self._expected = _native(sumo, "simulation", "getMinExpectedNumber")
+        self._happenings = tuple(
+            (_native(sumo, "simulation", count), _native(sumo, "simulation", ids))
+            for count, ids in _HAPPENINGS
+        )
 
     @property
     def time(self) -> float:
         """Simulated seconds at the start of the next step."""
-        return float(self._simulation.getTime())
+        return float(self._time())
 
     def step(self) -> None:
         """Advance by one step.
@@ -62,65 +82,24 @@ class Session:
             If SUMO ends the simulation with an error.
         """
         try:
-            self._sumo.simulationStep()
+            self._step()
         except self._errors as error:
             msg = f"SUMO stopped at {self.time:g} s: {error}"
             raise SimulationError(msg) from error
 
     def expected(self) -> int:
         """How many vehicles and persons are on the road or still to come; 0 only when none is."""
-        return int(self._simulation.getMinExpectedNumber())
+        return int(self._expected())
 
     def running(self) -> int:
         """How many vehicles and persons are on the road now."""
         return int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
 
-    def eventful(self) -> bool:
-        """Whether :meth:`lists` or :meth:`collisions` tell of anything in the last step."""
-        simulation = self._simulation
-        return bool(
-            simulation.getDepartedNumber()
-            or simulation.getArrivedNumber()
-            or simulation.getDepartedPersonNumber()
-            or simulation.getArrivedPersonNumber()
-            or simulation.getEmergencyStoppingVehiclesNumber()
-            or simulation.getStartingTeleportNumber()
-            or simulation.getEndingTeleportNumber()
-            or simulation.getCollisions()
-        )
-
-    def lists(self) -> StepLists:
-        """Id lists of the last step: one call each, whatever the number of vehicles running."""
-        simulation = self._simulation
+    def happened(self) -> StepLists | None:
+        """What happened in the last step; ``None`` if nothing did, as in most."""
         # A list costs far more than its length, and most are empty.
-        return StepLists(
-            simulation.getDepartedIDList() if simulation.getDepartedNumber() else (),
-            simulation.getArrivedIDList() if simulation.getArrivedNumber() else (),
-            simulation.getDepartedPersonIDList() if simulation.getDepartedPersonNumber() else (),
-            simulation.getArrivedPersonIDList() if simulation.getArrivedPersonNumber() else (),
-            simulation.getStartingTeleportIDList()
-            if simulation.getStartingTeleportNumber()
-            else (),
-            simulation.getEndingTeleportIDList() if simulation.getEndingTeleportNumber() else (),
-            simulation.getEmergencyStoppingVehiclesIDList()
-            if simulation.getEmergencyStoppingVehiclesNumber()
-            else (),
-        )
-
-    def collisions(self) -> list[Collision]:
-        """Collisions that lasted during the last step."""
-        return [
-            Collision(
-                str(c.collider),
-                str(c.victim),
-                str(c.type),
-                str(c.lane),
-                float(c.pos),
-                float(c.colliderSpeed),
-                float(c.victimSpeed),
-            )
-            for c in self._simulation.getCollisions()
-        ]
+        lists = [ids() if count() else () for count, ids in self._happenings]
+        return StepLists(*lists) if any(lists) else None
 
     def vehicle_front(self, vehicle: str) -> Front | None:
         """Pose of a vehicle on the road, ``None`` if it is not (or no longer) there."""
@@ -378,6 +357,13 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
 def sumo_errors(sumo: Any) -> tuple[type[Exception], ...]:
     """Exceptions that libsumo raises; the two of its own have no common base."""
     return sumo.TraCIException, sumo.FatalTraCIError, RuntimeError
+
+
+def _native(sumo: Any, domain: str, name: str) -> Callable[[], Any]:
+    """Return the C function of libsumo behind one of Python, which costs a call in every step."""
+    getter = getattr(getattr(sumo, domain), name)
+    native: Callable[[], Any] = getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
+    return native
 
 
 def import_libsumo() -> Any:

@@ -12,6 +12,7 @@ told to.
 
 from __future__ import annotations
 
+import gc
 import sys
 import time
 from pathlib import Path
@@ -55,6 +56,7 @@ def main() -> int:
 
         try:
             plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
+            gc.freeze()  # the plan stays, and need not be gone through again and again
             watch = _watch(plan, sys.argv[2], send) if len(sys.argv) > 2 else None
             send(simulate(plan, folder, send, watch))
         except (OdscenError, OSError) as error:
