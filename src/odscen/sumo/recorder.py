@@ -2,8 +2,7 @@
 
 Only counts are read per step, and, where they are not 0, id lists and poses of those who have just
 departed: the cost does not grow with the number of vehicles running. Four times a minute all are
-looked at for jams. Trajectories are
-SUMO's own business (FCD output).
+looked at for jams. Trajectories are SUMO's own business (FCD output).
 """
 
 from __future__ import annotations
@@ -43,7 +42,6 @@ class Recorder:
         self.arrived = 0
         self._planned = {actor.id: actor for actor in plan.actors}
         self._offset = plan.net_offset
-        self._elevation = plan.elevation
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
         self._stopping: set[str] = set()

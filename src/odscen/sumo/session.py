@@ -73,8 +73,8 @@ class Session:
         """Simulated seconds at the start of the next step."""
         return float(self._time())
 
-    def step(self) -> None:
-        """Advance by one step.
+    def step(self) -> float:
+        """Advance by one step; simulated seconds then, at the start of the next one.
 
         Raises
         ------
@@ -83,6 +83,7 @@ class Session:
         """
         try:
             self._step()
+            return float(self._time())
         except self._errors as error:
             msg = f"SUMO stopped at {self.time:g} s: {error}"
             raise SimulationError(msg) from error

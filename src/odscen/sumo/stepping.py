@@ -67,34 +67,33 @@ class Stepper:
         more
             Whether somebody is to come whom this simulation does not know of.
         """
-        watch, record = self._watch, self.recorder.record
+        watch, record, clock = self._watch, self.recorder.record, time.monotonic
         now = session.time
         if self._start is None:
             self._start = now, self.recorder.departed
-        begin = time.monotonic()
+        begin, waited = clock(), 0.0
         while now < until and (more or session.expected() > 0):
             if watch is not None:
+                asked = clock()
                 if not watch.next_step(session, self.recorder):
                     break
-                begin = time.monotonic()
-            session.step()
+                waited += clock() - asked
+            after = session.step()
             record(session, now)
-            now = session.time
+            now = after
             self.steps += 1
-            end = time.monotonic()
-            self._busy += end - begin
-            begin = end
-            if end - self._sent >= MESSAGE_PAUSE:
-                self._sent = end
-                self._tell(session, now)
+            if clock() - self._sent >= MESSAGE_PAUSE:
+                self._sent = clock()
+                self._tell(session, now, self._busy + self._sent - begin - waited)
+        self._busy += clock() - begin - waited
         if not more and session.expected() == 0:
             self.recorder.nobody_left(now)
         if self._watch is not None:  # whoever watches sees how it ends
             self._watch.show_last(session, self.recorder)
-            self._tell(session, now)
+            self._tell(session, now, self._busy)
         return now
 
-    def _tell(self, session: Session, now: float) -> None:
+    def _tell(self, session: Session, now: float, busy: float) -> None:
         recorder, plan = self.recorder, self._plan
         self._send(
             Progress(
@@ -104,12 +103,15 @@ class Stepper:
                 recorder.departed,
                 recorder.arrived,
                 len(plan.actors),
-                self._time_left(now),
+                self._time_left(now, busy),
             )
         )
 
-    def _time_left(self, now: float) -> float | None:
-        """Wall seconds of work left; half of the work goes with time, half with departures."""
+    def _time_left(self, now: float, busy: float) -> float | None:
+        """Wall seconds of work left, of which ``busy`` have been done.
+
+        Half of the work goes with time, half with departures.
+        """
         if self._start is None:
             return None
         begin, departed = self._start
@@ -118,4 +120,4 @@ class Stepper:
         share = 0.5 * (now - begin) / seconds + 0.5 * (self.recorder.departed - departed) / actors
         if share < _TOO_EARLY:
             return None
-        return round(self._busy * (1.0 - share) / share, 1)
+        return round(busy * (1.0 - share) / share, 1)
