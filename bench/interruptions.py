@@ -3,7 +3,7 @@
 ``python -m bench.interruptions [MAP.xodr] [--hours H] [--weekday TRIPS] [--kills N] [--meso]``:
 traffic on a map (the shipped town, 2 hours, if not given) in slices of 10 minutes; with
 ``--weekday`` the hours from 7:00 on of a weekday with so many trips. The command line
-is killed at 20 random moments, half of the time together with its worker, and resumed each time,
+is killed at 20 random moments, half of the time with all of its processes, and resumed each time,
 the last time to its end. The results must be the same bytes, and nothing that was there before a
 kill may be gone or different after it.
 """
@@ -11,6 +11,7 @@ kill may be gone or different after it.
 from __future__ import annotations
 
 import argparse
+import os
 import random
 import shutil
 import signal
@@ -18,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from odscen import demands, workflow
@@ -133,8 +135,9 @@ def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:
         except subprocess.TimeoutExpired:
             children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
             process.send_signal(signal.SIGKILL)
-            for child in children if worker else []:
-                subprocess.run(["kill", "-9", child], check=False, capture_output=True)
+            for child in children if worker else []:  # it leads a session, with what it started
+                with suppress(ProcessLookupError):
+                    os.killpg(int(child), signal.SIGKILL)
             return False
     return True
 

@@ -17,12 +17,14 @@ from odscen.results.records import (
     events_to_json,
 )
 from odscen.results.summary import (
+    Fates,
     Trip,
     actor_counts,
     actor_outcomes,
     actors_from_json,
     actors_to_json,
     key_figures,
+    outcome_row,
 )
 
 
@@ -108,6 +110,16 @@ def test_plan_events_and_actors_come_back_from_their_files() -> None:
     assert events_from_json(events_to_json(EVENTS)) == EVENTS
     outcomes = actor_outcomes(whole, EVENTS, TRIPS)
     assert actors_from_json(actors_to_json(outcomes)) == outcomes
+
+
+def test_rows_written_down_early_are_those_of_the_outcomes() -> None:
+    whole = plan(planned("a"), planned("b"), planned("never"))
+    fates = Fates(whole)
+    for event in EVENTS:
+        fates.hear([event], TRIPS)
+        fates.settle()
+    rows = [outcome_row(outcome) for outcome in actor_outcomes(whole, EVENTS, TRIPS)]
+    assert list(fates.rows()) == rows
 
 
 @given(

@@ -9,7 +9,7 @@ from lxml import etree
 from odscen.categories import Body, Category
 from odscen.errors import InputError, ScenarioError
 from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario, Simulation
-from odscen.sumo.realize import Realization, realize
+from odscen.sumo.realize import Realization, SliceLength, realize, slices_of
 from odscen.sumo.recording import Recording
 from tests.graphs import SHA256
 from tests.sumo.toys import sumo_map
@@ -213,3 +213,27 @@ def test_settings_of_the_run_are_in_the_configuration() -> None:
     assert (values["end"], values["step-length"], values["seed"]) == ("42", "0.1", "5")
     assert values["route-files"] == "routes.rou.xml"
     assert "/" not in values["net-file"]
+
+
+HOUR = 3600.0
+
+
+@pytest.mark.parametrize(
+    ("until", "wish", "seconds"),
+    [
+        (HOUR, "auto", None),
+        (2 * HOUR, "auto", HOUR),
+        (6 * HOUR, "auto", HOUR),
+        (7 * HOUR, "auto", 2 * HOUR),
+        (12 * HOUR, "auto", 2 * HOUR),
+        (24 * HOUR, "auto", 4 * HOUR),
+        (100 * HOUR, "auto", 4 * HOUR),
+        (24 * HOUR, None, None),
+        (24 * HOUR, 600.0, 600.0),
+        (24 * HOUR, 0.7, 0.5),
+    ],
+)
+def test_long_runs_go_in_slices_of_whole_steps_that_suit_them(
+    until: float, wish: SliceLength, seconds: float | None
+) -> None:
+    assert slices_of(until, wish, 0.5) == seconds

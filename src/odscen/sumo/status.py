@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 FORMAT = "odscen-status"
 VERSION = 1
-PATIENCE = 3.0
-"""Wall seconds to wait for a worker that is about to notice that its runner is gone."""
+PATIENCE = 10.0
+"""Wall seconds to wait for a worker that is about to notice that its runner is gone, and for the
+slice that is being completed then."""
 
 
 def write_status(run: Path, plan: Plan, done: Checkpoint | None) -> None:
