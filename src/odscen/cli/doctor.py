@@ -37,6 +37,7 @@ def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> No
         *(_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
         *(_package(name, needed=False, advice=advice) for name, advice in OPTIONAL.items()),
         _sumo(),
+        _allocator(),
         _workspace(workspace),
     ]
     healthy = all(check["found"] is not None for check in checks if check["needed"])
@@ -70,6 +71,13 @@ def _sumo() -> dict[str, Any]:
     except ImportError:
         return _check("sumo", shutil.which("sumo"), needed=True, advice=advice)
     return _check("sumo", str(Path(sumo.SUMO_HOME) / "bin" / "sumo"), needed=True, advice=advice)
+
+
+def _allocator() -> dict[str, Any]:
+    from odscen.sumo.allocator import fast_allocator
+
+    advice = "runs are a tenth faster with it: apt-get install libtcmalloc-minimal4"
+    return _check("fast allocator", fast_allocator(), needed=False, advice=advice)
 
 
 def _workspace(workspace: Any) -> dict[str, Any]:
