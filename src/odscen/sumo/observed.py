@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -45,7 +45,10 @@ class Collision(Protocol):
 
 
 class StepLists(NamedTuple):
-    """What happened in one step: ids, and collisions that lasted, in SUMO's order."""
+    """What happened in one step: ids, and collisions that lasted, in SUMO's order.
+
+    ``fronts`` are of those who have departed, come back from a teleport, or brake in an emergency.
+    """
 
     departed: Sequence[str]
     arrived: Sequence[str]
@@ -55,10 +58,7 @@ class StepLists(NamedTuple):
     teleports_ended: Sequence[str]
     emergency_stops: Sequence[str]
     collisions: Sequence[Collision]
-
-
-NOTHING = StepLists(*((),) * 8)
-"""A step in which nothing happened."""
+    fronts: Mapping[str, Front | None]
 
 
 class Standing(NamedTuple):

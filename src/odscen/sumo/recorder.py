@@ -8,12 +8,11 @@ looked at for jams. Trajectories are SUMO's own business (FCD output).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.frames import body_centre
 from odscen.results.records import Event, EventKind, Plan
 from odscen.sumo.jams import JamWatch
-from odscen.sumo.observed import NOTHING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -22,30 +21,58 @@ if TYPE_CHECKING:
     from odscen.sumo.session import Session
 
 
+class _Step(NamedTuple):
+    """A step in which something happened; ``number`` counts all steps."""
+
+    number: int
+    time: float
+    lists: StepLists
+
+
 class Recorder:
-    """Turns the session's lists into events, step by step.
+    """Turns the session's lists into events.
+
+    Steps in which something happened are put by and gone through together, at every look for jams
+    and whenever somebody asks: after a step of SUMO nothing of Python is in the processor's caches,
+    and one event alone costs several times as much as one of many.
 
     Attributes
     ----------
-    events
-        Events since the last :meth:`drain`, in order of time.
     drained
         How many events were drained before.
-    departed, arrived
-        How many vehicles and persons so far.
     """
 
     def __init__(self, plan: Plan) -> None:
-        self.events: list[Event] = []
         self.drained = 0
-        self.departed = 0
-        self.arrived = 0
+        self._events: list[Event] = []
+        self._departed = 0
+        self._arrived = 0
         self._planned = {actor.id: actor for actor in plan.actors}
         self._offset = plan.net_offset
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
         self._stopping: set[str] = set()
         self._jams = JamWatch(plan.net_offset)
+        self._number = self._settled = 0
+        self._put_by: list[_Step] = []
+
+    @property
+    def events(self) -> list[Event]:
+        """Events since the last :meth:`drain`, in order of time."""
+        self._settle()
+        return self._events
+
+    @property
+    def departed(self) -> int:
+        """How many vehicles and persons have departed so far."""
+        self._settle()
+        return self._departed
+
+    @property
+    def arrived(self) -> int:
+        """How many vehicles and persons have arrived so far."""
+        self._settle()
+        return self._arrived
 
     def since(self, number: int) -> list[Event]:
         """Events but the first ``number`` ones, as far as they have not been drained."""
@@ -58,16 +85,17 @@ class Recorder:
 
     def drain(self) -> list[Event]:
         """Hand out the events and forget them: a long run keeps them on disk."""
-        events, self.events = self.events, []
+        events, self._events = self.events, []
         self.drained += len(events)
         return events
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
+        self._settle()
         return {
             "drained": self.drained,
-            "departed": self.departed,
-            "arrived": self.arrived,
+            "departed": self._departed,
+            "arrived": self._arrived,
             "departures": dict(self._departures),
             "touching": sorted(self._touching),
             "stopping": sorted(self._stopping),
@@ -76,9 +104,9 @@ class Recorder:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self.events = []
+        self._events, self._put_by = [], []
         self.drained = state["drained"]
-        self.departed, self.arrived = state["departed"], state["arrived"]
+        self._departed, self._arrived = state["departed"], state["arrived"]
         self._departures = dict(state["departures"])
         self._touching = {(one, other) for one, other in state["touching"]}
         self._stopping = set(state["stopping"])
@@ -86,48 +114,55 @@ class Recorder:
 
     def nobody_left(self, time: float) -> None:
         """Say that the run ends because the road is empty: every jam is over."""
-        self.events += self._jams.nobody_left(time)
+        self.events.extend(self._jams.nobody_left(time))
 
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
-        self.events += [Event(time, EventKind.LOST, name) for name in sorted(names)]
+        self.events.extend(Event(time, EventKind.LOST, name) for name in sorted(names))
 
     def record(self, session: Session, time: float) -> None:
         """Record the step that began at ``time`` and has just been made."""
-        happened = session.happened()
-        if happened is not None or self._touching or self._stopping:
-            self._record_events(session, time, happened or NOTHING)
-        elif self._jams.due <= time:  # a quiet step, as most are: all that costs is saved there
-            self.events += self._jams.look(session, time)
+        self._number += 1
+        lists = session.happened()
+        if lists is not None:
+            self._put_by.append(_Step(self._number, time, lists))
+        if time >= self._jams.due:
+            self.events.extend(self._jams.look(session, time))
 
-    def _record_events(self, session: Session, time: float, lists: StepLists) -> None:
-        for vehicle in lists.departed:
-            self._depart(time, vehicle, session.vehicle_front(vehicle))
-        for person in lists.departed_persons:
-            self._depart(time, person, session.person_front(person))
+    def _settle(self) -> None:
+        """Go through the steps that were put by."""
+        steps, self._put_by = self._put_by, []
+        for number, time, lists in steps:
+            self._quiet_before(number)
+            self._record(time, lists)
+            self._settled = number
+        self._quiet_before(self._number + 1)
+
+    def _quiet_before(self, number: int) -> None:
+        """If nothing happened in the step before this one, nobody touched or braked hard."""
+        if self._settled < number - 1:
+            self._touching, self._stopping = set(), set()
+
+    def _record(self, time: float, lists: StepLists) -> None:
+        fronts = lists.fronts
+        for name in (*lists.departed, *lists.departed_persons):
+            self._depart(time, name, fronts[name])
         for vehicle in lists.teleports_started:
             self._teleport(time, vehicle)
         for vehicle in lists.teleports_ended:
-            front = session.vehicle_front(vehicle)
-            self._place(time, EventKind.TELEPORT_END, vehicle, front)
-        if lists.emergency_stops or self._stopping:
-            self._stops(time, lists.emergency_stops, session)
-        if lists.collisions or self._touching:
-            self._collisions(time, lists.collisions)
-        if self._jams.due <= time:
-            self.events += self._jams.look(session, time)
-        for name in lists.arrived:
-            self._arrive(time, name)
-        for name in lists.arrived_persons:
+            self._place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
+        self._stops(time, lists.emergency_stops, fronts)
+        self._collisions(time, lists.collisions)
+        for name in (*lists.arrived, *lists.arrived_persons):
             self._arrive(time, name)
 
     def _depart(self, time: float, name: str, front: Front | None) -> None:
         if name in self._departures:  # back on the road after a teleport is no second departure
             return
         self._departures[name] = time
-        self.departed += 1
+        self._departed += 1
         if front is None:
-            self.events.append(Event(time, EventKind.DEPARTED, name))
+            self._events.append(Event(time, EventKind.DEPARTED, name))
             return
         planned = self._planned.get(name)
         length = planned.length if planned else 0.0
@@ -135,21 +170,21 @@ class Recorder:
             front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
         )
         error = math.hypot(x - planned.x, y - planned.y) if planned else None
-        self.events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
+        self._events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
 
     def _arrive(self, time: float, name: str) -> None:
-        self.arrived += 1
+        self._arrived += 1
         departed = self._departures.pop(name, None)
         spent = None if departed is None else time - departed
-        self.events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
+        self._events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
 
     def _teleport(self, time: float, vehicle: str) -> None:
         """Tell where and why it stood until now, as it has no place any more."""
         stuck = self._jams.stuck(vehicle)
         if stuck is None:
-            self.events.append(Event(time, EventKind.TELEPORT_START, vehicle))
+            self._events.append(Event(time, EventKind.TELEPORT_START, vehicle))
             return
-        self.events.append(
+        self._events.append(
             Event(
                 time,
                 EventKind.TELEPORT_START,
@@ -164,17 +199,18 @@ class Recorder:
 
     def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
         if front is None:
-            self.events.append(Event(time, kind, name))
+            self._events.append(Event(time, kind, name))
             return
         dx, dy = self._offset
-        self.events.append(Event(time, kind, name, x=front.x - dx, y=front.y - dy))
+        self._events.append(Event(time, kind, name, x=front.x - dx, y=front.y - dy))
 
-    def _stops(self, time: float, stopping: Sequence[str], session: Session) -> None:
+    def _stops(
+        self, time: float, stopping: Sequence[str], fronts: Mapping[str, Front | None]
+    ) -> None:
         """Report the first step only of each emergency stop."""
         for vehicle in stopping:
             if vehicle not in self._stopping:
-                front = session.vehicle_front(vehicle)
-                self._place(time, EventKind.EMERGENCY_STOP, vehicle, front)
+                self._place(time, EventKind.EMERGENCY_STOP, vehicle, fronts[vehicle])
         self._stopping = set(stopping)
 
     def _collisions(self, time: float, collisions: Sequence[Collision]) -> None:
@@ -183,7 +219,7 @@ class Recorder:
         for collision in collisions:
             if (collision.collider, collision.victim) in self._touching:
                 continue
-            self.events.append(
+            self._events.append(
                 Event(
                     time,
                     EventKind.COLLISION,

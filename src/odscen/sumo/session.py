@@ -63,6 +63,10 @@ class Session:
         self._step = _native(sumo, "simulation", "step")
         self._time = _native(sumo, "simulation", "getTime")
         self._expected = _native(sumo, "simulation", "getMinExpectedNumber")
+        self._vehicle, self._person = (
+            (_native(sumo, domain, "getPosition3D"), _native(sumo, domain, "getAngle"))
+            for domain in ("vehicle", "person")
+        )
         self._happenings = tuple(
             (_native(sumo, "simulation", count), _native(sumo, "simulation", ids))
             for count, ids in _HAPPENINGS
@@ -99,16 +103,20 @@ class Session:
     def happened(self) -> StepLists | None:
         """What happened in the last step; ``None`` if nothing did, as in most."""
         # A list costs far more than its length, and most are empty.
-        lists = [ids() if count() else () for count, ids in self._happenings]
-        return StepLists(*lists) if any(lists) else None
+        lists: list[Any] = [ids() if count() else () for count, ids in self._happenings]
+        if not any(lists):
+            return None
+        fronts = {name: self._front(self._vehicle, name) for name in lists[0]}
+        for name in (*lists[5], *lists[6]):
+            fronts[name] = self._front(self._vehicle, name)
+        for name in lists[2]:
+            fronts[name] = self._front(self._person, name)
+        lists.append(fronts)
+        return StepLists(*lists)
 
     def vehicle_front(self, vehicle: str) -> Front | None:
         """Pose of a vehicle on the road, ``None`` if it is not (or no longer) there."""
-        return self._front(self._sumo.vehicle, vehicle)
-
-    def person_front(self, person: str) -> Front | None:
-        """Pose of a person, ``None`` if it is not (or no longer) there."""
-        return self._front(self._sumo.person, person)
+        return self._front(self._vehicle, vehicle)
 
     def vehicle_poses(self) -> Poses:
         """Poses of all vehicles; 1.5 microseconds each, a fifth of what subscriptions cost."""
@@ -304,10 +312,10 @@ class Session:
             np.array(bits, dtype=np.int64),
         )
 
-    def _front(self, domain: Any, name: str) -> Front | None:
+    def _front(self, pose: tuple[Any, Any], name: str) -> Front | None:
+        place, direction = pose
         try:
-            x, y, z = domain.getPosition3D(name)
-            angle = float(domain.getAngle(name))
+            (x, y, z), angle = place(name), direction(name)
         except self._errors:
             return None
         if abs(x) > 1e8:  # SUMO's INVALID_DOUBLE_VALUE, -2^30: known, but not on the road
@@ -360,11 +368,10 @@ def sumo_errors(sumo: Any) -> tuple[type[Exception], ...]:
     return sumo.TraCIException, sumo.FatalTraCIError, RuntimeError
 
 
-def _native(sumo: Any, domain: str, name: str) -> Callable[[], Any]:
+def _native(sumo: Any, domain: str, name: str) -> Any:
     """Return the C function of libsumo behind one of Python, which costs a call in every step."""
     getter = getattr(getattr(sumo, domain), name)
-    native: Callable[[], Any] = getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
-    return native
+    return getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
 
 
 def import_libsumo() -> Any:
