@@ -236,7 +236,9 @@ def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
 
 def test_the_forecast_holds_for_a_run_like_this(long: PreparedRun, tmp_path: Path) -> None:
     expected = forecast.forecast(long.plan, long.sumo_files, every=None)
-    run_prepared(long, tmp_path / "run")
+    result = run_prepared(long, tmp_path / "run")
+    held = max(one["memory_mb"] for one in result.summary["slices"]["done"])
+    assert 50e6 < held * 1e6 < expected.memory < 1e9
     sizes = sum(file.stat().st_size for file in trajectory_files(tmp_path / "run"))
     assert sizes < expected.disk < 20 * sizes
     fewer = forecast.forecast(long.plan, long.sumo_files, every=10.0)

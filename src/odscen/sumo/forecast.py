@@ -35,8 +35,11 @@ UNKNOWN_TIME = 300.0
 MEMORY_BASE = 300e6
 MEMORY_RUNNING = 9e3
 """Bytes of memory for each road user under way; SUMO 1.28, 8-9 MB for 1,000."""
-MEMORY_PLANNED = 2.5e3
+MEMORY_PLANNED = 4e3
 """Bytes of memory for each planned actor."""
+COMPLETER_BASE = 150e6
+COMPLETER_PLANNED = 2.7e3
+"""Bytes of memory of the process that completes slices, and for each planned actor."""
 
 _MINUTE = 60.0
 
@@ -92,6 +95,8 @@ def forecast(
     measured = LANE_ROW * lanes * intervals if seconds else 0.0
     disk = written + ROW * rows + measured + ACTOR * len(plan.actors) + STATE * slices * most
     memory = MEMORY_BASE + MEMORY_RUNNING * most + MEMORY_PLANNED * len(plan.actors)
+    if slices:
+        memory += COMPLETER_BASE + COMPLETER_PLANNED * len(plan.actors)
     return Forecast(int(disk), int(memory), most)
 
 
