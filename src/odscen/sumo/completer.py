@@ -108,7 +108,7 @@ def main() -> int:
 
 
 def _happened(run: Path, number: int) -> tuple[Iterator[Event], dict[str, Trip]]:
-    """Events and trips of a complete slice."""
+    """Events and trips of a complete slice, from its files: the same in a run that was resumed."""
     lines = _event_lines(run, number)
     return map(event_from_line, lines), trips_in(recorded_part(run, layout.TRIPS_FILE, number))
 

@@ -106,13 +106,14 @@ class Session:
         lists: list[Any] = [ids() if count() else () for count, ids in self._happenings]
         if not any(lists):
             return None
-        fronts = {name: self._front(self._vehicle, name) for name in lists[0]}
-        for name in (*lists[5], *lists[6]):
-            fronts[name] = self._front(self._vehicle, name)
-        for name in lists[2]:
-            fronts[name] = self._front(self._person, name)
+        fronts: dict[str, Front | None] = {}
         lists.append(fronts)
-        return StepLists(*lists)
+        step = StepLists(*lists)
+        for name in (*step.departed, *step.teleports_ended, *step.emergency_stops):
+            fronts[name] = self._front(self._vehicle, name)
+        for name in step.departed_persons:
+            fronts[name] = self._front(self._person, name)
+        return step
 
     def vehicle_front(self, vehicle: str) -> Front | None:
         """Pose of a vehicle on the road, ``None`` if it is not (or no longer) there."""
