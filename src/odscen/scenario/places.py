@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.model import BoolArray, FloatArray, LaneGraph, PedestrianGraph, Relation
+from odscen.lanegraph.model import (
+    CHANGE_LEFT,
+    CHANGE_RIGHT,
+    BoolArray,
+    FloatArray,
+    LaneGraph,
+    PedestrianGraph,
+    Relation,
+)
 from odscen.lanegraph.paths import MIN_EDGE_LENGTH
 from odscen.scenario.bodies import SIDE_GAP, Crowd, box_at
 
@@ -24,6 +32,10 @@ LANE_MARGIN = 0.05
 SAGITTA = 0.05
 """A rigid body of length L on curvature k sits ``L^2 |k| / 8`` beside the lane centre; no more than
 this many metres are accepted for sampled spawns."""
+
+LANE_CHANGE = 8.0
+"""Metres beyond its front that a vehicle setting off needs to change lanes; our choice, about what
+a car at full lock needs to move a lane's width aside."""
 
 
 class Fit(NamedTuple):
@@ -58,6 +70,26 @@ def standing_room(graph: LaneGraph, body: Body, *, allowed: BoolArray) -> BoolAr
         ahead &= _step(ahead, source, target)
         behind &= _step(behind, target, source)
     return ahead & behind & (graph.width >= body.width + 2 * LANE_MARGIN)
+
+
+def late_for_changes(graph: LaneGraph, body: Body) -> BoolArray:
+    """Nodes where lanes may be changed, but not for long enough for somebody who sets off there.
+
+    Returns
+    -------
+    Shape ``(N,)``: a lane change is permitted to a side here, and not any more, or not on all lanes
+    ahead, where the front is and :data:`LANE_CHANGE` further on.
+    """
+    follows = graph.relation == Relation.SUCCESSOR
+    source, target = graph.source[follows], graph.target[follows]
+    late = np.zeros(len(graph.x), dtype=np.bool_)
+    for side in (CHANGE_LEFT, CHANGE_RIGHT):
+        here = graph.lane_change & side > 0
+        ahead = here.copy()
+        for _ in range(ceil((body.length / 2.0 + LANE_CHANGE) / graph.spacing)):
+            ahead &= _step(ahead, source, target)
+        late |= here & ~ahead
+    return late
 
 
 def max_fit(

@@ -9,7 +9,7 @@ import numpy as np
 
 from odscen.categories import Category
 from odscen.lanegraph.paths import Router, WalkRouter
-from odscen.scenario.places import standing_room
+from odscen.scenario.places import late_for_changes, standing_room
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -87,8 +87,9 @@ class Ways(NamedTuple):
 class Ground:
     """Where road users of a region can start and end, on lanes and on walks.
 
-    Vehicles start on lanes outside junctions with room for their body, and end at the last such
-    place of a lane in its segment; pedestrians start and end anywhere on walks.
+    Vehicles start on lanes outside junctions with room for their body, where a segment has such
+    places not just before the end of where lanes may be changed, and end at the last place of a
+    lane in its segment; pedestrians start and end anywhere on walks.
 
     Parameters
     ----------
@@ -179,7 +180,11 @@ class Ground:
     def _vehicle_room(self, category: Category) -> BoolArray:
         lanes = self.region.graph.lanes
         body = self._usable.bodies[category]
-        return self._on_roads & standing_room(lanes, body, allowed=self._spawnable)
+        room = self._on_roads & standing_room(lanes, body, allowed=self._spawnable)
+        better = room & ~late_for_changes(lanes, body)
+        elsewhere = np.zeros(len(self.region.graph.segments.ids), dtype=np.bool_)
+        elsewhere[lanes.segment[better]] = True
+        return better | (room & ~elsewhere[lanes.segment])
 
     @cached_property
     def _spawnable(self) -> BoolArray:

@@ -2,35 +2,58 @@
 
 A search over the whole graph costs milliseconds; tens of thousands of trips have a few hundred
 goals between them.
+
+A vehicle does not change lanes before its front is where the lane change begins, and it needs room
+for it: its way leads straight on for so long, even if the shortest one changes lanes at once. SUMO
+would have it stand before the junction on the wrong lane.
 """
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+from odscen.categories import DEFAULT_BODY
+from odscen.lanegraph.model import Relation
+from odscen.scenario.places import LANE_CHANGE
 
-    from odscen.lanegraph.model import IntArray
-    from odscen.lanegraph.paths import Router, WalkRouter
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.categories import Body
+    from odscen.lanegraph.model import BoolArray, IntArray, LaneGraph
+    from odscen.lanegraph.paths import Router, WaysTo
     from odscen.scenario.region import Region
     from odscen.sumo.people import RoadUser
 
 TOGETHER = 500
 """Ways to one goal that are in memory at a time."""
 
+_NOWHERE = np.empty(0, dtype=np.int32)
+
 
 def each_path(
-    users: Sequence[RoadUser], region: Region, drivable: Router
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    bodies: Sequence[Body] | None = None,
 ) -> Iterator[tuple[int, IntArray]]:
-    """Yield the position of each user and the nodes of its shortest way inside the region.
+    """Yield the position of each user and the nodes of its way inside the region.
 
-    Ways of vehicles lead over lanes that SUMO has, if there is such a way. The order is that of
-    spawns (actors and flows) and of goals (trips of the demand).
+    It is the shortest one, of vehicles among those that do not change lanes at their very start, if
+    there is one. Ways of vehicles lead over lanes that SUMO has, if there is such a way. The order
+    is that of spawns (actors and flows) and of goals (trips of the demand).
+
+    Parameters
+    ----------
+    bodies
+        Of the users; those of their categories if not given.
     """
+    if bodies is None:
+        bodies = [DEFAULT_BODY[user.category] for user in users]
     by_spawn: dict[tuple[bool, int], list[int]] = defaultdict(list)
     by_goal: dict[tuple[bool, int], list[int]] = defaultdict(list)
     for index, user in enumerate(users):
@@ -38,24 +61,110 @@ def each_path(
             by_goal[user.person, user.goal].append(index)
         else:
             by_spawn[user.person, user.spawn].append(index)
+    leads = _Leads(region.graph.lanes)
     for (person, spawn), group in by_spawn.items():
-        routers = _routers(region, drivable, person=person, node=spawn)
+        goals = {index: users[index].goal for index in group}
+        ways: dict[int, IntArray] = {}
+        if person:
+            ways = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
+        else:
+            for router in (drivable, region.router):
+                rest = {index: goal for index, goal in goals.items() if index not in ways}
+                ways |= _from_spawn(spawn, rest, bodies, router, leads)
         for index in group:
-            paths = (router.path(spawn, users[index].goal) for router in routers)
-            yield index, next((path for path in paths if len(path)), np.empty(0, dtype=np.int32))
+            yield index, ways.get(index, _NOWHERE)
     for (person, goal), group in by_goal.items():
-        router = region.walk_router if person else drivable
-        ways = router.ways_to(goal)
+        there = (region.walk_router if person else drivable).ways_to(goal)
         for first in range(0, len(group), TOGETHER):
             part = group[first : first + TOGETHER]
-            spawns = np.array([users[index].spawn for index in part], dtype=np.int32)
-            yield from zip(part, ways.paths(spawns), strict=True)
+            spawns = [users[index].spawn for index in part]
+            begun = [
+                [_Lead((spawn,), 0.0)] if person else leads.of(spawn, bodies[index], drivable.mask)
+                for index, spawn in zip(part, spawns, strict=True)
+            ]
+            yield from zip(part, _to_goal(goal, begun, there), strict=True)
 
 
-def _routers(
-    region: Region, drivable: Router, *, person: bool, node: int
-) -> tuple[Router | WalkRouter, ...]:
-    """Routers to ask one after another."""
-    if person:
-        return (region.walk_router,)
-    return (drivable, region.router) if drivable.mask[node] else (region.router,)
+class _Lead(NamedTuple):
+    """A way straight on from a spawn: its nodes, from the spawn on, and its length, metres."""
+
+    nodes: tuple[int, ...]
+    metres: float
+
+
+class _Leads:
+    """Ways straight on from spawns, on which no vehicle changes lanes yet."""
+
+    def __init__(self, lanes: LaneGraph) -> None:
+        follows = lanes.relation == Relation.SUCCESSOR
+        self._next: dict[int, list[tuple[int, float]]] = defaultdict(list)
+        edges = (lanes.source[follows], lanes.target[follows], lanes.length[follows])
+        for source, target, length in zip(*(column.tolist() for column in edges), strict=True):
+            self._next[source].append((target, length))
+
+    def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_Lead]:
+        """Straight ways of somebody who sets off, inside the mask, and last the spawn alone."""
+        least = body.length / 2.0 + LANE_CHANGE
+        found: list[_Lead] = []
+        open_ = [_Lead((spawn,), 0.0)]
+        while open_:
+            lead = open_.pop()
+            if lead.metres >= least:
+                found.append(lead)
+                continue
+            open_ += [
+                _Lead((*lead.nodes, target), lead.metres + length)
+                for target, length in self._next[lead.nodes[-1]]
+                if mask[target]
+            ]
+        return [*found, _Lead((spawn,), 0.0)]
+
+
+def _from_spawn(
+    spawn: int,
+    goals: Mapping[int, int],
+    bodies: Sequence[Body],
+    router: Router,
+    leads: _Leads,
+) -> dict[int, IntArray]:
+    """Ways of the members of a flow, or of one actor, as far as there are any."""
+    if not goals or not router.mask[spawn]:
+        return {}
+    begun = {index: leads.of(spawn, bodies[index], router.mask) for index in goals}
+    ends = {lead.nodes[-1] for mine in begun.values() for lead in mine}
+    metres = {end: router.distances(end) for end in sorted(ends)}
+    chosen = {
+        index: _best(
+            goals[index],
+            [(lead, lead.metres + float(metres[lead.nodes[-1]][goals[index]])) for lead in mine],
+        )
+        for index, mine in begun.items()
+    }
+    ways = {
+        index: _joined(lead, router.path(lead.nodes[-1], goals[index]))
+        for index, lead in sorted(chosen.items(), key=lambda pair: pair[1].nodes[-1])
+    }
+    return {index: way for index, way in ways.items() if len(way)}
+
+
+def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: WaysTo) -> list[IntArray]:
+    """Ways of trips to one goal; empty where there is none."""
+    ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
+    metres = iter(there.distance(ends).tolist())
+    chosen = [
+        _best(goal, [(lead, lead.metres + next(metres)) for lead in leads]) for leads in begun
+    ]
+    paths = there.paths(np.array([lead.nodes[-1] for lead in chosen], dtype=np.int32))
+    return [_joined(lead, path) for lead, path in zip(chosen, paths, strict=True)]
+
+
+def _best(goal: int, leads: Sequence[tuple[_Lead, float]]) -> _Lead:
+    """Lead with the shortest way in all; the last, which is no lead, where no other leads there."""
+    *ahead, (none, _) = leads
+    fit = [pair for pair in ahead if math.isfinite(pair[1]) and goal not in pair[0].nodes]
+    return min(fit, key=lambda pair: pair[1])[0] if fit else none
+
+
+def _joined(lead: _Lead, path: IntArray) -> IntArray:
+    before = np.array(lead.nodes[:-1], dtype=np.int32)
+    return np.concatenate([before, path]) if len(path) else path

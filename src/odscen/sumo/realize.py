@@ -252,7 +252,7 @@ class _Writer:
         bodies = [self._body(user) for user in users]
         manners = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
         ways: dict[int, _Way] = {}
-        for index, path in each_path(users, self._region, self._drivable):
+        for index, path in each_path(users, self._region, self._drivable, bodies):
             ways[index] = self._way(users[index], bodies[index], manners[index], path)
         return tuple(
             self._write(user, body, manner, ways[index])
