@@ -326,6 +326,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good = start(client, sampled, speed=5)
+    wait_for(lambda: client.get(f"/api/runs/{good}").json()["state"] == "running" or None)
     real = runs.prepare
 
     def spoiled(*arguments: Any, **more: Any) -> Any:
@@ -345,7 +346,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
     info = finished(client, bad)
     assert (info["state"], info["summary"]["status"]) == ("failed", "failed")
     assert "nowhere" in info["error"]
-    assert client.get(f"/api/runs/{good}").json()["state"] in ("preparing", "running")
+    assert client.get(f"/api/runs/{good}").json()["state"] == "running"
     control(client, good, "stop")
     assert finished(client, good)["state"] == "stopped"
 
