@@ -8,8 +8,9 @@ trips each; name one of them to run it alone. ``--rounds N`` for more than one r
 Wall and CPU seconds of each, in turn, and the median of the ratios of each round. Each round has
 another seed, as traffic is chance: a run in slices and one in one piece have the same demand, but
 not the same jams, and the one with more of them takes longer. How many records of road users the
-one made for each of the other is told beside the ratio. Preparation and report, which ``sumo`` does
-not have, are told apart. Memory is what the worker holds at each boundary between slices.
+one made for each of the other is told beside the ratio, and how many road users SUMO moved on in
+the run in slices. Preparation and report, which ``sumo`` does not have, are told apart. Memory is
+what the worker holds at each boundary between slices.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
         loaded = workflow.load_map(entry)
         net, assets = entry.path("net"), workspace.assets()
         times: defaultdict[str, list[Spent]] = defaultdict(list)
-        records = []
+        records, moved_on = [], []
         for seed in range(rounds):
             run = Path(name) / f"run{seed}"
             run.mkdir()
@@ -92,9 +93,10 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             if ended.done is None:
                 raise SystemExit(ended.error)
             records.append(rows(trajectory_files(run)) / alone)
+            summary = make_summary(prepared, run, ended, ())
+            moved_on.append(summary["actors"]["teleported"])
             times["silent"].append(timed(silent))
         start = spent()
-        summary = make_summary(prepared, run, ended, ())
         write_report(run, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
         report = since(start)
         memory = [read_checkpoint(run, n).memory / 1e6 for n in range(1, last_number(run) + 1)]
@@ -104,7 +106,8 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             f"  odscen {told(times['odscen'])}\n"
             f"  sumo with the same output {told(times['sumo'])}, "
             f"ratio {ratios(times['odscen'], times['sumo'])} (aim 1.15), "
-            f"records {' '.join(f'{one:.3f}' for one in records)}\n"
+            f"records {' '.join(f'{one:.3f}' for one in records)}, "
+            f"moved on {' '.join(map(str, moved_on))}\n"
             f"  sumo without output {told(times['silent'])}, "
             f"ratio {ratios(times['odscen'], times['silent'])}\n"
             f"  apart: preparation {told(times['preparation'])}, report {told([report])}\n"
@@ -146,8 +149,10 @@ def told(times: list[Spent]) -> str:
 
 def ratios(ours: list[Spent], theirs: list[Spent]) -> str:
     pairs = list(zip(ours, theirs, strict=True))
-    wall = statistics.median(mine.wall / other.wall for mine, other in pairs)
-    return f"{wall:.2f} ({statistics.median(mine.cpu / other.cpu for mine, other in pairs):.2f})"
+    wall = [mine.wall / other.wall for mine, other in pairs]
+    cpu = statistics.median(mine.cpu / other.cpu for mine, other in pairs)
+    each = f" [{' '.join(f'{one:.2f}' for one in wall)}]" if len(wall) > 1 else ""
+    return f"{statistics.median(wall):.2f} ({cpu:.2f}){each}"
 
 
 if __name__ == "__main__":
