@@ -7,6 +7,7 @@ from odscen.results.conflicts import (
     SEEN_TTC,
     conflict_figures,
     conflict_table,
+    conflicts_of_slices,
     walking_conflicts,
 )
 from odscen.results.records import PlannedActor
@@ -49,6 +50,27 @@ def test_two_who_meet_again_later_have_two_conflicts():
         (10.0, "a", "b", 1.9),
         (11.0, "a", "c", 2.5),
         (14.5, "a", "b", 1.0),
+    ]
+
+
+def test_a_conflict_over_the_boundary_of_two_slices_is_one():
+    first = [
+        conflict("a", "b", 50.0, 59.5, ttc=2.0, drac=3.5),
+        conflict("a", "c", 40.0, 45.0, ttc=1.0),
+        conflict("a", "d", 50.0, 56.0, pet=1.0),
+    ]
+    second = [
+        conflict("b", "a", 60.0, 66.0, ttc=1.4, drac=1.0),
+        conflict("a", "c", 60.0, 61.0, ttc=2.0),
+        conflict("a", "b", 66.5, 67.0, ttc=2.5),
+    ]
+    whole = conflicts_of_slices([conflict_table(first), conflict_table(second)])
+    assert whole.select("begin", "end", "one", "other", "ttc", "drac", "pet").rows() == [
+        (40.0, 45.0, "a", "c", 1.0, None, None),
+        (50.0, 66.0, "a", "b", 1.4, 3.5, None),
+        (50.0, 56.0, "a", "d", None, None, 1.0),
+        (60.0, 61.0, "a", "c", 2.0, None, None),
+        (66.5, 67.0, "a", "b", 2.5, None, None),
     ]
 
 

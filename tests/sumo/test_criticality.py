@@ -108,6 +108,10 @@ def test_a_run_in_slices_and_another_time_has_its_conflicts_as_well(
     # The two runs differ after a reload, as SUMO's chance does; devices live on.
     assert found.height == pytest.approx(in_one_piece.height, rel=0.3)
     assert found["begin"].max() > 120.0
+    parts = [pl.read_parquet(one / "conflicts" / name) for name in files]
+    assert found.height < sum(part.height for part in parts)
+    over = found.filter((col("begin") < 60.0) & (col("end") > 60.0))
+    assert len(over) >= 1
 
 
 def test_nothing_is_measured_that_was_not_asked_for(long: PreparedRun, tmp_path: Path):

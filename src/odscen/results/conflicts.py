@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     import polars as pl
 
@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 
 SEEN_TTC, SEEN_DRAC, SEEN_PET = 3.0, 3.0, 3.0
 """What is recorded: seconds or less, m/s^2 or more, seconds or less."""
+WATCHED_ON = 2.0
+"""Seconds for which two are watched after they have parted."""
 SERIOUS_TTC, SERIOUS_DRAC, SERIOUS_PET = 1.5, 3.35, 1.0
 """What makes a conflict serious: seconds or less, m/s^2 or more, seconds or less."""
 
@@ -58,16 +60,35 @@ def conflict_table(rows: Iterable[Mapping[str, object]]) -> pl.DataFrame:
     schema = {name: pl.String if name in _TEXTS else pl.Float64 for name in _SCHEMA_NAMES}
     table = pl.DataFrame(list(rows), schema=schema)
     pair = [pl.min_horizontal("one", "other"), pl.max_horizontal("one", "other")]
-    ordered = table.with_columns(pair[0].alias("one"), pair[1].alias("other")).sort(
-        "one", "other", "begin", "end"
-    )
-    over = pl.col("begin") > pl.col("end").cum_max().shift().over("one", "other")
-    new = over.fill_null(value=True).cum_sum().over("one", "other").alias("number")
+    return _joined([table.with_columns(pair[0].alias("one"), pair[1].alias("other"))])
+
+
+def conflicts_of_slices(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
+    """Conflicts of the slices of a run, in order, as one table.
+
+    The device starts anew with each slice. Two who were in conflict until the end of one slice and
+    are again within the time for which it would have gone on to watch them have one conflict.
+    """
+    return tables[0] if len(tables) == 1 else _joined(tables)
+
+
+def _joined(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
+    """Rows of the same two as one where their times overlap, or nearly so from table to table."""
+    import polars as pl
+
+    pair = ("one", "other")
+    ordered = pl.concat(
+        [table.with_columns(slice=pl.lit(number)) for number, table in enumerate(tables)]
+    ).sort(*pair, "begin", "end")
+    until = pl.col("end").cum_max().shift().over(pair)
+    same_slice = pl.col("slice") == pl.col("slice").shift().over(pair)
+    new = pl.col("begin") > until + pl.when(same_slice).then(0.0).otherwise(WATCHED_ON)
+    number = new.fill_null(value=True).cum_sum().over(pair).alias("number")
     worst = ("ttc", "pet", "drac")
     place = pl.col("ttc").fill_null(np.inf).arg_min()
     return (
-        ordered.with_columns(new)
-        .group_by("one", "other", "number", maintain_order=True)
+        ordered.with_columns(number)
+        .group_by(*pair, "number", maintain_order=True)
         .agg(
             pl.col("begin").min(),
             pl.col("end").max(),
@@ -75,7 +96,7 @@ def conflict_table(rows: Iterable[Mapping[str, object]]) -> pl.DataFrame:
             *(pl.col(name).max() if name == "drac" else pl.col(name).min() for name in worst),
         )
         .select(_SCHEMA_NAMES)
-        .sort("begin", "one", "other")
+        .sort("begin", *pair)
     )
 
 

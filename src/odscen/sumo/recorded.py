@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.results.conflicts import conflicts_of_slices
 from odscen.sumo.layout import CONFLICTS_FILE, LANES_FILE, RECORDED, TRAJECTORIES_FILE, TRIPS_FILE
 
 if TYPE_CHECKING:
@@ -100,7 +101,10 @@ def read_conflicts(run: Path) -> pl.DataFrame | None:
     -------
     ``None`` if nothing was recorded.
     """
-    return _read(run, CONFLICTS_FILE)
+    import polars as pl
+
+    files = recorded_files(run, CONFLICTS_FILE)
+    return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
 
 
 def _read(run: Path, file: str) -> pl.DataFrame | None:

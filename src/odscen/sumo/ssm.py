@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.errors import SimulationError
-from odscen.results.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC
+from odscen.results.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
 from odscen.sumo.xml_rows import elements
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ OPTIONS = {
     "device.ssm.measures": "TTC DRAC PET",
     "device.ssm.thresholds": f"{SEEN_TTC:g} {SEEN_DRAC:g} {SEEN_PET:g}",
     "device.ssm.range": "50",
-    "device.ssm.extratime": "2",
+    "device.ssm.extratime": f"{WATCHED_ON:g}",
 }
-"""Of the sumocfg. Range in metres; seconds that two are watched after they have parted."""
+"""Of the sumocfg; range in metres."""
 
 _KINDS = {
     **dict.fromkeys((1, 2, 3, 18), "following"),
