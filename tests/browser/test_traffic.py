@@ -72,9 +72,14 @@ def test_background_traffic_is_added_changed_and_taken_back(
     with user.changing():
         user.page.get_by_label("Time of day at the start").fill("07:30")
         user.page.keyboard.press("Enter")
+    for label, minutes in (("From", "5"), ("Until", "20")):
+        with user.changing():
+            background(user).get_by_label(label, exact=True).fill(minutes)
+            user.page.keyboard.press("Enter")
     demand = user.document()["demand"]
     assert demand["clock"] == 7.5 * HOUR
     (one,) = demand["background"]
+    assert (one["begin"], one["end"]) == (300, 1200)
     assert (one["trips"], one["per_km"], one["profile"]) == (80, None, "weekend")
     assert one["mix"] == {"car": 1, "bus": 1}
     with user.changing():
@@ -84,6 +89,10 @@ def test_background_traffic_is_added_changed_and_taken_back(
         user.undo.click()
     expect(background(user)).to_be_visible()
     assert user.document()["demand"] == demand
+    with user.changing():
+        background(user).get_by_label("Until", exact=True).fill("")
+        user.page.keyboard.press("Enter")
+    assert user.document()["demand"]["background"][0]["end"] is None
 
 
 def test_a_table_with_a_mistake_names_line_and_column_and_mended_it_is_read_in(

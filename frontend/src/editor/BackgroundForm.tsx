@@ -5,7 +5,7 @@ import type { Edit } from "../api/types";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { AMOUNTS, amountOf } from "./demand";
-import { MixFold, PartCard } from "./DemandParts";
+import { MixFold, PartCard, WindowFields } from "./DemandParts";
 
 /** Vehicles that come and go anywhere: how many, when, and of which kinds. */
 export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
@@ -23,6 +23,7 @@ export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
       <Committed label={amount.unit} suffix={amount.suffix} min={amount.min} max={amount.max} digits={amount.digits}
         value={(background[amount.key] ?? amount.begin) * amount.scale}
         onCommit={(value) => { if (value !== null) change({ [amount.key]: value / amount.scale }); }} />
+      <WindowFields begin={background.begin} end={background.end} onChange={change} />
       <ProfileChoice value={background.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <MixFold mix={background.mix} onChange={(mix) => change({ mix })} />
     </PartCard>

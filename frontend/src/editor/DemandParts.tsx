@@ -5,6 +5,7 @@ import type { Counts, Matrix, Mix, Zone } from "../api/demand";
 import type { Edit } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { count, span } from "../ui/words";
+import { Committed } from "./Committed";
 import { ProfileChart, ProfileChoice, type Profiles, profileWord } from "./DayProfiles";
 import { mixWords, timeOfDay, tripsOf } from "./demand";
 import { MixForm } from "./MixForm";
@@ -24,6 +25,20 @@ export function PartCard({ name, what, note, onRemove, children }: {
       </Group>
       {children}
     </section>
+  );
+}
+
+/** From when until when a part of the traffic comes, in minutes of the run. */
+export function WindowFields({ begin, end, onChange }: {
+  begin: number; end: number | null; onChange: (fields: { begin?: number; end?: number | null }) => void;
+}) {
+  return (
+    <Group grow align="flex-start">
+      <Committed label="From" suffix=" min" min={0} max={1e5} digits={1} value={begin / 60}
+        onCommit={(value) => onChange({ begin: (value ?? 0) * 60 })} />
+      <Committed label="Until" suffix=" min" min={0.1} max={1e5} digits={1} placeholder="the end of the run"
+        value={end === null ? "" : end / 60} onCommit={(value) => onChange({ end: value === null ? null : value * 60 })} />
+    </Group>
   );
 }
 
@@ -47,6 +62,7 @@ export function MatrixForm({ matrix, profiles, onEdit, onRemove }: {
   const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}, ${when}`;
   return (
     <PartCard name={matrix.id} what="Trips from where to where" note={note} onRemove={onRemove}>
+      <WindowFields begin={matrix.begin} end={matrix.end} onChange={change} />
       <ProfileChoice value={matrix.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <MixFold mix={matrix.mix} people onChange={(mix) => change({ mix })} />
     </PartCard>
