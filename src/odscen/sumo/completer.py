@@ -8,6 +8,7 @@ too, so that the results of 50,000 actors are there soon after the last slice. S
 
 from __future__ import annotations
 
+import gc
 import sys
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -85,6 +86,7 @@ def main() -> int:
     run, connection = Path(sys.argv[1]), Connection(int(sys.argv[2]))
     plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8"))
     fates = Fates(plan)
+    gc.freeze()  # plan and fates stay, and need not be gone through again and again
     for number in range(1, last_number(run) + 1):
         fates.hear(*_happened(run, number))
     while True:
