@@ -4,13 +4,18 @@ import inspect
 import json
 import threading
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 from odscen import workflow
+from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
+from odscen.categories import DEFAULT_BODY, Category
+from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario import demand_edits, edits
 from odscen.scenario.files import dumps, loads, read_any
+from odscen.scenario.places import late_for_changes
 from odscen.scenario.region import Region, name_of, place_of
 from odscen.web.app import create_app
 from odscen.web.edits import FUNCTIONS
@@ -302,6 +307,30 @@ def test_a_scenario_whose_map_is_gone_can_still_be_looked_at(client: TestClient,
     state = client.get(f"/api/scenarios/{new}").json()
     assert [problem["code"] for problem in state["problems"]] == ["map_missing"]
     assert client.get(f"/api/scenarios/{new}/roi").status_code == 404
+
+
+def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
+    client: TestClient, workspace: Workspace
+) -> None:
+    (town,) = (path for path in shipped_maps() if path.stem == "town_5x5")
+    graph = workflow.load_map(workspace.add_map(town)).sumo.graph
+    scenario = edits.new_scenario(graph, name="town", roi=graph.segments.ids)
+    workspace.scenarios.mkdir(exist_ok=True)
+    (workspace.scenarios / f"town{workflow.SUFFIX}").write_text(dumps(scenario))
+    router = Region.of(graph, scenario.roi).router
+    late = np.flatnonzero(late_for_changes(graph.lanes, DEFAULT_BODY[Category.CAR]))
+    found = 0
+    for spawn in late[::5].tolist():
+        for goal in router.goal_candidates(spawn)[:20].tolist():
+            shortest = router.path(spawn, goal)
+            if graph.lanes.lane[shortest[3]] == graph.lanes.lane[spawn]:
+                continue
+            query = {"spawn": node_id(graph, spawn), "goal": node_id(graph, goal)}
+            way = client.get("/api/scenarios/town/path", params=query).json()["nodes"]
+            start = [graph.lanes.lane[node_index(graph, node)] for node in way[:4]]
+            assert set(start) == {graph.lanes.lane[spawn]}
+            found += 1
+    assert found > 0
 
 
 def test_goals_ways_and_neighbours_are_those_of_the_graph(

@@ -9,7 +9,9 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
 from odscen.catalog.store import check_name, name_from_file
+from odscen.categories import Category
 from odscen.errors import InputError, NotFoundError
+from odscen.lanegraph.paths import Router
 from odscen.scenario.checks import check
 from odscen.scenario.document import Scenario
 from odscen.scenario.edits import eligible_segments, new_scenario, removable_segments
@@ -18,6 +20,8 @@ from odscen.scenario.graphform import to_graphml
 from odscen.scenario.problems import Problem
 from odscen.scenario.region import Place as GraphPlace
 from odscen.scenario.region import name_of, place_of
+from odscen.sumo.paths import each_path
+from odscen.sumo.people import RoadUser
 from odscen.web.edits import EditRequest, apply_edit
 from odscen.web.messages import (
     CopyName,
@@ -139,17 +143,21 @@ def goals(name: str, spawn: str, shared: Shared) -> Goals:
 
 @router.get("/{name}/path")
 def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
-    """Shortest way from ``spawn`` to ``goal`` inside the region."""
+    """Way from ``spawn`` to ``goal`` inside the region, as somebody on foot, or a car, takes it."""
     scenario = shared.drafts.get(name).scenario
-    graph = shared.map_of(scenario).sumo.graph
+    sumo = shared.map_of(scenario).sumo
+    graph = sumo.graph
     start, end = _place(shared, scenario, spawn), _place(shared, scenario, goal)
     if start.walk != end.walk:
         msg = f"no way leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
         raise InputError(msg)
     with shared.search:
         region = _region(shared, scenario)
-        router = region.walk_router if start.walk else region.router
-        found = router.path(start.node, end.node).tolist()
+        category = Category.PEDESTRIAN if start.walk else Category.CAR
+        somebody = RoadUser("somebody", category, start.node, end.node, depart=0.0)
+        drivable = Router(graph, region.lanes & sumo.drivable)
+        ((_, way),) = each_path([somebody], region, drivable)
+    found = way.tolist()
     nodes = region.nodes_of(start)
     return Path(
         nodes=[name_of(graph, GraphPlace(start.walk, node)) for node in found],
