@@ -3,12 +3,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
-
-if TYPE_CHECKING:
-    from pathlib import Path
+import sumo
 
 # libsumo is one global simulation, so each of these runs in a process of its own.
 PRELUDE = """
@@ -120,3 +118,82 @@ print("clean")
     )
     assert result.stdout == "clean\n"
     assert result.stderr == "Warning!"
+
+
+def test_somebody_who_waits_for_a_lane_change_long_before_the_turn_has_that_as_the_reason(
+    tmp_path: Path,
+) -> None:
+    """Lanes may be changed on ``ab`` only; ``ab`` leads on, but only its left lane to ``ce``."""
+    (tmp_path / "n.nod.xml").write_text(
+        '<nodes><node id="a" x="0" y="0"/><node id="b" x="100" y="0"/><node id="c" x="140" y="0"/>'
+        '<node id="d" x="240" y="0"/><node id="e" x="140" y="100"/></nodes>'
+    )
+    fixed = "".join(
+        f'<lane index="{k}" changeLeft="emergency" changeRight="emergency"/>' for k in (0, 1)
+    )
+    (tmp_path / "e.edg.xml").write_text(
+        '<edges><edge id="ab" from="a" to="b" numLanes="2"/>'
+        f'<edge id="bc" from="b" to="c" numLanes="2">{fixed}</edge>'
+        '<edge id="cd" from="c" to="d"/><edge id="ce" from="c" to="e"/></edges>'
+    )
+    (tmp_path / "c.con.xml").write_text(
+        '<connections><connection from="ab" to="bc" fromLane="0" toLane="0"/>'
+        '<connection from="ab" to="bc" fromLane="1" toLane="1"/>'
+        '<connection from="bc" to="cd" fromLane="0" toLane="0"/>'
+        '<connection from="bc" to="ce" fromLane="1" toLane="0"/></connections>'
+    )
+    files = ("-n", "n.nod.xml", "-e", "e.edg.xml", "-x", "c.con.xml", "-o", "net.xml")
+    netconvert = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
+    subprocess.run([netconvert, *files], cwd=tmp_path, check=True, capture_output=True)
+    parked = "".join(
+        f'<vehicle id="p{x}" depart="0" departLane="1" departPos="{x}" insertionChecks="none">'
+        f'<route edges="ab bc ce"/><stop lane="ab_1" endPos="{x + 0.1}" duration="900"/></vehicle>'
+        for x in range(10, 96, 6)
+    )
+    (tmp_path / "r.rou.xml").write_text(
+        f'<routes>{parked}<vehicle id="one" depart="0" departLane="0" departPos="60">'
+        '<route edges="ab bc ce"/></vehicle></routes>'
+    )
+    result = run_script(
+        """
+with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) as session:
+    while session.time < 60:
+        session.step()
+    ((lane, _),) = session.vehicle_places(["one"])
+    print(json.dumps([lane, *session.ahead("one")]))
+""",
+        str(tmp_path / "net.xml"),
+        str(tmp_path / "r.rou.xml"),
+    )
+    lane, onwards, *_, beside = json.loads(result.stdout)
+    assert (lane, onwards, beside) == ("ab_0", False, True)
+
+
+def test_who_stands_in_a_junction_is_ahead_of_those_whose_way_is_crossed(
+    grid: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "r.rou.xml").write_text(
+        '<routes><vType id="slow" maxSpeed="3"/><vehicle id="foe" type="slow" depart="0"'
+        ' departPos="80"><route edges="B0B1 B1B2"/></vehicle>'
+        '<vehicle id="one" depart="12" departPos="20"><route edges="A1B1 B1C1"/></vehicle></routes>'
+    )
+    result = run_script(
+        """
+with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) as session:
+    import libsumo
+    libsumo.trafficlight.setRedYellowGreenState("B1", "G" * len(
+        libsumo.trafficlight.getRedYellowGreenState("B1")
+    ))
+    stopped = False
+    while session.time < 60:
+        session.step()
+        if not stopped and session.vehicle_front("foe").y > 119.0:  # the middle of B1 is at 120
+            libsumo.vehicle.setSpeed("foe", 0.0)
+            stopped = True
+    print(json.dumps([stopped, session.ahead("one").leader, session.ahead("foe").onwards]))
+""",
+        str(grid),
+        str(tmp_path / "r.rou.xml"),
+    )
+    assert result.stdout, result.stderr
+    assert json.loads(result.stdout) == [True, "foe", True]

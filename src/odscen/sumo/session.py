@@ -8,6 +8,7 @@ process's file descriptors 1 and 2, see :mod:`odscen.sumo.output_capture`.
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections import Counter
@@ -36,6 +37,8 @@ _EDGES_AHEAD = 3
 
 _CLOSE = 5.0
 """Metres that a standing vehicle ahead may be away and be the reason for standing."""
+_IN_THE_WAY = 10.0
+"""Metres from the front to the middle of another body in a junction that may be the reason."""
 _STANDS = 0.1
 """Speed, m/s, below which SUMO counts a vehicle as waiting."""
 
@@ -252,12 +255,18 @@ class Session:
             links = vehicle.getNextLinks(name)
             leader = self._standing_leader(name, float(links[0][7]) if links else 0.0)
             at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
+            lane = str(vehicle.getLaneID(name))
+            if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
+                return Ahead(False, "", False, None, people=False, beside=wrong)
+            inside = lane.startswith(":")
+            through = lane if inside else str(links[0][4]) if links else ""
+            if leader is None and through:
+                leader = self._in_the_way(name, through)
         except self._errors:
             return None
-        if not links:
-            return Ahead(at_end, "", at_end, leader, people=False)
-        if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
-            return Ahead(False, "", False, None, people=False, beside=wrong)
+        if not links:  # inside a junction the way out of it is not among them
+            onwards = at_end or inside
+            return Ahead(onwards, "", onwards, leader, people=False)
         link = links[0]
         # approachedLane, hasPrio, isOpen, hasFoe, approachedInternal, state, direction, length
         people = bool(link[3]) and self._people_cross(link[4])
@@ -275,7 +284,11 @@ class Session:
             for one in (f"{edge}_{k}" for k in range(self._sumo.edge.getLaneNumber(edge)))
             if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(one))
         }
-        return None if lane in leading else bool(leading)
+        if lane not in leading:
+            return bool(leading)
+        # It may lead on there and no further: SUMO wants another lane, so many to the left.
+        wants = next((one[3] for one in vehicle.getBestLanes(name) if one[0] == lane), 0)
+        return True if wants else None
 
     def _standing_leader(self, name: str, junction: float) -> str | None:
         """Return who leaves no room for the vehicle behind ``junction`` metres of junction."""
@@ -288,6 +301,25 @@ class Session:
         if not leader or not leader[0] or leader[1] > needed:
             return None
         return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STANDS else None
+
+    def _in_the_way(self, name: str, internal: str) -> str | None:
+        """Return who stands ahead on another way through the junction, the nearest of them."""
+        vehicle, lanes = self._sumo.vehicle, self._sumo.lane
+        x, y = vehicle.getPosition(name)
+        angle = math.radians(vehicle.getAngle(name))
+        nearest, found = _IN_THE_WAY, None
+        for foe in sorted(lanes.getInternalFoes(internal)):
+            for other in lanes.getLastStepVehicleIDs(foe):
+                if vehicle.getSpeed(other) >= _STANDS:
+                    continue
+                (fx, fy), turned = vehicle.getPosition(other), math.radians(vehicle.getAngle(other))
+                half = vehicle.getLength(other) / 2.0
+                dx = fx - half * math.sin(turned) - x
+                dy = fy - half * math.cos(turned) - y
+                away = math.hypot(dx, dy)
+                if away < nearest and dx * math.sin(angle) + dy * math.cos(angle) > 0.0:
+                    nearest, found = away, str(other)
+        return found
 
     def _people_cross(self, internal: str) -> bool:
         if not internal:
