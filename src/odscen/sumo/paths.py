@@ -96,11 +96,9 @@ class _Leads:
     """Ways straight on from spawns, on which no vehicle changes lanes yet."""
 
     def __init__(self, lanes: LaneGraph) -> None:
-        follows = lanes.relation == Relation.SUCCESSOR
-        self._next: dict[int, list[tuple[int, float]]] = defaultdict(list)
-        edges = (lanes.source[follows], lanes.target[follows], lanes.length[follows])
-        for source, target, length in zip(*(column.tolist() for column in edges), strict=True):
-            self._next[source].append((target, length))
+        follows = lanes.relation == Relation.SUCCESSOR  # edges are in the order of their sources
+        self._target, self._length = lanes.target[follows], lanes.length[follows]
+        self._first = np.searchsorted(lanes.source[follows], np.arange(len(lanes.x) + 1))
 
     def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_Lead]:
         """Straight ways of somebody who sets off, inside the mask, and last the spawn alone."""
@@ -112,10 +110,11 @@ class _Leads:
             if lead.metres >= least:
                 found.append(lead)
                 continue
+            first, end = self._first[lead.nodes[-1] : lead.nodes[-1] + 2].tolist()
             open_ += [
-                _Lead((*lead.nodes, target), lead.metres + length)
-                for target, length in self._next[lead.nodes[-1]]
-                if mask[target]
+                _Lead((*lead.nodes, int(self._target[k])), lead.metres + float(self._length[k]))
+                for k in range(first, end)
+                if mask[self._target[k]]
             ]
         return [*found, _Lead((spawn,), 0.0)]
 

@@ -39,6 +39,8 @@ _CLOSE = 5.0
 """Metres that a standing vehicle ahead may be away and be the reason for standing."""
 _IN_THE_WAY = 10.0
 """Metres from the front to the middle of another body in a junction that may be the reason."""
+_RED = ("r", "u")
+"""States of a traffic light's link at which nobody goes."""
 _STANDS = 0.1
 """Speed, m/s, below which SUMO counts a vehicle as waiting."""
 
@@ -259,7 +261,8 @@ class Session:
             if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
                 return Ahead(False, "", False, None, people=False, beside=wrong)
             inside = lane.startswith(":")
-            through = lane if inside else str(links[0][4]) if links else ""
+            goes = bool(links) and links[0][5] not in _RED  # else that is the reason
+            through = lane if inside else str(links[0][4]) if goes else ""
             if leader is None and through:
                 leader = self._in_the_way(name, through)
         except self._errors:
