@@ -19,7 +19,7 @@ import numpy as np
 import tests.carla.test_mirror_on_maps as judge
 from bench.common import shared_maps
 from odscen import workflow
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 
 SHIPPED = ("signal_crossing", "town_5x5")
 SHARED = ("carla-2019/Town05", "carla-2019/Town03")

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from odscen.carla.blueprints import choose_blueprints
+from odscen.carla.carla_server import Server
 from odscen.carla.client import Address, import_carla
 from odscen.carla.mirror import ROLE, Mirror
-from odscen.carla.server import Server
-from odscen.catalog.assets import shipped_assets
-from odscen.results.records import Plan, PlannedActor
-from odscen.sumo.in_step import Step
+from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.sumo.runner.in_step import Step
+from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin.process import StandIn
 
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"

@@ -14,15 +14,21 @@ from pathlib import Path
 
 from bench.common import shared_maps
 from odscen import workflow
-from odscen.catalog.store import Workspace
-from odscen.scenario import edits
-from odscen.scenario.counting import Observation, transitions
-from odscen.scenario.document import Background, Counts, Demand, Scenario, Simulation
-from odscen.scenario.region import Region
-from odscen.scenario.zones import Ground
-from odscen.sumo.fit import Fit, planned_fit
-from odscen.sumo.passages import planned_passages
-from odscen.sumo.realize import everybody
+from odscen.scenario.demand.count_stations import Observation, transitions
+from odscen.scenario.demand.zones import TripEnds
+from odscen.scenario.document.scenario_document import (
+    Background,
+    Counts,
+    Demand,
+    Scenario,
+    Simulation,
+)
+from odscen.scenario.edits import scenario_edits
+from odscen.scenario.placing.region import Region
+from odscen.sumo.calibrate.count_fit import CountFits, planned_fit
+from odscen.sumo.realize.passages import planned_passages
+from odscen.sumo.realize.realization import everybody
+from odscen.workspace.store import Workspace
 
 HOURS = 3
 SLICE = 900.0
@@ -58,7 +64,7 @@ def main() -> None:
 
 def known_demand(loaded: workflow.LoadedMap) -> Scenario:
     graph = loaded.sumo.graph
-    scenario = edits.new_scenario(graph, name="known", roi=graph.segments.ids, seed=1)
+    scenario = scenario_edits.new_scenario(graph, name="known", roi=graph.segments.ids, seed=1)
     trips = Background.model_validate({"id": "known", "trips": PER_HOUR * HOURS, "mix": MIX})
     return scenario.model_copy(
         update={
@@ -75,7 +81,7 @@ def counted(known: Scenario, loaded: workflow.LoadedMap) -> Counts:
     places = sorted(_places(loaded))
     slices = [(k * SLICE, (k + 1) * SLICE) for k in range(int(HOURS * 3600 / SLICE))]
     seen = [Observation("known", place, *when, 0.0) for place in places for when in slices]
-    ground = Ground(region, loaded.usable)
+    ground = TripEnds(region, loaded.usable)
     passages = planned_passages(users, region, ground.router, seen)
     used = {place for place, _, _ in passages}
     rows = [
@@ -111,7 +117,7 @@ def _places(loaded: workflow.LoadedMap) -> set[str]:
     return places
 
 
-def show(fit: Fit, seconds: float) -> None:
+def show(fit: CountFits, seconds: float) -> None:
     met = sum(row.met for row in fit.rows)
     seen = sum(row.counted for row in fit.rows)
     print(

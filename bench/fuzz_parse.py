@@ -65,7 +65,7 @@ def main() -> None:
 
 def parse_one(path: Path) -> int:
     """What a damaged file goes through by default."""
-    from odscen.errors import OdscenError
+    from odscen.base.errors import OdscenError
     from tests.opendrive.test_mutations import use_everything
 
     try:

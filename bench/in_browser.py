@@ -22,8 +22,8 @@ from websockets.sync.client import connect
 from bench.canvas import TOWN
 from bench.common import shared_maps
 from odscen import workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 

@@ -23,14 +23,14 @@ from contextlib import suppress
 from pathlib import Path
 
 from odscen import demands, workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
-from odscen.scenario.demand_edits import set_clock
-from odscen.scenario.document import Flow
-from odscen.scenario.files import dumps
-from odscen.scenario.profiles import DAY, curve
-from odscen.sumo.layout import RECORDED
-from odscen.sumo.recorded import recorded_files
+from odscen.scenario.demand.day_profiles import DAY, curve
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.scenario_document import Flow
+from odscen.scenario.edits.demand_edits import set_clock
+from odscen.sumo.folder.layout import RECORDED
+from odscen.sumo.folder.recorded import recorded_files
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 
 SLICE = 600.0
 FLOWS = 40

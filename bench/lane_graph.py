@@ -53,8 +53,8 @@ def _compare(carla: object, path: Path, town: str) -> None:
 
 
 def _lane_graph(data: bytes) -> int:
-    from odscen.lanegraph.edges import connect
-    from odscen.lanegraph.nodes import place_nodes
+    from odscen.lanegraph.lane_edges import connect
+    from odscen.lanegraph.lane_nodes import place_nodes
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.parse import parse
     from odscen.opendrive.topology import lane_successors
@@ -69,7 +69,7 @@ def _lane_graph(data: bytes) -> int:
 
 
 def _map_graph(data: bytes) -> int:
-    from odscen.lanegraph.build import build_map_graph
+    from odscen.lanegraph.build_graphs import build_map_graph
     from odscen.opendrive.parse import parse
 
     return len(build_map_graph(parse(data), name="bench", sha256="0" * 64).lanes.source)

@@ -21,13 +21,13 @@ from websockets.sync.client import connect
 
 from bench import recording
 from odscen import workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
-from odscen.sumo import layout
-from odscen.sumo.live import Live
-from odscen.sumo.process import run_worker
-from odscen.sumo.progress import Command, Pace
-from odscen.web.app import create_app
+from odscen.sumo.folder import layout
+from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.protocol import Command, Pace
+from odscen.web.application import create_app
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 
 VEHICLES = 2200
 SECONDS = 120.0

@@ -29,14 +29,14 @@ import polars as pl
 
 from bench.common import shared_maps, without_output
 from odscen import demands, workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
-from odscen.sumo import layout
-from odscen.sumo.checkpoint import last_number, read_checkpoint
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.process import run_worker
-from odscen.sumo.recorded import trajectory_files
-from odscen.sumo.run_folder import make_summary, write_run_folder
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
+from odscen.sumo.folder.recorded import trajectory_files
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_folder import make_summary, write_run_folder
+from odscen.sumo.runner.worker_process import run_worker
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 from tools.make_maps.__main__ import map_text
 
 HOUR = 3600.0

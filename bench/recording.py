@@ -16,10 +16,10 @@ import tempfile
 from pathlib import Path
 
 from bench.common import without_output
-from odscen.results.records import Plan, PlannedActor
-from odscen.sumo import layout
-from odscen.sumo.config import RunSettings, sumo_config
-from odscen.sumo.measures import interval_of, measures_xml
+from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.sumo.folder import layout
+from odscen.sumo.realize.measure_files import interval_of, measures_xml
+from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
 
 VEHICLES = 1500
 CROSSINGS = 20
@@ -37,7 +37,12 @@ def main() -> None:
         config = folder / layout.SUMO_FOLDER / layout.CONFIG_FILE
         bare = without_output(config)
         commands = {
-            "odscen": [sys.executable, "-m", "odscen.sumo.worker", str(folder / layout.PLAN_FILE)],
+            "odscen": [
+                sys.executable,
+                "-m",
+                "odscen.sumo.worker.simulate",
+                str(folder / layout.PLAN_FILE),
+            ],
             "sumo": [str(binaries / "sumo"), "-c", str(config)],
             "bare": [str(binaries / "sumo"), "-c", str(bare)],
         }

@@ -15,11 +15,11 @@ from pathlib import Path
 
 from bench.common import shared_maps
 from odscen import workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
-from odscen.cli.maps import names_for
-from odscen.results.summary import ActorOutcome, actors_from_json
-from odscen.scenario.config import SamplingConfig
+from odscen.cli.map_commands import names_for
+from odscen.results.measures.summary import ActorOutcome, actors_from_json
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 
 COUNT = int(os.environ.get("ODSCEN_BENCH_SCENARIOS", "200"))
 UNTIL = 3600.0

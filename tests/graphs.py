@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.ids import JunctionId, LaneKey, RoadId, SegmentId
-from odscen.lanegraph.model import (
+from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
+from odscen.lanegraph.graphs import (
     LaneGraph,
     Lanes,
     MapGraph,

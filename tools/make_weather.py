@@ -1,4 +1,4 @@
-"""Write ``src/odscen/catalog/data/weather.json``: CARLA's presets and our own.
+"""Write ``src/odscen/workspace/data/weather.json``: CARLA's presets and our own.
 
 CARLA's values are read from its Python package; ours complete the table of kinds and times of day.
 Run with ``python tools/make_weather.py`` where ``carla`` is installed.
@@ -12,7 +12,7 @@ from typing import Any
 
 import carla
 
-TARGET = Path(__file__).parents[1] / "src" / "odscen" / "catalog" / "data" / "weather.json"
+TARGET = Path(__file__).parents[1] / "src" / "odscen" / "workspace" / "data" / "weather.json"
 PARAMETERS = (
     "cloudiness",
     "precipitation",

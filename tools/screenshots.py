@@ -14,11 +14,11 @@ from PIL import Image
 from playwright.sync_api import Browser, expect
 
 from odscen import workflow
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import Workspace
-from odscen.scenario import demand_edits, edits
-from odscen.scenario.counting import transitions
-from odscen.scenario.document import Scenario
+from odscen.scenario.demand.count_stations import transitions
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.edits import demand_edits, scenario_edits
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage, settle
 from tools import page as tool
 
@@ -68,7 +68,7 @@ def main() -> None:
 def _counted(workspace: Workspace) -> None:
     """Save a scenario with background traffic and counts, some of which contradict each other."""
     graph = workflow.load_map(workspace.map(MAP)).sumo.graph
-    scenario = edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
+    scenario = scenario_edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
     scenario = demand_edits.set_clock(scenario, clock=7.5 * 3600)
     mix = {"car": 8, "van": 1, "bicycle": 1}
     scenario = demand_edits.set_background(
@@ -88,8 +88,8 @@ def _counted(workspace: Workspace) -> None:
 def _long(workspace: Workspace) -> None:
     """Save a scenario of hours."""
     graph = workflow.load_map(workspace.map(SMALL)).sumo.graph
-    scenario = edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
-    scenario = edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
+    scenario = scenario_edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
+    scenario = scenario_edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
     scenario = demand_edits.set_background(scenario, graph, background="others", trips=1200)
     _save(workspace, LONG, scenario)
 

@@ -9,24 +9,30 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from odscen import workflow
-from odscen.errors import InputError, ScenarioError, in_file
-from odscen.scenario import demand_edits, edits
-from odscen.scenario.profiles import DAY
-from odscen.scenario.tables import COLUMNS, read_counts, read_matrix, read_profile, read_zones
-from odscen.sumo.fit import planned_fit, run_fit
-from odscen.sumo.layout import SCENARIO_FILE
-from odscen.sumo.recorded import trajectory_files
-from odscen.sumo.town_day import TOWN_MIX, town_day
+from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.scenario.demand.day_profiles import DAY
+from odscen.scenario.demand.demand_tables import (
+    COLUMNS,
+    read_counts,
+    read_matrix,
+    read_profile,
+    read_zones,
+)
+from odscen.scenario.edits import demand_edits, scenario_edits
+from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
+from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
+from odscen.sumo.folder.layout import SCENARIO_FILE
+from odscen.sumo.folder.recorded import trajectory_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from odscen.catalog.store import Workspace
-    from odscen.scenario.document import Scenario
-    from odscen.sumo.fit import Fit
-    from odscen.sumo.town_day import Load
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.calibrate.count_fit import CountFits
+    from odscen.sumo.calibrate.town_day import Load
     from odscen.workflow import LoadedMap
+    from odscen.workspace.store import Workspace
 
 
 def import_table(
@@ -131,7 +137,9 @@ def whole_day(
 ) -> tuple[Scenario, Load]:
     """Make 24 hours of traffic on a whole map, from midnight on; see :func:`town_day`."""
     loaded = workflow.load_map(workspace.map(map_name))
-    scenario = edits.new_scenario(loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed)
+    scenario = scenario_edits.new_scenario(
+        loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed
+    )
     return with_whole_day(loaded, scenario, trips=trips, day=day)
 
 
@@ -151,13 +159,13 @@ def with_whole_day(
         If there is no such day, or no trips are possible.
     """
     graph = loaded.sumo.graph
-    empty = edits.new_scenario(
+    empty = scenario_edits.new_scenario(
         graph, name=scenario.name, roi=graph.segments.ids, seed=scenario.seed
     )
     matrix, load = town_day(empty, loaded.sumo, trips=trips, day=day)
     roi = tuple(dict.fromkeys((*scenario.roi, *empty.roi)))
     scenario = scenario.model_copy(update={"roi": roi})
-    scenario = edits.set_simulation(scenario, duration=DAY)
+    scenario = scenario_edits.set_simulation(scenario, duration=DAY)
     scenario = demand_edits.set_clock(scenario, clock=0.0)
     scenario = demand_edits.set_matrix(
         scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX, begin=0.0, end=DAY
@@ -165,7 +173,7 @@ def with_whole_day(
     return scenario, load
 
 
-def fit(workspace: Workspace, what: Path) -> Fit:
+def fit(workspace: Workspace, what: Path) -> CountFits:
     """Hold traffic against the counts of its scenario: as planned, or as a run had it.
 
     Parameters

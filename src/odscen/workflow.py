@@ -1,6 +1,6 @@
 """The main job as functions: what the command line and scripts call.
 
->>> from odscen.catalog.store import Workspace
+>>> from odscen.workspace.store import Workspace
 >>> from odscen import workflow
 >>> workspace = Workspace.open()
 >>> workspace.add_map(Path("Town01.xodr"))
@@ -16,40 +16,40 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from odscen.errors import InputError, NotFoundError, WorkspaceError, in_file
-from odscen.results.corridors import corridor_along, way_between
-from odscen.results.expectations import needs_criticality
-from odscen.scenario.checks import check
-from odscen.scenario.config import SamplingConfig, loads_config, overridden
-from odscen.scenario.files import dumps, read_any
-from odscen.scenario.graphform import to_graphml
-from odscen.scenario.problems import refuse_errors
-from odscen.scenario.sampling import choose_map, sample_scenario
-from odscen.sumo import long_runs
-from odscen.sumo.ended import read_summary
-from odscen.sumo.layout import NET_FILE
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.recording import Recording
-from odscen.sumo.runner import RunJob, run_many, write_sumo_files
-from odscen.sumo.signals import scenario_lights
-from odscen.sumo.sumo_map import SumoMap
-from odscen.sumo.usable import usable_places
+from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.results.measures.corridors import corridor_along, way_between
+from odscen.results.measures.expectations import needs_criticality
+from odscen.scenario.checks.scenario_checks import check
+from odscen.scenario.document.json_form import dumps, read_any
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.sampling_config import SamplingConfig, loads_config, overridden
+from odscen.scenario.forms.graph_form import to_graphml
+from odscen.scenario.sampling.sampler import choose_map, sample_scenario
+from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.layout import NET_FILE
+from odscen.sumo.realize.program_files import scenario_lights
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.sumo_map import SumoMap
+from odscen.sumo.realize.usable import usable_places
+from odscen.sumo.runner import long_runs
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_jobs import RunJob, run_many, write_sumo_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from odscen.catalog.drawing import MapDrawing
-    from odscen.catalog.store import MapEntry, Workspace
-    from odscen.results.expectations import Expectation
-    from odscen.scenario.document import Scenario
-    from odscen.scenario.problems import Problem
-    from odscen.scenario.signals import Light
-    from odscen.scenario.supply import Usable
-    from odscen.sumo.process import Companion
-    from odscen.sumo.progress import Progress
-    from odscen.sumo.realize import SliceLength
-    from odscen.sumo.runner import RunResult
+    from odscen.drawing.map_drawing import MapDrawing
+    from odscen.results.measures.expectations import Expectation
+    from odscen.scenario.checks.signal_timing import Light
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.placing.supply import Usable
+    from odscen.sumo.realize.realization import SliceLength
+    from odscen.sumo.runner.run_jobs import RunResult
+    from odscen.sumo.runner.worker_process import Companion
+    from odscen.sumo.worker.protocol import Progress
+    from odscen.workspace.store import MapEntry, Workspace
 
 SUFFIX = ".scenario.json"
 
@@ -122,7 +122,7 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
 
 
 def check_scenario(workspace: Workspace, scenario: Scenario) -> tuple[Problem, ...]:
-    """Every problem of a scenario on its map, see :mod:`odscen.scenario.checks`."""
+    """Every problem of a scenario on its map, see :mod:`odscen.scenario.checks.scenario_checks`."""
     loaded = load_map(workspace.map_for(scenario.map.name, scenario.map.sha256))
     return check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
 
@@ -222,7 +222,7 @@ def run(
     processes
         How many run at a time.
     recording, meso, slice_length
-        See :func:`odscen.sumo.prepare.prepare`. Criticality is recorded where an expectation asks
+        See :func:`odscen.sumo.runner.prepare.prepare`. Criticality is recorded where an expectation asks
         for it.
     tell
         Called with what the user should know before a long run.

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage
 from tools import chromium
 from tools import page as tool

@@ -14,9 +14,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
+from odscen.workspace.store import Workspace
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle
 from tools import page as tool

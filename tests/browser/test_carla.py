@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING, SHIPPED
 from tests.browser.pages import OdscenPage
 from tests.browser.test_accessibility import Inspector

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, expect
 
-from odscen.catalog.store import Workspace
-from odscen.scenario import demand_edits, edits
-from odscen.scenario.files import dumps
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.edits import demand_edits, scenario_edits
 from odscen.workflow import SUFFIX, load_map
+from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tools.page import Served
@@ -25,7 +25,7 @@ def crossing(served: Served, request: pytest.FixtureRequest) -> str:
     workspace = Workspace.open(served.workspace)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
     name = request.node.name.replace("_", "-")[:40]
-    scenario = edits.new_scenario(graph, name=name, roi=graph.segments.ids)
+    scenario = scenario_edits.new_scenario(graph, name=name, roi=graph.segments.ids)
     _write(workspace, name, scenario)
     return name
 
@@ -134,9 +134,11 @@ def test_a_stream_can_have_a_day_profile(user: OdscenPage, crossing: str, served
     workspace = Workspace.open(served.workspace)
     loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
-    scenario = edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
-    spawn = edits.fill_roi(scenario, graph, loaded.usable, share=0.2, seed=1).actors[0].spawn
-    _write(workspace, crossing, edits.add_flow(scenario, graph, spawn=spawn, per_hour=200))
+    scenario = scenario_edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
+    spawn = (
+        scenario_edits.fill_roi(scenario, graph, loaded.usable, share=0.2, seed=1).actors[0].spawn
+    )
+    _write(workspace, crossing, scenario_edits.add_flow(scenario, graph, spawn=spawn, per_hour=200))
     user.open_editor(crossing)
     user.step("Road users").click()
     user.names.first.click()
@@ -177,8 +179,8 @@ def test_a_long_run_is_forecast_interrupted_and_goes_on_to_its_end(
 ) -> None:
     workspace = Workspace.open(served.workspace)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
-    scenario = edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
-    scenario = edits.set_simulation(scenario, duration=2 * HOUR)
+    scenario = scenario_edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
+    scenario = scenario_edits.set_simulation(scenario, duration=2 * HOUR)
     _write(
         workspace,
         crossing,

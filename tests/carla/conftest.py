@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
 Sample = Callable[..., Path]

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
+from odscen.base.errors import MissingDependencyError
 from odscen.carla.client import Address, connect
-from odscen.errors import MissingDependencyError
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

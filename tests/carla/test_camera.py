@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.camera import EGO_SPAN, View, open_camera
+from odscen.carla.carla_server import Server
 from odscen.carla.client import Address
 from odscen.carla.pictures import Picture, Wish, picture_files, still
-from odscen.carla.server import Server
-from odscen.errors import InputError, WorkspaceError
 from tests.carla.conftest import MAPS
 from tests.carla_standin.process import StandIn
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from odscen.carla.batch import Batch, Move, Place, Shine, Spawn, Velocity
+from odscen.base.errors import CarlaError, InputError
+from odscen.carla.batch import ActorPlace, Batch, Move, Shine, Spawn, Velocity
+from odscen.carla.carla_server import Server
 from odscen.carla.client import Address, connect
-from odscen.carla.maps import ensure_map, same_map
-from odscen.carla.server import Server
-from odscen.errors import CarlaError, InputError
+from odscen.carla.server_map import ensure_map, same_map
 from tests.carla_standin.process import StandIn
 
 carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
@@ -23,7 +23,7 @@ STILL = Velocity(0.0, 0.0, 0.0)
 
 
 def car(x: float = 0.0) -> Spawn:
-    at = Place(x, 0.0, 0.0, 0.0, 90.0)
+    at = ActorPlace(x, 0.0, 0.0, 0.0, 90.0)
     return Spawn("vehicle.tesla.model3", "odscen.a", at, STILL, 0.0, False, 0.0, 0)
 
 
@@ -82,7 +82,7 @@ def test_a_tick_is_two_calls_however_many_actors_there_are() -> None:
     with StandIn(CROSSING) as stand_in, Server(address_of(stand_in)) as server:
         server.synchronize(0.05)
         made = server.apply(Batch(spawn=tuple(car(10.0 * number) for number in range(30))))
-        at = Place(0.0, 0.0, 0.0, 0.0, 90.0)
+        at = ActorPlace(0.0, 0.0, 0.0, 0.0, 90.0)
         moves = [Move(int(actor), at, STILL, 0.0, False) for actor in made]
         shines = [Shine(int(actor), 8) for actor in made]
         for few in (1, 30):

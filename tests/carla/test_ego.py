@@ -10,14 +10,14 @@ from typing import Any
 import polars as pl
 import pytest
 
+from odscen.base.errors import InputError
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, CosimReport, cosim
-from odscen.catalog.store import Workspace
-from odscen.errors import InputError
 from odscen.lanegraph.query import node_index
-from odscen.scenario.document import Actor, MapReference, Scenario
-from odscen.scenario.files import dumps
-from odscen.sumo.runner import RunResult
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
+from odscen.sumo.runner.run_jobs import RunResult
+from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla.driver import Driver
 from tests.carla_standin.process import StandIn

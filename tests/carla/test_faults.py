@@ -19,7 +19,7 @@ from typing import Any
 import psutil
 import pytest
 
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 
@@ -237,7 +237,9 @@ def test_when_sumo_dies_nothing_is_left_in_carla(start: Start) -> None:
         run = start(server, until=60.0)
         wait_for_actors(server, run)
         [worker] = [
-            child for child in run.process.children() if "odscen.sumo.worker" in child.cmdline()
+            child
+            for child in run.process.children()
+            if "odscen.sumo.worker.simulate" in child.cmdline()
         ]
         worker.kill()
         code, told, _ = run.wait()

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample, lights_of_sumo_alone
 from tests.carla.observer import Frame, Observer
 from tests.carla_standin.process import StandIn

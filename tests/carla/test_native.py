@@ -17,10 +17,10 @@ import psutil
 import pytest
 
 from odscen import workflow
-from odscen.carla.native import native_actors
-from odscen.catalog.store import Workspace
-from odscen.scenario.files import dumps
-from odscen.sumo.prepare import prepare
+from odscen.carla.native_plan import native_actors
+from odscen.scenario.document.json_form import dumps
+from odscen.sumo.runner.prepare import prepare
+from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 

@@ -10,8 +10,8 @@ import pytest
 
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
-from odscen.catalog.store import Workspace
-from odscen.sumo.in_step import Step
+from odscen.sumo.runner.in_step import Step
+from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 

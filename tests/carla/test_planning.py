@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from odscen.base.errors import CarlaError, InputError
 from odscen.carla.batch import Batch
 from odscen.carla.blueprints import Shape, choose_blueprints
 from odscen.carla.cosim import CosimOptions
 from odscen.carla.environment import vehicle_lights
+from odscen.carla.light_heads import Heads
 from odscen.carla.mirror import BRAKE, FOG, LEFT, LIFTS, LOW_BEAM, POSITION, RIGHT, Mirror, between
 from odscen.carla.nearby import HYSTERESIS, Nearby
-from odscen.carla.signals import Heads
-from odscen.catalog.assets import shipped_assets
-from odscen.convert.lane_table import SumoLight
-from odscen.errors import CarlaError, InputError
-from odscen.results.records import Plan, PlannedActor
-from odscen.sumo.in_step import Step
+from odscen.convert.lane_table.table import SumoLight
+from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.sumo.runner.in_step import Step
+from odscen.workspace.asset_catalogue import shipped_assets
 
 
 def actor(name: str, category: str = "car", *, length: float = 4.5, **more: object) -> PlannedActor:

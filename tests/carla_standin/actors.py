@@ -7,7 +7,7 @@ from enum import Enum
 from math import cos, hypot, radians, sin
 from typing import Any
 
-from odscen.scenario.bodies import Box
+from odscen.scenario.placing.bodies import Box
 from tests.carla_standin import wire
 from tests.carla_standin.blueprints import CAMERA
 from tests.carla_standin.wire import ZERO, Pose, Vector

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from odscen.catalog.assets import Blueprint, shipped_assets
-from odscen.categories import Category
+from odscen.base.categories import Category
+from odscen.workspace.asset_catalogue import Blueprint, shipped_assets
 
 CAMERA = "sensor.camera.rgb"
 WALKER_CONTROLLER = "controller.ai.walker"

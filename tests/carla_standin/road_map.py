@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from odscen.frames import CarlaPose, XodrPose, xodr_to_carla
+from odscen.base.frames import CarlaPose, XodrPose, xodr_to_carla
 from odscen.opendrive.lanes import RoadTable
-from odscen.opendrive.model import OpenDrive, Signal
 from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import OpenDrive, Signal
 from tests.carla_standin.wire import Pose
 
 _SPAWN_EVERY = 25.0

@@ -5,7 +5,7 @@ from math import hypot
 import numpy as np
 import pytest
 
-from odscen.catalog.assets import shipped_assets
+from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin.conftest import DELTA, MAPS, Connected, connect, synchronize
 from tests.carla_standin.process import StandIn
 

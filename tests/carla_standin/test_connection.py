@@ -5,9 +5,9 @@ import time
 import numpy as np
 import pytest
 
-from odscen.catalog.assets import shipped_assets
-from odscen.lanegraph.build import build_map_graph
+from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.opendrive.parse import parse
+from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin.conftest import DELTA, MAPS, Connected, connect, synchronize
 from tests.carla_standin.process import StandIn
 

@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from odscen.catalog.assets import shipped_assets
-from odscen.scenario.bodies import overlap
+from odscen.scenario.placing.bodies import overlap
+from odscen.workspace.asset_catalogue import shipped_assets
 from tests.carla_standin import camera, wire
 from tests.carla_standin.actors import Actor, Kind, attached
 from tests.carla_standin.blueprints import (

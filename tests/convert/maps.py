@@ -11,16 +11,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from odscen.convert.network import SumoNetwork, build_network
-from odscen.lanegraph.build import build_map_graph
-from odscen.lanegraph.model import MapGraph
+from odscen.convert.building.network import SumoNetwork, build_network
+from odscen.lanegraph.build_graphs import build_map_graph
+from odscen.lanegraph.graphs import MapGraph
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from tests.conftest import shared_map_files
 
 if TYPE_CHECKING:
-    from odscen.convert.lane_table import SumoPlaces
-    from odscen.opendrive.model import OpenDrive
+    from odscen.convert.lane_table.table import SumoPlaces
+    from odscen.opendrive.road_model import OpenDrive
 
 FOLDER = Path(__file__).parents[2] / "maps"
 SHIPPED = tuple(sorted(FOLDER.glob("*.xodr")))

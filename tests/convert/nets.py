@@ -15,7 +15,7 @@ import numpy as np
 from tests.lanegraph.roads import lane, network, road, section
 
 if TYPE_CHECKING:
-    from odscen.opendrive.model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive
 
 TURN = -0.5
 OFFSET = np.array([100.0, 50.0])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from odscen.convert.lane_table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
-from odscen.convert.net import Phase
-from odscen.convert.pieces import Piece
-from odscen.ids import JunctionId, LaneKey, RoadId, SumoEdgeId, SumoLaneId
+from odscen.base.ids import JunctionId, LaneKey, RoadId, SumoEdgeId, SumoLaneId
+from odscen.convert.lane_table.mapping_intervals import Piece
+from odscen.convert.lane_table.table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
+from odscen.convert.model.net import Phase
 
 DRIVE = LaneKey(RoadId("1"), 0, -1)
 AGAINST = LaneKey(RoadId("1"), 0, 1)

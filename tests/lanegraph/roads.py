@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.opendrive.parse import parse
 
 if TYPE_CHECKING:
-    from odscen.opendrive.model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive
 
 
 def lane(

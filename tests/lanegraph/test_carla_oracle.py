@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from odscen.lanegraph.build import build_map_graph
-from odscen.lanegraph.model import CHANGE_LEFT, CHANGE_RIGHT, MapGraph, Relation
-from odscen.lanegraph.nodes import MIN_LANE_WIDTH
+from odscen.lanegraph.build_graphs import build_map_graph
+from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, MapGraph, Relation
+from odscen.lanegraph.lane_nodes import MIN_LANE_WIDTH
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.errors import NotFoundError
+from odscen.base.errors import NotFoundError
 from odscen.lanegraph.query import (
     induced,
     is_connected,

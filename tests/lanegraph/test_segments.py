@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from odscen.ids import RoadId
-from odscen.lanegraph.model import SegmentPart
+from odscen.base.ids import RoadId
+from odscen.lanegraph.graphs import SegmentPart
 from odscen.lanegraph.query import is_connected
 from odscen.lanegraph.segments import TARGET_LENGTH, build_segments
 from tests.lanegraph.roads import junction, lane, network, road, section
 
 if TYPE_CHECKING:
-    from odscen.opendrive.model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive
 
 ONE = section(lane(-1, before=-1, after=-1))
 

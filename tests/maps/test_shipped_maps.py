@@ -9,9 +9,9 @@ import pyproj
 import pytest
 
 from odscen.opendrive.lanes import RoadTable
-from odscen.opendrive.model import DRIVABLE_TYPES
 from odscen.opendrive.objects import crosswalks, signal_kind, stop_lines
 from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import DRIVABLE_TYPES
 from odscen.opendrive.topology import lane_successors
 
 MAPS = sorted((Path(__file__).parents[2] / "maps").glob("*.xodr"))

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from odscen.errors import OpenDriveError
-from odscen.opendrive.model import OpenDrive
+from odscen.base.errors import OpenDriveError
 from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import OpenDrive
 from tests.opendrive.full import FULL
 from tests.opendrive.standard import VERSIONS, schema_folder, schema_rows
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from odscen.opendrive.geometry import PlanView
-from odscen.opendrive.model import Geometry, GeometryKind
 from odscen.opendrive.profiles import CubicTable, StepTable, locate, offsets
+from odscen.opendrive.road_model import Geometry, GeometryKind
 
 lengths = st.floats(0.05, 300.0)
 headings = st.floats(-7.0, 7.0)

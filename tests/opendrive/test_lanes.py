@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.ids import LaneKey
+from odscen.base.ids import LaneKey
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from tests.conftest import shared_map_files

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odscen.errors import OdscenError
+from odscen.base.errors import OdscenError
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks, object_outline, stop_lines
 from odscen.opendrive.parse import parse

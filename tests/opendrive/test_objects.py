@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.opendrive.lanes import RoadTable
-from odscen.opendrive.model import OpenDrive
 from odscen.opendrive.objects import (
     crosswalks,
     object_outline,
@@ -17,6 +16,7 @@ from odscen.opendrive.objects import (
     stop_lines,
 )
 from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import OpenDrive
 from tests.opendrive.snippets import LINE, document, road
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from odscen.errors import OpenDriveError
-from odscen.opendrive.model import Cubic, GeometryKind, LaneSpeed
+from odscen.base.errors import OpenDriveError
 from odscen.opendrive.parse import parse
+from odscen.opendrive.road_model import Cubic, GeometryKind, LaneSpeed
 from tests.conftest import shared_map_files
 from tests.opendrive.snippets import LANES, LINE, document, lane, road, section
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odscen.ids import LaneKey
+from odscen.base.ids import LaneKey
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.opendrive.topology import lane_successors

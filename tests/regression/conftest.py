@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from odscen.catalog.store import Workspace
 from odscen.regression.gates import run_suite
 from odscen.regression.suite import read_suite
+from odscen.workspace.store import Workspace
 
 ROOT = Path(__file__).parents[2]
 

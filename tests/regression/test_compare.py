@@ -6,12 +6,12 @@ import pytest
 from scipy import stats
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
-from odscen.errors import InputError
+from odscen.base.errors import InputError
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
-from odscen.regression.measure import Key
-from odscen.results.comparison import compare_figure
+from odscen.regression.measure import FigureKey
+from odscen.results.measures.comparison import compare_figure
+from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen
 from tests.regression.conftest import ROOT
 
@@ -63,7 +63,7 @@ def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
     a, b = sides
     result = compare_runs(read_runs(a), read_runs(b))
     rows = {row.key: row.difference for row in result.rows}
-    delay = rows[Key("run", "", "mean_delay")]
+    delay = rows[FigureKey("run", "", "mean_delay")]
     assert delay.paired
     assert delay.runs == 3
     assert delay.low < delay.difference < delay.high
@@ -93,7 +93,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
         row.says == "clear" and bool(row.difference.relative) for row in run_rows
     )
     waiting = next(
-        row for row in result.rows if row.key == Key("junction", "j10001", "waiting_time")
+        row for row in result.rows if row.key == FigureKey("junction", "j10001", "waiting_time")
     )
     words = f"time {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
     assert re.search(rf'class="d[01]"><title>j10001: [a-z ]*{re.escape(words)}', page)
@@ -118,7 +118,7 @@ def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
     assert {key for key in sliced.runs[1] if key.place} == {
         key for key in whole.runs[1] if key.place
     }
-    passed = Key("junction", "j10001", "vehicles")
+    passed = FigureKey("junction", "j10001", "vehicles")
     assert sliced.runs[1][passed] == pytest.approx(whole.runs[1][passed], abs=2)
 
 

@@ -4,12 +4,12 @@ import re
 import pytest
 from lxml import etree
 
-from odscen.errors import InputError
+from odscen.base.errors import InputError
 from odscen.regression.gates import run_suite
 from odscen.regression.junit import junit_xml
-from odscen.regression.pages import suite_page
 from odscen.regression.suite import read_suite
-from odscen.regression.words import lines, to_dict
+from odscen.regression.suite_page import suite_page
+from odscen.regression.suite_words import lines, to_dict
 
 
 def run(store, file, **options):

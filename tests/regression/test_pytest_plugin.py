@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from odscen.catalog.store import Workspace
+from odscen.workspace.store import Workspace
 from tests.regression.conftest import ROOT
 
 

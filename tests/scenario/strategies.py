@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from odscen.categories import Category
-from odscen.scenario.document import (
+from odscen.base.categories import Category
+from odscen.scenario.document.scenario_document import (
     Actor,
     Background,
     Counts,

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import sumo
 
-from odscen.results.records import Plan, PlannedActor
-from odscen.sumo.config import RunSettings, sumo_config
-from odscen.sumo.measures import measures_xml
-from odscen.sumo.runner import PreparedRun
+from odscen.results.records.run_records import Plan, PlannedActor
+from odscen.sumo.realize.measure_files import measures_xml
+from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
+from odscen.sumo.runner.run_jobs import PreparedRun
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
 

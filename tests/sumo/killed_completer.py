@@ -1,6 +1,6 @@
 """The process that completes slices, killed with signal 9 just before a change of the run folder.
 
-Run in place of :mod:`odscen.sumo.completer` by ``killed_worker``: before the
+Run in place of :mod:`odscen.sumo.worker.completer` by ``killed_worker``: before the
 ``KILL_COMPLETER_AT``-th change it alone, before the ``KILL_BOTH_AT``-th the worker with it.
 """
 
@@ -10,7 +10,7 @@ import itertools
 import os
 import sys
 
-from odscen.sumo.completer import main
+from odscen.sumo.worker.completer import main
 from tests.sumo.killed_worker import kill_before_change
 
 if __name__ == "__main__":

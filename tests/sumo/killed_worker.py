@@ -1,6 +1,6 @@
 """The worker, killed with signal 9 just before the ``KILL_AT``-th time it changes the run folder.
 
-Run in place of :mod:`odscen.sumo.worker`. With ``KILL_AFTER_SLICE`` it is the first time after that
+Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it is the first time after that
 slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that completes
 slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many bytes fail as
 on a full disk.
@@ -16,9 +16,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from odscen.sumo import completion
-from odscen.sumo.checkpoint import slice_folder
-from odscen.sumo.worker import main
+from odscen.sumo.folder.checkpoint import slice_folder
+from odscen.sumo.worker import completion
+from odscen.sumo.worker.simulate import main
 
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "open")
 

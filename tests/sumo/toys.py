@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.sumo.network import Link, NetLane, RoadNet
-from odscen.sumo.routes import Places
-from odscen.sumo.sumo_map import SumoMap
+from odscen.sumo.realize.road_net import Link, RoadNet, RoadNetLane
+from odscen.sumo.realize.route_planner import NodePositions
+from odscen.sumo.realize.sumo_map import SumoMap
 from tests.graphs import ToyLane, ToyWalk, key, map_graph
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.model import LaneGraph, MapGraph, PedestrianGraph
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
 
 OFFSET = (1000.0, -50.0)
 CARS = frozenset({"passenger", "delivery", "truck", "bus", "motorcycle", "bicycle"})
@@ -45,14 +45,14 @@ def street() -> MapGraph:
 
 def street_net() -> RoadNet:
     lanes = [
-        NetLane("in_0", "in", 0, 98.0, allowed=WALKERS),
-        NetLane("in_1", "in", 1, 98.0, allowed=CARS),
-        NetLane("in_2", "in", 2, 98.0, allowed=CARS),
-        NetLane(":9_0_0", ":9_0", 0, 24.0, internal=True, allowed=CARS),
-        NetLane(":9_0_1", ":9_0", 1, 24.0, internal=True, allowed=CARS),
-        NetLane("out_0", "out", 0, 98.0, allowed=WALKERS),
-        NetLane("out_1", "out", 1, 98.0, allowed=CARS),
-        NetLane("out_2", "out", 2, 98.0, allowed=CARS),
+        RoadNetLane("in_0", "in", 0, 98.0, allowed=WALKERS),
+        RoadNetLane("in_1", "in", 1, 98.0, allowed=CARS),
+        RoadNetLane("in_2", "in", 2, 98.0, allowed=CARS),
+        RoadNetLane(":9_0_0", ":9_0", 0, 24.0, internal=True, allowed=CARS),
+        RoadNetLane(":9_0_1", ":9_0", 1, 24.0, internal=True, allowed=CARS),
+        RoadNetLane("out_0", "out", 0, 98.0, allowed=WALKERS),
+        RoadNetLane("out_1", "out", 1, 98.0, allowed=CARS),
+        RoadNetLane("out_2", "out", 2, 98.0, allowed=CARS),
     ]
     links = (
         Link("in_1", "out_1", ":9_0_0"),
@@ -68,18 +68,22 @@ def street_net() -> RoadNet:
     )
 
 
-def lane_places(graph: LaneGraph) -> Places:
+def lane_places(graph: LaneGraph) -> NodePositions:
     names = ("in_1", "in_2", ":9_0_0", ":9_0_1", "out_1", "out_2")
     edge = np.where(graph.x < 98.0, 0, np.where(graph.x < 122.0, 1, 2))
     starts = np.array([0.0, 98.0, 122.0])[edge]
     row = 2 * edge + (graph.y > -3.5)
-    return Places(names, row.astype(np.int32), graph.x - starts, np.zeros(len(row)), np.ones(6))
+    return NodePositions(
+        names, row.astype(np.int32), graph.x - starts, np.zeros(len(row)), np.ones(6)
+    )
 
 
-def walk_places(graph: PedestrianGraph) -> Places:
+def walk_places(graph: PedestrianGraph) -> NodePositions:
     beyond = graph.x > 100.0
     pos = graph.x - 122.0 * beyond
-    return Places(("in_0", "out_0"), beyond.astype(np.int32), pos, np.zeros(len(pos)), np.ones(2))
+    return NodePositions(
+        ("in_0", "out_0"), beyond.astype(np.int32), pos, np.zeros(len(pos)), np.ones(2)
+    )
 
 
 def sumo_map() -> SumoMap:

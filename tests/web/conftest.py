@@ -14,9 +14,9 @@ import uvicorn
 from starlette.testclient import TestClient
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
-from odscen.web.app import create_app
+from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
+from odscen.workspace.store import Workspace
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 CROSSING = "signal_crossing"

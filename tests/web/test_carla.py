@@ -9,9 +9,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from odscen.carla.client import Address
-from odscen.catalog.store import Workspace
-from odscen.web.app import create_app
+from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
+from odscen.workspace.store import Workspace
 from tests.carla_standin.process import StandIn
 from tests.web.conftest import CROSSING, SHIPPED, finished, serving
 

@@ -9,9 +9,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from odscen import demands, workflow
-from odscen.catalog.store import Workspace
-from odscen.scenario.counting import place_points
-from odscen.scenario.files import loads
+from odscen.scenario.demand.count_stations import place_points
+from odscen.scenario.document.json_form import loads
+from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished
 
 

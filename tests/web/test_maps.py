@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.catalog.store import Workspace
 from odscen.lanegraph.query import node_ids
-from odscen.web.app import create_app
+from odscen.web.application import create_app
+from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, SHIPPED, job
 
 _ENTITIES = "".join(f'<!ENTITY b{i} "{f"&b{i - 1};" * 10}">' for i in range(1, 10))

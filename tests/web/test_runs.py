@@ -18,12 +18,12 @@ from starlette.testclient import TestClient, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 from websockets.sync.client import connect
 
+from odscen.base.errors import SimulationError
+from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.carla.client import Address
-from odscen.catalog.store import Workspace
-from odscen.errors import SimulationError
-from odscen.frames import SumoPose, sumo_to_xodr
-from odscen.results.records import Plan
-from odscen.web import runs
+from odscen.results.records.run_records import Plan
+from odscen.web import active_runs
+from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
 
 
@@ -269,7 +269,7 @@ def test_runs_of_one_scenario_are_found_after_a_restart_too(
     finished(client, other)
     second = start(client, sampled)
     finished(client, second)
-    again = runs.Runs(workspace, Address())
+    again = active_runs.Runs(workspace, Address())
     try:
         assert [row.run for row in again.rows(scenario=sampled)] == [first, second]
         assert [row.run for row in again.rows(scenario=f"{sampled}-1")] == [other]
@@ -307,7 +307,7 @@ def test_a_run_whose_preparation_fails_can_be_removed(
         msg = "no way"
         raise SimulationError(msg)
 
-    monkeypatch.setattr(runs, "prepare", refuse)
+    monkeypatch.setattr(active_runs, "prepare", refuse)
     run = start(client, sampled)
     assert finished(client, run)["error"] == "no way"
     assert client.delete(f"/api/runs/{run}").status_code == 204
@@ -327,7 +327,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
 ) -> None:
     good = start(client, sampled, speed=5)
     wait_for(lambda: client.get(f"/api/runs/{good}").json()["state"] == "running" or None)
-    real = runs.prepare
+    real = active_runs.prepare
 
     def spoiled(*arguments: Any, **more: Any) -> Any:
         prepared = real(*arguments, **more)
@@ -338,7 +338,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
         object.__setattr__(prepared, "sumo_files", files)
         return prepared
 
-    monkeypatch.setattr(runs, "prepare", spoiled)
+    monkeypatch.setattr(active_runs, "prepare", spoiled)
     bad = start(client, sampled)
     seen = watch(client, bad)
     assert seen.of("end")[0]["state"] == "failed"
@@ -433,7 +433,7 @@ def test_several_run_at_once_and_the_end_of_the_server_is_their_end(
 def test_at_most_so_many_go_on_at_a_time(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runs, "MOST", 1)
+    monkeypatch.setattr(active_runs, "MOST", 1)
     run = start(client, sampled, speed=1)
     answer = client.post("/api/runs", json={"scenario": sampled})
     assert answer.status_code == 409
@@ -447,8 +447,8 @@ def test_the_server_never_imports_libsumo(workspace: Workspace, sampled: str) ->
 import sys, time
 from pathlib import Path
 from starlette.testclient import TestClient
-from odscen.catalog.store import Workspace
-from odscen.web.app import create_app
+from odscen.workspace.store import Workspace
+from odscen.web.application import create_app
 with TestClient(create_app(Workspace.open(Path(sys.argv[1]))), base_url="http://localhost") as c:
     run = c.post("/api/runs", json={"scenario": sys.argv[2]}).json()["run"]
     while c.get(f"/api/runs/{run}").json()["state"] not in ("completed", "failed"):
@@ -472,10 +472,10 @@ def test_a_worker_ends_when_the_program_that_started_it_is_gone(
 import os, sys, threading, time
 from pathlib import Path
 from odscen import workflow
-from odscen.catalog.store import Workspace
-from odscen.sumo.live import Live
-from odscen.sumo.prepare import prepare
-from odscen.sumo.progress import Pace
+from odscen.workspace.store import Workspace
+from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.prepare import prepare
+from odscen.sumo.worker.protocol import Pace
 from odscen.sumo.runner import run_prepared
 workspace = Workspace.open(Path(sys.argv[1]))
 scenario = workflow.read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")

@@ -19,8 +19,8 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from odscen import workflow
-from odscen.catalog.store import Workspace
-from odscen.web.app import create_app
+from odscen.web.application import create_app
+from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
 
 CHECKS = [

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 
-class Place(NamedTuple):
+class ActorPlace(NamedTuple):
     """Origin of an actor: x, y, z, then pitch and yaw in degrees."""
 
     x: float
@@ -28,7 +28,7 @@ class Move(NamedTuple):
     """Put an actor somewhere; a walker with a speed, at which it moves its legs."""
 
     actor: int
-    at: Place
+    at: ActorPlace
     velocity: Velocity
     speed: float
     walks: bool
@@ -59,7 +59,7 @@ class Spawn:
 
     blueprint: str
     role_name: str
-    at: Place
+    at: ActorPlace
     velocity: Velocity
     speed: float
     walks: bool

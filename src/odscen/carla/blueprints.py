@@ -6,14 +6,14 @@ import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.categories import Category
-from odscen.errors import CarlaError
+from odscen.base.categories import Category
+from odscen.base.errors import CarlaError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.catalog.assets import Assets, Blueprint
-    from odscen.results.records import PlannedActor
+    from odscen.results.records.run_records import PlannedActor
+    from odscen.workspace.asset_catalogue import Assets, Blueprint
 
 ALIKE = 0.25
 """Metres that bodies may differ more than the best one's and still be as good a choice."""

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from odscen.base.errors import CarlaError, OdscenError
 from odscen.carla.mirror import ROLE
 from odscen.carla.pictures import Picture, picture_files, still
-from odscen.errors import CarlaError, OdscenError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from odscen.carla.carla_server import Server
     from odscen.carla.pictures import Wish
-    from odscen.carla.server import Server
-    from odscen.results.records import Plan
+    from odscen.results.records.run_records import Plan
 
 BLUEPRINT = "sensor.camera.rgb"
 FIELD_OF_VIEW = 60.0

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.errors import CarlaError, CarlaReleaseError, InputError, MissingDependencyError
+from odscen.base.errors import CarlaError, CarlaReleaseError, InputError, MissingDependencyError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,14 +62,14 @@ class Address:
         return True
 
 
-class Connection(NamedTuple):
+class CarlaConnection(NamedTuple):
     """The package ``carla`` and a client that a server of the right release has answered."""
 
     carla: Any
     client: Any
 
 
-def connect(address: Address) -> Connection:
+def connect(address: Address) -> CarlaConnection:
     """Connect with a server; one that is just starting is waited for.
 
     Raises
@@ -91,7 +91,7 @@ def connect(address: Address) -> Connection:
             f"start a server of release {mine}"
         )
         raise CarlaReleaseError(problem)
-    return Connection(package, client)
+    return CarlaConnection(package, client)
 
 
 @contextmanager

@@ -12,35 +12,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen import workflow
+from odscen.base.errors import CarlaError, InputError, in_file
 from odscen.carla.blueprints import choose_blueprints, size_differences
 from odscen.carla.camera import first_view, watch_from_above
+from odscen.carla.carla_server import Server
 from odscen.carla.client import Address
 from odscen.carla.ego import ExternalEgo
 from odscen.carla.environment import vehicle_lights, weather_parameters
-from odscen.carla.maps import ensure_map
+from odscen.carla.light_heads import Heads
 from odscen.carla.mirror import Mirror
 from odscen.carla.nearby import Nearby
+from odscen.carla.parity_recorder import StateRecorder
 from odscen.carla.pictures import Wish
-from odscen.carla.recorder import StateRecorder
-from odscen.carla.server import Server
-from odscen.carla.signals import Heads
-from odscen.errors import CarlaError, InputError, in_file
-from odscen.scenario.problems import refuse_errors
-from odscen.sumo.ground import Ground
-from odscen.sumo.in_step import InStep
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.runner import run_prepared
+from odscen.carla.server_map import ensure_map
+from odscen.scenario.document.problems import refuse_errors
+from odscen.sumo.runner.elevation import ElevationLookup
+from odscen.sumo.runner.in_step import InStep
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_jobs import run_prepared
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from odscen.carla.camera import Camera
-    from odscen.catalog.store import Workspace
-    from odscen.results.records import Plan
-    from odscen.sumo.in_step import Step
-    from odscen.sumo.progress import OnProgress, Place
-    from odscen.sumo.runner import PreparedRun, RunResult
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.runner.in_step import Step
+    from odscen.sumo.runner.run_jobs import PreparedRun, RunResult
+    from odscen.sumo.worker.protocol import EgoPose, OnProgress
+    from odscen.workspace.store import Workspace
 
 TICK = 0.05
 """Simulated seconds of a tick of CARLA's, at most, unless asked for otherwise."""
@@ -217,7 +217,7 @@ def cosim(
         show = _Show(server, mirror, Heads(loaded.sumo.lights), ego, ticks, report, interrupted)
         in_step = InStep(
             prepared.plan,
-            Ground(loaded.sumo.graph, entry.lane_table()),
+            ElevationLookup(loaded.sumo.graph, entry.lane_table()),
             show.on_step,
             placed=ego.row if ego else None,
         )
@@ -298,7 +298,7 @@ class _Show:
         report.signals = len(known & self._joined.keys())
         report.signals_missing = sorted(known - self._joined.keys())
 
-    def on_step(self, step: Step) -> Place | None:
+    def on_step(self, step: Step) -> EgoPose | None:
         """Show a step; an error ends the run, whose results are kept."""
         if self._interrupted.is_set():
             self._report.interrupted = True

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from odscen.carla.batch import Place
-from odscen.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla, xodr_to_sumo
-from odscen.sumo.progress import Place as SumoPlace
+from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla, xodr_to_sumo
+from odscen.carla.batch import ActorPlace
+from odscen.sumo.worker.protocol import EgoPose as SumoPlace
 
 if TYPE_CHECKING:
-    from odscen.carla.server import Server
-    from odscen.results.records import Plan
-    from odscen.sumo.in_step import Step
+    from odscen.carla.carla_server import Server
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.runner.in_step import Step
 
 HERO = "hero"
 """``role_name`` by which external programs find, or mark, the vehicle they drive."""
@@ -47,7 +47,9 @@ class ExternalEgo:
         if hero is None:
             actor = plan.actors[row]
             pose = xodr_to_carla(XodrPose(actor.x, actor.y, actor.z, actor.hdg))
-            at = Place(float(pose.x), float(pose.y), float(pose.z) + LIFT, 0.0, float(pose.yaw_deg))
+            at = ActorPlace(
+                float(pose.x), float(pose.y), float(pose.z) + LIFT, 0.0, float(pose.yaw_deg)
+            )
             hero = server.spawn_free(blueprint, HERO, at)
         return cls(server, plan, row, hero, server.shape(hero).centre[0])
 

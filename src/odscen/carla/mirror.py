@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.carla.batch import Batch, Move, Place, Shine, Spawn, Velocity
+from odscen.base.frames import XodrPose, xodr_to_carla
+from odscen.carla.batch import ActorPlace, Batch, Move, Shine, Spawn, Velocity
 from odscen.carla.blueprints import Shape
 from odscen.carla.nearby import Nearby
-from odscen.frames import XodrPose, xodr_to_carla
-from odscen.sumo.in_step import Step
-from odscen.sumo.snapshots import Signal
+from odscen.sumo.runner.in_step import Step
+from odscen.sumo.worker.snapshots import VehicleSignal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from odscen.results.records import Plan
+    from odscen.results.records.run_records import Plan
 
 ROLE = "odscen."
 """Beginning of the ``role_name`` of every actor that we make; its id in the scenario follows."""
@@ -189,7 +189,7 @@ class Mirror:
         self._asked = tuple(asked)
         return Batch(destroy, tuple(spawns), tuple(moves), tuple(shines))
 
-    def _places(self, step: Step, here: np.ndarray) -> tuple[list[Place], list[Velocity]]:
+    def _places(self, step: Step, here: np.ndarray) -> tuple[list[ActorPlace], list[Velocity]]:
         """Origins of the actors: the box's middle is where the body centre is.
 
         A vehicle's origin is on the ground, a walker's half its height above; walkers are upright.
@@ -218,17 +218,17 @@ class Mirror:
             ]
         )
         return (
-            [Place(*values) for values in columns.tolist()],
+            [ActorPlace(*values) for values in columns.tolist()],
             [Velocity(*values) for values in velocity.tolist()],
         )
 
     def _all_flags(self, signals: np.ndarray) -> list[int]:
-        hazard = signals & Signal.BLINKER_EMERGENCY
+        hazard = signals & VehicleSignal.BLINKER_EMERGENCY
         flags = np.full(len(signals), self._lights)
-        flags += BRAKE * ((signals & Signal.BRAKE) > 0)
-        flags += RIGHT * (((signals & Signal.BLINKER_RIGHT) | hazard) > 0)
-        flags += LEFT * (((signals & Signal.BLINKER_LEFT) | hazard) > 0)
-        flags += SIREN * ((signals & Signal.EMERGENCY_BLUE) > 0)
+        flags += BRAKE * ((signals & VehicleSignal.BRAKE) > 0)
+        flags += RIGHT * (((signals & VehicleSignal.BLINKER_RIGHT) | hazard) > 0)
+        flags += LEFT * (((signals & VehicleSignal.BLINKER_LEFT) | hazard) > 0)
+        flags += SIREN * ((signals & VehicleSignal.EMERGENCY_BLUE) > 0)
         listed: list[int] = flags.tolist()
         return listed
 

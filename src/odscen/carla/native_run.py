@@ -16,24 +16,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen import workflow
+from odscen.base.errors import CarlaError, in_file
+from odscen.base.frames import XodrPose, xodr_to_sumo
 from odscen.carla.camera import first_view
+from odscen.carla.carla_server import Server
 from odscen.carla.client import Address
 from odscen.carla.cosim import interrupts
 from odscen.carla.environment import weather_parameters
-from odscen.carla.native import native_actors
+from odscen.carla.native_plan import native_actors
 from odscen.carla.native_worker import NativeJob, Note, Shot, Tick, work
 from odscen.carla.pictures import Wish
-from odscen.carla.server import Server
-from odscen.errors import CarlaError, in_file
-from odscen.frames import XodrPose, xodr_to_sumo
-from odscen.results.records import Event, EventKind, events_to_json
-from odscen.results.summary import actor_outcomes, actors_to_json
-from odscen.scenario.problems import refuse_errors
-from odscen.sumo import layout
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.process import Ended
-from odscen.sumo.progress import Done, Failed, Progress
-from odscen.sumo.runner import run_prepared
+from odscen.results.measures.summary import actor_outcomes, actors_to_json
+from odscen.results.records.run_records import Event, EventKind, events_to_json
+from odscen.scenario.document.problems import refuse_errors
+from odscen.sumo.folder import layout
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.runner.worker_process import Ended
+from odscen.sumo.worker.protocol import Done, Failed, Progress
 
 if TYPE_CHECKING:
     import threading
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     from odscen.carla.native_worker import Told
-    from odscen.catalog.store import Workspace
-    from odscen.results.records import Plan
-    from odscen.sumo.progress import OnProgress
-    from odscen.sumo.runner import RunResult
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.runner.run_jobs import RunResult
+    from odscen.sumo.worker.protocol import OnProgress
+    from odscen.workspace.store import Workspace
 
 LOG_FILE = "carla.log"
 GRACE = 30.0
@@ -64,7 +64,7 @@ class NativeOptions:
     tick
         Simulated seconds of a tick; the scenario's step, but at most 0.05, if not given.
     physics
-        Whether vehicles have their own physics; see :class:`odscen.carla.traffic.Traffic`.
+        Whether vehicles have their own physics; see :class:`odscen.carla.native_traffic.Traffic`.
     on_picture
         Called with each picture as JPEG.
     """

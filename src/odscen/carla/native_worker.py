@@ -15,15 +15,15 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from odscen.base.errors import OdscenError
 from odscen.carla.blueprints import choose_blueprints
 from odscen.carla.camera import View, watch_from_above
-from odscen.carla.maps import ensure_map
+from odscen.carla.carla_server import Server
+from odscen.carla.native_traffic import Traffic
 from odscen.carla.pictures import Wish
-from odscen.carla.server import Server
-from odscen.carla.traffic import Traffic
-from odscen.errors import OdscenError
-from odscen.sumo.output_capture import captured_output
-from odscen.sumo.progress import Done, Failed
+from odscen.carla.server_map import ensure_map
+from odscen.sumo.worker.output_capture import captured_output
+from odscen.sumo.worker.protocol import Done, Failed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
     from odscen.carla.camera import Camera
     from odscen.carla.client import Address
-    from odscen.carla.native import NativeActor
-    from odscen.catalog.assets import Assets
-    from odscen.results.records import Event, Plan
+    from odscen.carla.native_plan import NativeActor
+    from odscen.results.records.run_records import Event, Plan
+    from odscen.workspace.asset_catalogue import Assets
 
 NO_NAVIGATION = (
     "the world has no navigation mesh: pedestrians are led along their ways and do not look "
@@ -83,7 +83,7 @@ class NativeJob:
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What a tick has brought; rows as :meth:`odscen.carla.traffic.Traffic.rows`.
+    """What a tick has brought; rows as :meth:`odscen.carla.native_traffic.Traffic.rows`.
 
     ``own`` are the actors that would be left on the server if this process ended now.
     """

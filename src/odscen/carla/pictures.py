@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from odscen.errors import InputError, MissingDependencyError, WorkspaceError
+from odscen.base.errors import InputError, MissingDependencyError, WorkspaceError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -8,8 +8,8 @@ from __future__ import annotations
 import json
 import sys
 
+from odscen.base.errors import CarlaError, CarlaReleaseError, MissingDependencyError
 from odscen.carla.client import Address, connect
-from odscen.errors import CarlaError, CarlaReleaseError, MissingDependencyError
 
 TIMEOUT = 5.0
 

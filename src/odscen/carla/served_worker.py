@@ -2,7 +2,7 @@
 
 The client may end its process, and holds Python's lock while it waits; a web server has neither to
 spare. The job is the first line of standard input, commands are the lines after it, and what is to
-be seen goes to standard output, all as in :mod:`odscen.sumo.progress`.
+be seen goes to standard output, all as in :mod:`odscen.sumo.worker.protocol`.
 """
 
 from __future__ import annotations
@@ -14,21 +14,29 @@ from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from odscen.base.errors import OdscenError
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
-from odscen.carla.served import ServedJob
-from odscen.catalog.store import Workspace
-from odscen.errors import OdscenError
-from odscen.sumo.output_capture import captured_output
-from odscen.sumo.progress import Done, Failed, Frame, Incidents, Lights, Shot, encode
-from odscen.sumo.snapshots import frame_bytes, frame_rows
-from odscen.sumo.steering import Steering
+from odscen.carla.served_run import ServedJob
+from odscen.sumo.worker.output_capture import captured_output
+from odscen.sumo.worker.protocol import (
+    Done,
+    Failed,
+    FrameMessage,
+    Incidents,
+    Lights,
+    ShotMessage,
+    encode,
+)
+from odscen.sumo.worker.snapshots import frame_bytes, frame_rows
+from odscen.sumo.worker.steering import Steering
+from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.sumo.in_step import Step
-    from odscen.sumo.progress import Message
+    from odscen.sumo.runner.in_step import Step
+    from odscen.sumo.worker.protocol import Message
 
 _WINDOW = 0.5
 """Wall seconds that the real-time factor is measured over."""
@@ -58,7 +66,7 @@ def main() -> int:
 def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed:
     """Run a job to its end."""
     steering = Steering(sys.stdin.fileno(), job.pace, step_length=job.step_length)
-    page = _Page(job, steering, send)
+    page = _PageFollower(job, steering, send)
     start = time.perf_counter()
     result, report = cosim(
         Workspace.open(Path(job.workspace)),
@@ -66,7 +74,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
         CosimOptions(
             address=Address.parse(job.address),
             on_step=page.on_step,
-            on_picture=lambda jpeg: send(Shot(len(jpeg)), jpeg),
+            on_picture=lambda jpeg: send(ShotMessage(len(jpeg)), jpeg),
         ),
         seed=job.seed,
         until=job.until,
@@ -85,7 +93,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
     )
 
 
-class _Page:
+class _PageFollower:
     """Shows steps to whoever watches, and waits for its pace."""
 
     def __init__(
@@ -135,7 +143,7 @@ class _Page:
             real_time_factor=self._factor,
             arrived=step.arrived,
         )
-        self._send(Frame(len(frame)), frame)
+        self._send(FrameMessage(len(frame)), frame)
 
     def _measure(self) -> None:
         now, (then, count) = time.monotonic(), self._mark

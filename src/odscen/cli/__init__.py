@@ -11,20 +11,20 @@ from typing import Annotated
 import typer
 
 from odscen import __version__
-from odscen.cli.assets import app as assets
-from odscen.cli.cosim import cosim
-from odscen.cli.demand import app as demand
-from odscen.cli.demo import demo
-from odscen.cli.doctor import doctor
-from odscen.cli.maps import app as maps
-from odscen.cli.output import report_error, report_usage
-from odscen.cli.pull import pull
-from odscen.cli.regression import compare, gate
-from odscen.cli.report import report
-from odscen.cli.runs import resume, run
-from odscen.cli.scenarios import check, export, generate
-from odscen.cli.serve import serve
-from odscen.errors import OdscenError
+from odscen.base.errors import OdscenError
+from odscen.cli.asset_commands import app as assets
+from odscen.cli.console import report_error, report_usage
+from odscen.cli.cosim_commands import cosim
+from odscen.cli.demand_commands import app as demand
+from odscen.cli.demo_command import demo
+from odscen.cli.doctor_command import doctor
+from odscen.cli.map_commands import app as maps
+from odscen.cli.pull_command import pull
+from odscen.cli.regression_commands import compare, gate
+from odscen.cli.report_command import report
+from odscen.cli.run_commands import resume, run
+from odscen.cli.scenario_commands import check, export, generate
+from odscen.cli.serve_command import serve
 
 app = typer.Typer(
     name="odscen",

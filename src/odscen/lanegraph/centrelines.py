@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.errors import OpenDriveError
+from odscen.base.errors import OpenDriveError
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.model import BoolArray, FloatArray
+    from odscen.lanegraph.graphs import BoolArray, FloatArray
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.profiles import IntArray
 

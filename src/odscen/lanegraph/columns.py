@@ -1,6 +1,6 @@
 """The columns of a map graph, and what must hold for them; shared by the file formats.
 
-Each table names the arrays of one part of :class:`~odscen.lanegraph.model.MapGraph` with their
+Each table names the arrays of one part of :class:`~odscen.lanegraph.graphs.MapGraph` with their
 type, so that readers and writers are loops and not lists of names.
 """
 
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.errors import GraphFormatError
+from odscen.base.errors import GraphFormatError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.lanegraph.model import FloatArray, IntArray, MapGraph
+    from odscen.lanegraph.graphs import FloatArray, IntArray, MapGraph
 
 Array = NDArray[Any]
 

@@ -1,7 +1,7 @@
 """Ids of nodes, and what belongs to a set of segments.
 
 The graphs are arrays over dense integers; this module is the only place that turns those into the
-string ids of :mod:`odscen.ids` and back (R24), and that knows which sets of segments are
+string ids of :mod:`odscen.base.ids` and back (R24), and that knows which sets of segments are
 regions of interest (requirements R29 and R31).
 """
 
@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.errors import NotFoundError
-from odscen.ids import LaneKey, NodeId, RoadId, SegmentId
+from odscen.base.errors import NotFoundError
+from odscen.base.ids import LaneKey, NodeId, RoadId, SegmentId
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import networkx as nx
 
-    from odscen.lanegraph.model import BoolArray, IntArray, MapGraph, Segments
+    from odscen.lanegraph.graphs import BoolArray, IntArray, MapGraph, Segments
 
 WALK_PREFIX = "ped."
 
@@ -35,7 +35,7 @@ class Roi:
     segments
         The members, in the map's order.
     rows
-        Their rows of :class:`~odscen.lanegraph.model.Segments`, ascending.
+        Their rows of :class:`~odscen.lanegraph.graphs.Segments`, ascending.
     nodes, edges
         Shapes ``(N,)`` and ``(E,)``: lane-graph nodes inside, and edges with both ends inside.
     walk_nodes, walk_edges

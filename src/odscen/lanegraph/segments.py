@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.ids import JunctionId, RoadId, SegmentId
-from odscen.lanegraph.model import FloatArray, SegmentPart, Segments
+from odscen.base.ids import JunctionId, RoadId, SegmentId
+from odscen.lanegraph.graphs import FloatArray, SegmentPart, Segments
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from odscen.opendrive.model import ContactPoint, OpenDrive, Road, RoadLink
     from odscen.opendrive.profiles import IntArray
+    from odscen.opendrive.road_model import ContactPoint, OpenDrive, Road, RoadLink
 
 TARGET_LENGTH = 100.0
 """Metres; a chain of length L has ``max(1, round(L / TARGET_LENGTH))`` pieces."""
@@ -29,21 +29,21 @@ MIN_PART = 1e-3
 """Metres; a shorter stretch of a road is not listed as a part of a segment."""
 
 
-class _End(NamedTuple):
+class _RoadEnd(NamedTuple):
     """One end of a road."""
 
     road: RoadId
     side: ContactPoint
 
 
-class _Step(NamedTuple):
+class _RoadStep(NamedTuple):
     """A road in a chain; ``forward`` if the chain runs with growing s."""
 
     road: RoadId
     forward: bool
 
 
-class _Place(NamedTuple):
+class _SegmentSpan(NamedTuple):
     """Which segments a road lies in: row ``base + floor((start + sign * s) / piece)``."""
 
     base: int
@@ -57,8 +57,8 @@ class _Place(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class _Chain:
-    steps: tuple[_Step, ...]
+class _RoadChain:
+    steps: tuple[_RoadStep, ...]
     closed: bool
     length: float
     pieces: int
@@ -103,7 +103,7 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
     """
     owned = _roads_of_junctions(odr)
     chains = _chains(odr, target_length)
-    rows = _Rows([], [], [], {}, {})
+    rows = _SegmentRows([], [], [], {}, {})
     for chain in chains:
         rows.add_chain(chain, odr)
     for junction, roads in owned.items():
@@ -129,16 +129,16 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
 
 
 @dataclass(slots=True)
-class _Rows:
+class _SegmentRows:
     """The segments while they are listed."""
 
     ids: list[str]
     parts: list[tuple[SegmentPart, ...]]
     lengths: list[float]
-    places: dict[RoadId, _Place]
+    places: dict[RoadId, _SegmentSpan]
     junctions: dict[JunctionId, int]
 
-    def add_chain(self, chain: _Chain, odr: OpenDrive) -> None:
+    def add_chain(self, chain: _RoadChain, odr: OpenDrive) -> None:
         self.places.update(_places(chain, odr, base=len(self.ids)))
         name = f"r{chain.steps[0].road}"
         self.ids += [name] if chain.pieces == 1 else [f"{name}-{k}" for k in range(chain.pieces)]
@@ -148,7 +148,7 @@ class _Rows:
     def add_junction(self, junction: JunctionId, roads: list[Road]) -> None:
         row = len(self.ids)
         self.junctions[junction] = row
-        self.places.update({road.id: _Place(row, 0.0, 1.0, 1.0, 0) for road in roads})
+        self.places.update({road.id: _SegmentSpan(row, 0.0, 1.0, 1.0, 0) for road in roads})
         self.ids.append(f"j{junction}")
         self.parts.append(tuple(SegmentPart(road.id, 0.0, road.length) for road in roads))
         self.lengths.append(sum(road.length for road in roads))
@@ -178,13 +178,13 @@ def _link(road: Road, side: ContactPoint) -> RoadLink | None:
     return road.predecessor if side == "start" else road.successor
 
 
-def _opposite(end: _End) -> _End:
-    return _End(end.road, "end" if end.side == "start" else "start")
+def _opposite(end: _RoadEnd) -> _RoadEnd:
+    return _RoadEnd(end.road, "end" if end.side == "start" else "start")
 
 
-def _joints(odr: OpenDrive) -> dict[_End, _End]:
+def _joints(odr: OpenDrive) -> dict[_RoadEnd, _RoadEnd]:
     """Find the ends of ordinary roads that name each other: each with the one that it meets."""
-    named: dict[_End, _End] = {}
+    named: dict[_RoadEnd, _RoadEnd] = {}
     for road in odr.roads.values():
         if road.junction is not None:
             continue
@@ -194,19 +194,19 @@ def _joints(odr: OpenDrive) -> dict[_End, _End]:
                 continue
             other = odr.roads.get(RoadId(link.element_id))
             if other is not None and other.junction is None and link.element_s is None:
-                named[_End(road.id, side)] = _End(other.id, link.contact_point)
+                named[_RoadEnd(road.id, side)] = _RoadEnd(other.id, link.contact_point)
     return {end: other for end, other in named.items() if named.get(other) == end}
 
 
-def _chains(odr: OpenDrive, target_length: float) -> list[_Chain]:
+def _chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
     """Maximal chains of ordinary roads: open ones first, then rings, each in file order."""
     joints = _joints(odr)
     ordinary = [road.id for road in odr.roads.values() if road.junction is None]
     seen: set[RoadId] = set()
-    chains: list[_Chain] = []
+    chains: list[_RoadChain] = []
     for rings in (False, True):
         for road in ordinary:
-            starts = [_End(road, "start"), _End(road, "end")]
+            starts = [_RoadEnd(road, "start"), _RoadEnd(road, "end")]
             start = next((end for end in starts if rings or end not in joints), None)
             if road in seen or start is None:
                 continue
@@ -214,32 +214,34 @@ def _chains(odr: OpenDrive, target_length: float) -> list[_Chain]:
             seen.update(step.road for step in steps)
             length = sum(odr.roads[step.road].length for step in steps)
             pieces = max(1, round(length / target_length))
-            chains.append(_Chain(tuple(steps), rings, max(length, MIN_PART), pieces))
+            chains.append(_RoadChain(tuple(steps), rings, max(length, MIN_PART), pieces))
     return chains
 
 
-def _walk(start: _End, joints: Mapping[_End, _End]) -> list[_Step]:
+def _walk(start: _RoadEnd, joints: Mapping[_RoadEnd, _RoadEnd]) -> list[_RoadStep]:
     """Roads met when one enters at ``start`` and goes on to the end or once round the ring."""
-    steps: list[_Step] = []
+    steps: list[_RoadStep] = []
     seen: set[RoadId] = set()
-    entry: _End | None = start
+    entry: _RoadEnd | None = start
     while entry is not None and entry.road not in seen:
-        steps.append(_Step(entry.road, entry.side == "start"))
+        steps.append(_RoadStep(entry.road, entry.side == "start"))
         seen.add(entry.road)
         entry = joints.get(_opposite(entry))
     return steps
 
 
-def _places(chain: _Chain, odr: OpenDrive, *, base: int) -> Iterator[tuple[RoadId, _Place]]:
+def _places(
+    chain: _RoadChain, odr: OpenDrive, *, base: int
+) -> Iterator[tuple[RoadId, _SegmentSpan]]:
     done = 0.0
     for step in chain.steps:
         length = odr.roads[step.road].length
         start, sign = (done, 1.0) if step.forward else (done + length, -1.0)
-        yield step.road, _Place(base, start, sign, chain.piece_length, chain.pieces - 1)
+        yield step.road, _SegmentSpan(base, start, sign, chain.piece_length, chain.pieces - 1)
         done += length
 
 
-def _parts(chain: _Chain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
+def _parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
     """List the stretches of roads in each piece of the chain."""
     pieces: list[list[SegmentPart]] = [[] for _ in range(chain.pieces)]
     done = 0.0
@@ -259,7 +261,7 @@ def _parts(chain: _Chain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
 
 
 def _inside_chains(
-    chains: list[_Chain], places: Mapping[RoadId, _Place]
+    chains: list[_RoadChain], places: Mapping[RoadId, _SegmentSpan]
 ) -> Iterator[tuple[int, int]]:
     for chain in chains:
         base = places[chain.steps[0].road].base
@@ -269,7 +271,7 @@ def _inside_chains(
             yield base, base + chain.pieces - 1
 
 
-def _across_links(odr: OpenDrive, rows: _Rows) -> Iterator[tuple[int, int]]:
+def _across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int]]:
     """Pairs of segments that meet at the end of a road, as its link or a junction says."""
     places = rows.places
     for road in odr.roads.values():
@@ -288,7 +290,7 @@ def _across_links(odr: OpenDrive, rows: _Rows) -> Iterator[tuple[int, int]]:
 
 
 def _across_connections(
-    odr: OpenDrive, places: Mapping[RoadId, _Place]
+    odr: OpenDrive, places: Mapping[RoadId, _SegmentSpan]
 ) -> Iterator[tuple[int, int]]:
     """Pairs of segments that a junction's connections name."""
     for junction in odr.junctions.values():
@@ -304,7 +306,9 @@ def _across_connections(
                 yield places[incoming.id].row(s), there
 
 
-def _row_at_link(odr: OpenDrive, link: RoadLink, places: Mapping[RoadId, _Place]) -> int | None:
+def _row_at_link(
+    odr: OpenDrive, link: RoadLink, places: Mapping[RoadId, _SegmentSpan]
+) -> int | None:
     other = odr.roads.get(RoadId(link.element_id))
     if other is None:
         return None

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import fresnel
 
-from odscen.opendrive.model import Geometry, GeometryKind
 from odscen.opendrive.profiles import FloatArray, IntArray, locate, offsets
+from odscen.opendrive.road_model import Geometry, GeometryKind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -253,10 +253,12 @@ class CubicCurves:
         return u, v, np.arctan2(v1, u1), curvature, change
 
 
-Pair = tuple[FloatArray, FloatArray]
+ArrayPair = tuple[FloatArray, FloatArray]
 
 
-def _derivatives(coefficients: FloatArray, p: FloatArray) -> tuple[Pair, Pair, Pair, Pair]:
+def _derivatives(
+    coefficients: FloatArray, p: FloatArray
+) -> tuple[ArrayPair, ArrayPair, ArrayPair, ArrayPair]:
     """(u, v) and their first three derivatives by p.
 
     The first two axes of ``coefficients`` are (u or v, power), the others broadcast with ``p``.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from odscen.ids import LaneKey, RoadId
+from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.profiles import (
     CubicTable,
@@ -31,7 +31,7 @@ from odscen.opendrive.surface import (
 )
 
 if TYPE_CHECKING:
-    from odscen.opendrive.model import Lane, LaneSection, OpenDrive, Road
+    from odscen.opendrive.road_model import Lane, LaneSection, OpenDrive, Road
 
 BoolArray = NDArray[np.bool_]
 

@@ -11,10 +11,10 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.ids import RoadId
+    from odscen.base.ids import RoadId
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.model import OpenDrive, Outline, RoadObject, Signal, Validity
     from odscen.opendrive.profiles import FloatArray
+    from odscen.opendrive.road_model import OpenDrive, Outline, RoadObject, Signal, Validity
 
 SignalKind = Literal["traffic_light", "pedestrian_light", "stop", "yield", "speed_limit", "other"]
 

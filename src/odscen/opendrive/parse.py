@@ -2,7 +2,7 @@
 
 The parser refuses what it does not understand and never invents: each tolerance is a
 :class:`~odscen.opendrive.parse_rules.Rule`, and each use of one is a sentence in
-:attr:`OpenDrive.notes <odscen.opendrive.model.OpenDrive.notes>`.
+:attr:`OpenDrive.notes <odscen.opendrive.road_model.OpenDrive.notes>`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import re
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from odscen.errors import in_file
-from odscen.opendrive.model import Controller, Header, Junction, OpenDrive, Road
+from odscen.base.errors import in_file
 from odscen.opendrive.parse_checks import check_numbers
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_references import check_references
@@ -29,9 +28,10 @@ from odscen.opendrive.parse_xml import (
     refusal,
     shown,
 )
+from odscen.opendrive.road_model import Controller, Header, Junction, OpenDrive, Road
 
 if TYPE_CHECKING:
-    from odscen.ids import JunctionId, RoadId
+    from odscen.base.ids import JunctionId, RoadId
 
 READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.errors import OpenDriveError
+from odscen.base.errors import OpenDriveError
 from odscen.opendrive import parse_rules as rules
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.parse_rules import Notes, Rule
@@ -20,10 +20,10 @@ from odscen.opendrive.profiles import CubicTable, FloatArray, IntArray
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from odscen.ids import RoadId
-    from odscen.opendrive.model import Road
+    from odscen.base.ids import RoadId
+    from odscen.opendrive.road_model import Road
 
-Name = Callable[[int], str]
+NameOf = Callable[[int], str]
 """Path of the element of a row."""
 
 
@@ -44,7 +44,7 @@ def check_numbers(roads: dict[RoadId, Road], notes: Notes) -> None:
     _check_lane_length(in_order)
 
 
-def _namer(roads: list[Road], groups: list[int], tag: str) -> Name:
+def _namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:
     """Path of row ``i`` of a table with ``groups[k]`` rows of road ``k``."""
     first = np.concatenate([[0], np.cumsum(groups)])
 
@@ -55,7 +55,7 @@ def _namer(roads: list[Road], groups: list[int], tag: str) -> Name:
     return name
 
 
-def _refuse_any(bad: NDArray[np.bool_], name: Name, problem: Callable[[int], str]) -> None:
+def _refuse_any(bad: NDArray[np.bool_], name: NameOf, problem: Callable[[int], str]) -> None:
     for row in _rows(bad):
         raise OpenDriveError(problem(row), element=name(row))
 
@@ -110,7 +110,12 @@ def _check_plan_view(roads: list[Road], notes: Notes) -> None:
 
 
 def _note_joints(
-    plan: PlanView, end_hdg: FloatArray, gap: FloatArray, inner: IntArray, name: Name, notes: Notes
+    plan: PlanView,
+    end_hdg: FloatArray,
+    gap: FloatArray,
+    inner: IntArray,
+    name: NameOf,
+    notes: Notes,
 ) -> None:
     kink = np.zeros(gap.size)
     turn = plan.curves.start_heading(plan.cubic, plan.hdg)[inner + 1] - end_hdg[inner]
@@ -121,7 +126,7 @@ def _note_joints(
         notes.add(Rule.PLAN_VIEW_GAP, name(i), detail)
 
 
-def _check_curves(plan: PlanView, name: Name, notes: Notes) -> None:
+def _check_curves(plan: PlanView, name: NameOf, notes: Notes) -> None:
     """Arc lengths of paramPoly3 curves against their ``length``."""
     rows = np.flatnonzero(plan.cubic >= 0)
     stretch = np.ones(plan.s.size)
@@ -224,7 +229,7 @@ def _extremes(table: CubicTable, ends: FloatArray) -> tuple[FloatArray, FloatArr
     return values[lowest, columns], values.max(axis=0), table.starts + ds[lowest, columns]
 
 
-def _note_jumps(table: CubicTable, ends: FloatArray, name: Name, notes: Notes) -> None:
+def _note_jumps(table: CubicTable, ends: FloatArray, name: NameOf, notes: Notes) -> None:
     """Note where a record does not start with the value that the one before it ends with."""
     if table.starts.size == 0:
         return

@@ -4,14 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from odscen.opendrive.model import (
-    Corner,
-    ObjectRepeat,
-    Outline,
-    RoadObject,
-    Signal,
-    SignalReference,
-)
 from odscen.opendrive.parse_rules import MAX_COORDINATE, Notes, Rule
 from odscen.opendrive.parse_values import speed_factor, validities
 from odscen.opendrive.parse_xml import (
@@ -24,6 +16,14 @@ from odscen.opendrive.parse_xml import (
     optional_number,
     required,
     shown,
+)
+from odscen.opendrive.road_model import (
+    Corner,
+    ObjectRepeat,
+    Outline,
+    RoadObject,
+    Signal,
+    SignalReference,
 )
 
 if TYPE_CHECKING:

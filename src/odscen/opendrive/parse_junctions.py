@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from odscen.ids import JunctionId, RoadId
-from odscen.opendrive.model import (
-    Connection,
-    ContactPoint,
-    Controller,
-    Junction,
-    JunctionPriority,
-)
+from odscen.base.ids import JunctionId, RoadId
 from odscen.opendrive.parse_rules import MAX_LANE_ID, Notes, Rule
 from odscen.opendrive.parse_xml import (
     Element,
@@ -22,6 +15,13 @@ from odscen.opendrive.parse_xml import (
     required,
     shown,
     unread,
+)
+from odscen.opendrive.road_model import (
+    Connection,
+    ContactPoint,
+    Controller,
+    Junction,
+    JunctionPriority,
 )
 
 READ: Final = frozenset({"connection", "priority", "controller", "userData"})

@@ -6,15 +6,6 @@ import itertools
 import sys
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from odscen.opendrive.model import (
-    Lane,
-    LaneAccess,
-    LaneChange,
-    LaneHeight,
-    LaneSection,
-    LaneSpeed,
-    RoadMark,
-)
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
     MAX_ROAD_LENGTH,
@@ -36,6 +27,15 @@ from odscen.opendrive.parse_xml import (
     refusal,
     required,
     unread,
+)
+from odscen.opendrive.road_model import (
+    Lane,
+    LaneAccess,
+    LaneChange,
+    LaneHeight,
+    LaneSection,
+    LaneSpeed,
+    RoadMark,
 )
 
 if TYPE_CHECKING:

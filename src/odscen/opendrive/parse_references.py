@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from odscen.ids import JunctionId, RoadId
-from odscen.opendrive.model import (
+from odscen.base.ids import JunctionId, RoadId
+from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
+from odscen.opendrive.road_model import (
     Connection,
     Controller,
     Junction,
@@ -14,7 +15,6 @@ from odscen.opendrive.model import (
     Road,
     RoadLink,
 )
-from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from odscen.ids import JunctionId, RoadId
-from odscen.opendrive.model import (
-    ContactPoint,
-    Cubic,
-    Geometry,
-    GeometryKind,
-    Road,
-    RoadLink,
-    RoadType,
-    TrafficRule,
-)
+from odscen.base.ids import JunctionId, RoadId
 from odscen.opendrive.parse_furniture import parse_objects, parse_signals
 from odscen.opendrive.parse_lanes import parse_sections
 from odscen.opendrive.parse_rules import (
@@ -35,6 +25,16 @@ from odscen.opendrive.parse_xml import (
     positive,
     refusal,
     required,
+)
+from odscen.opendrive.road_model import (
+    ContactPoint,
+    Cubic,
+    Geometry,
+    GeometryKind,
+    Road,
+    RoadLink,
+    RoadType,
+    TrafficRule,
 )
 
 READ: Final = frozenset(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, cast
 
-from odscen.opendrive.model import Cubic, Validity
 from odscen.opendrive.parse_rules import MAX_LANE_ID, MAX_NUMBER, Notes, Rule
 from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal, shown
+from odscen.opendrive.road_model import Cubic, Validity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
 
-from odscen.errors import OpenDriveError
+from odscen.base.errors import OpenDriveError
 
 if TYPE_CHECKING:
     from collections.abc import Container, Mapping

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from odscen.opendrive.model import Cubic
+    from odscen.opendrive.road_model import Cubic
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

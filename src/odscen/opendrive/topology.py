@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from odscen.ids import LaneKey, RoadId
+from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.opendrive.model import (
+    from odscen.opendrive.road_model import (
         Connection,
         ContactPoint,
         Junction,

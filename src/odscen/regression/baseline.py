@@ -13,17 +13,17 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
-from odscen.errors import InputError, in_file
-from odscen.regression.measure import Key
-from odscen.results.records import json_with_rows
+from odscen.base.errors import InputError, in_file
+from odscen.regression.measure import FigureKey
+from odscen.results.records.run_records import json_with_rows
 from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from odscen.regression.measure import Kind, Measured
-    from odscen.scenario.document import Scenario
+    from odscen.regression.measure import Measured, PlaceKind
+    from odscen.scenario.document.scenario_document import Scenario
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -31,7 +31,7 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
-_KINDS: tuple[Kind, ...] = ("segment", "junction", "actor")
+_KINDS: tuple[PlaceKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
 """What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""
@@ -45,7 +45,7 @@ class Baseline:
 
     seeds: tuple[int, ...]
     fingerprint: Fingerprint
-    figures: dict[Key, tuple[float | None, ...]]
+    figures: dict[FigureKey, tuple[float | None, ...]]
 
 
 def fingerprint(
@@ -157,15 +157,15 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
         msg = f"format {data['format']!r} version {data['version']!r} is not a baseline"
         raise InputError(msg)
     seeds = tuple(int(seed) for seed in data["seeds"])
-    figures: dict[Key, tuple[float | None, ...]] = {}
+    figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:
         if "figure" in row:
-            figures[Key("run", "", row["figure"])] = _values(row["values"], seeds)
+            figures[FigureKey("run", "", row["figure"])] = _values(row["values"], seeds)
             continue
         kind = next(kind for kind in _KINDS if kind in row)
         for name, values in row.items():
             if name != kind:
-                figures[Key(kind, row[kind], name)] = _values(values, seeds)
+                figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)
     return Baseline(seeds, dict(data["fingerprint"]), figures)
 
 

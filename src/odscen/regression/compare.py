@@ -7,14 +7,14 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from odscen.errors import InputError
+from odscen.base.errors import InputError
 from odscen.regression.measure import measure
-from odscen.results.comparison import CONFIDENCE, compare_figure
-from odscen.results.place_shapes import place_shapes
-from odscen.results.traffic_files import read_tables
-from odscen.results.units import unit_of, with_unit
-from odscen.sumo.ended import read_summary
-from odscen.sumo.layout import FIGURES_FOLDER, SUMMARY_FILE
+from odscen.results.measures.comparison import CONFIDENCE, compare_figure
+from odscen.results.measures.traffic_files import read_tables
+from odscen.results.measures.units import unit_of, with_unit
+from odscen.results.report.place_shapes import place_shapes
+from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.layout import FIGURES_FOLDER, SUMMARY_FILE
 from odscen.workflow import load_map
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.catalog.store import Workspace
-    from odscen.regression.measure import Key, Measured
-    from odscen.results.comparison import Difference
-    from odscen.results.place_shapes import PlaceShapes
+    from odscen.regression.measure import FigureKey, Measured
+    from odscen.results.measures.comparison import Difference
+    from odscen.results.report.place_shapes import PlaceShapes
+    from odscen.workspace.store import Workspace
 
 FORMAT = "odscen-comparison"
 VERSION = 1
@@ -58,7 +58,7 @@ class RunSet:
 class Row:
     """One figure on both sides."""
 
-    key: Key
+    key: FigureKey
     difference: Difference
 
     @property

@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.catalog.markup import Markup, element, join, number, path_data
+from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.regression.figure_words import in_words
-from odscen.results.plots import Dots, dot_chart, legend
-from odscen.results.report import html_page
-from odscen.results.report_flow import DENSITY, FLOW, column
-from odscen.results.report_map import fitted_view, scale_bar, view_box
-from odscen.results.report_tables import html_table, report_section
-from odscen.results.report_words import stretch
-from odscen.results.units import with_unit
+from odscen.results.measures.units import with_unit
+from odscen.results.report.plots import Dots, dot_chart, legend
+from odscen.results.report.report_flow import DENSITY, FLOW, column
+from odscen.results.report.report_map import fitted_view, scale_bar, view_box
+from odscen.results.report.report_tables import html_table, report_section
+from odscen.results.report.report_words import stretch
+from odscen.results.report.run_report import html_page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.regression.compare import Row, RunComparison, RunSet
-    from odscen.results.place_shapes import PlaceShapes
+    from odscen.results.report.place_shapes import PlaceShapes
 
 STEPS = (0.05, 0.15, 0.3)
 """Limits between the colours of the map, as shares of the value in A."""

@@ -10,9 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from odscen.catalog.assets import shipped_assets
-from odscen.catalog.store import name_from_file
-from odscen.errors import InputError, in_file
+from odscen.base.errors import InputError, in_file
 from odscen.regression.baseline import (
     baseline_of,
     changed_inputs,
@@ -22,24 +20,26 @@ from odscen.regression.baseline import (
 )
 from odscen.regression.measure import measure
 from odscen.regression.verdict import hold_against
-from odscen.results.expectations import evaluate, needs_criticality
-from odscen.scenario.problems import refuse_errors
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.recording import Recording
-from odscen.sumo.runner import RunJob, run_many
+from odscen.results.measures.expectations import evaluate, needs_criticality
+from odscen.scenario.document.problems import refuse_errors
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_jobs import RunJob, run_many
 from odscen.workflow import check_scenario, load_map, read_scenario
+from odscen.workspace.asset_catalogue import shipped_assets
+from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from odscen.catalog.store import MapEntry, Workspace
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
-    from odscen.regression.verdict import Verdict
-    from odscen.scenario.document import Scenario
-    from odscen.sumo.progress import Progress
-    from odscen.sumo.runner import RunResult
+    from odscen.regression.verdict import BaselineVerdict
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.runner.run_jobs import RunResult
+    from odscen.sumo.worker.protocol import Progress
+    from odscen.workspace.store import MapEntry, Workspace
 
 Status = Literal["passed", "failed", "error"]
 
@@ -75,7 +75,7 @@ class CaseResult:
     map_name: str
     runs: tuple[SeedResult, ...]
     changed_inputs: tuple[str, ...] = ()
-    verdict: Verdict | None = None
+    verdict: BaselineVerdict | None = None
     problems: tuple[str, ...] = ()
     updated: bool = False
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from odscen.regression.words import lines, reason
+from odscen.regression.suite_words import lines, reason
 
 if TYPE_CHECKING:
     from odscen.regression.gates import CaseResult, SuiteResult

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from odscen.errors import InputError, in_file
-from odscen.results.expectations import COUNTS
-from odscen.results.summary import actors_from_json
-from odscen.results.traffic import over_run
-from odscen.sumo import layout
-from odscen.sumo.measured import read_figures
+from odscen.base.errors import InputError, in_file
+from odscen.results.measures.expectations import COUNTS
+from odscen.results.measures.summary import actors_from_json
+from odscen.results.measures.traffic import over_run
+from odscen.sumo.folder import layout
+from odscen.sumo.outputs.measured import read_figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
     from typing import Any
 
-    from odscen.results.traffic import TrafficFigures
+    from odscen.results.measures.traffic import TrafficFigures
 
-Kind = Literal["run", "segment", "junction", "actor"]
+PlaceKind = Literal["run", "segment", "junction", "actor"]
 
 DIGITS = 4
 """Decimals kept: far below what matters, and readable in a diff."""
 
 
-class Key(NamedTuple):
+class FigureKey(NamedTuple):
     """A figure and its place; ``place`` is empty for figures of the whole run."""
 
-    kind: Kind
+    kind: PlaceKind
     place: str
     figure: str
 
@@ -37,7 +37,7 @@ class Key(NamedTuple):
         return f"{self.kind} {self.place}: {self.figure}" if self.place else self.figure
 
 
-Measured = dict[Key, float | None]
+Measured = dict[FigureKey, float | None]
 
 
 def run_figures(summary: Mapping[str, Any]) -> Measured:
@@ -46,20 +46,20 @@ def run_figures(summary: Mapping[str, Any]) -> Measured:
     values |= {name: (summary.get("actors") or {}).get(name) for name in COUNTS}
     values |= summary.get("figures") or {}
     return {
-        Key("run", "", name): None if value is None else round(float(value), DIGITS)
+        FigureKey("run", "", name): None if value is None else round(float(value), DIGITS)
         for name, value in values.items()
         if value is None or isinstance(value, int | float)
     }
 
 
-_PLACES: dict[str, tuple[Kind, dict[str, str]]] = {
+_PLACES: dict[str, tuple[PlaceKind, dict[str, str]]] = {
     "segments": ("segment", {"vehicles": "vehicles", "mean_speed": "speed", "free_speed": "free"}),
     "junctions": ("junction", {"vehicles": "vehicles", "waiting_time": "waiting"}),
 }
 """Tables with the kind of their places, and their figures by the names that baselines have."""
 
 
-def place_figures(figures: TrafficFigures) -> Iterator[tuple[Key, float | None]]:
+def place_figures(figures: TrafficFigures) -> Iterator[tuple[FigureKey, float | None]]:
     """Figures of each segment and junction over the whole run."""
     import polars as pl
 
@@ -69,7 +69,7 @@ def place_figures(figures: TrafficFigures) -> Iterator[tuple[Key, float | None]]
             rows = rows.with_columns(free=1000.0 * pl.col("length") / pl.col("free_flow_time"))
         for row in rows.iter_rows(named=True):
             for name, column in names.items():
-                yield Key(kind, row[kind], name), row[column]
+                yield FigureKey(kind, row[kind], name), row[column]
 
 
 def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
@@ -93,7 +93,7 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
             actors = actors_from_json(actors_file.read_text(encoding="utf-8"))
         for actor in actors:
             if actor.flow is None:
-                found[Key("actor", actor.id, "travel_time")] = actor.travel_time
+                found[FigureKey("actor", actor.id, "travel_time")] = actor.travel_time
         figures = read_figures(folder, end=summary["sim_seconds"])
     except (OSError, pl.exceptions.PolarsError) as error:
         msg = f"files of the run cannot be read: {error}"

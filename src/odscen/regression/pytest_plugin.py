@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from odscen.sumo.runner import RunResult
+    from odscen.sumo.runner.run_jobs import RunResult
 
 _SUFFIX = ".scenario.json"
 
@@ -77,7 +77,7 @@ class _ScenarioTest(pytest.Item):
         self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None
     ) -> str:
         """Errors of odscen in their own words, without Python's traceback."""
-        from odscen.errors import OdscenError
+        from odscen.base.errors import OdscenError
 
         if isinstance(excinfo.value, OdscenError):
             return str(excinfo.value)
@@ -136,8 +136,8 @@ def _run(
     from pathlib import Path
 
     from odscen import workflow
-    from odscen.catalog.store import Workspace
-    from odscen.results.expectations import parse_expectation
+    from odscen.results.measures.expectations import parse_expectation
+    from odscen.workspace.store import Workspace
 
     named = workspace or config.getoption("--odscen-workspace")
     (result,) = workflow.run(

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from odscen.errors import InputError, ScenarioError
+from odscen.base.errors import InputError, ScenarioError
 from odscen.regression.tolerance import PLACE_FIGURES, Tolerances, parse_tolerance
-from odscen.results.expectations import NAMES, parse_expectation
-from odscen.scenario.document import Label, Part
-from odscen.scenario.files import validation_problems
+from odscen.results.measures.expectations import NAMES, parse_expectation
+from odscen.scenario.document.json_form import validation_problems
+from odscen.scenario.document.scenario_document import Label, Part
 from odscen.workflow import folder_name
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.regression.tolerance import Tolerance
-    from odscen.results.expectations import Expectation
+    from odscen.results.measures.expectations import Expectation
 
 Seeds = Annotated[
     tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], Field(min_length=1, max_length=1000)
@@ -59,7 +59,7 @@ class _ScenarioEntry(_Settings):
     file: Label
 
 
-class _Document(_Settings):
+class _SuiteDocument(_Settings):
     name: Label | None = None
     maps: tuple[Label, ...] = ()
     scenarios: tuple[Label, ...] = ()
@@ -109,14 +109,14 @@ def read_suite(file: Path) -> Suite:
         msg = f"the suite cannot be read: {error}"
         raise InputError(msg, file=str(file)) from error
     try:
-        document = _Document.model_validate(data)
+        document = _SuiteDocument.model_validate(data)
     except ValidationError as error:
         msg = "the suite has problems"
         raise ScenarioError(msg, problems=validation_problems(error), file=str(file)) from error
     return _suite(document, file)
 
 
-def _suite(document: _Document, file: Path) -> Suite:
+def _suite(document: _SuiteDocument, file: Path) -> Suite:
     named = [("scenarios", pattern, _ScenarioEntry(file=pattern)) for pattern in document.scenarios]
     named += [("scenario", entry.file, entry) for entry in document.scenario]
     folder = None if document.baselines is None else file.parent / document.baselines
@@ -152,7 +152,7 @@ def _found(file: Path, key: str, pattern: str) -> list[Path]:
     return found
 
 
-def _case(document: _Document, entry: _ScenarioEntry, path: Path, folder: Path | None) -> Case:
+def _case(document: _SuiteDocument, entry: _ScenarioEntry, path: Path, folder: Path | None) -> Case:
     name = folder_name(path)
     tolerances = _tolerances(document.tolerance) | _tolerances(entry.tolerance)
     expect = dict.fromkeys((*document.expect, *entry.expect))

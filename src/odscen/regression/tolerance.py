@@ -6,14 +6,14 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.errors import InputError
-from odscen.results.expectations import COUNTS
-from odscen.results.units import in_unit_of, with_unit
+from odscen.base.errors import InputError
+from odscen.results.measures.expectations import COUNTS
+from odscen.results.measures.units import in_unit_of, with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.regression.measure import Key
+    from odscen.regression.measure import FigureKey
 
 _PART = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>%|[A-Za-z][A-Za-z/]*)?")
 
@@ -90,7 +90,7 @@ class Tolerances:
 
     given: Mapping[tuple[str, str], Tolerance]
 
-    def of(self, key: Key) -> Tolerance:
+    def of(self, key: FigureKey) -> Tolerance:
         """Tolerance of one figure."""
         own = (key.kind, key.figure)
         return self.given.get(own, _USUAL.get(own, ORDINARY))

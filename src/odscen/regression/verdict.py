@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.regression.tolerance import EXACT
-from odscen.results.comparison import compare_figure
-from odscen.results.units import with_unit
+from odscen.results.measures.comparison import compare_figure
+from odscen.results.measures.units import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.regression.baseline import Baseline
-    from odscen.regression.measure import Key, Measured
+    from odscen.regression.measure import FigureKey, Measured
     from odscen.regression.tolerance import Tolerance, Tolerances
-    from odscen.results.comparison import Difference
+    from odscen.results.measures.comparison import Difference
 
 FEWEST = 5
 """A place with fewer vehicles, as a mean over the seeds, is told of but fails nothing."""
@@ -29,7 +29,7 @@ _NOISE = 1e-4
 class Change:
     """A figure that is not as it was; ``score`` orders places by how much they have changed."""
 
-    key: Key
+    key: FigureKey
     difference: Difference
     tolerance: Tolerance
     score: float
@@ -59,7 +59,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class BaselineVerdict:
     """Figures of a scenario outside their tolerance.
 
     Attributes
@@ -91,7 +91,7 @@ class Verdict:
 
 def hold_against(
     baseline: Baseline, runs: Mapping[int, Measured], tolerances: Tolerances
-) -> Verdict:
+) -> BaselineVerdict:
     """Hold new runs, given by seed, against a baseline, by the means over the seeds of both."""
     seeds = [seed for seed in baseline.seeds if seed in runs]
     position = {seed: index for index, seed in enumerate(baseline.seeds)}
@@ -116,11 +116,11 @@ def hold_against(
             chosen.sort(key=lambda change: (not change.counts, -change.score, change.key))
         return tuple(chosen)
 
-    return Verdict(of("run"), of("segment", "junction"), of("actor"))
+    return BaselineVerdict(of("run"), of("segment", "junction"), of("actor"))
 
 
 def _change(
-    key: Key, difference: Difference, tolerances: Tolerances, weight: float
+    key: FigureKey, difference: Difference, tolerances: Tolerances, weight: float
 ) -> Change | None:
     tolerance = tolerances.of(key)
     if difference.a is None or difference.b is None:
@@ -142,7 +142,7 @@ def _change(
 
 
 def _vehicles(
-    key: Key,
+    key: FigureKey,
     baseline: Baseline,
     runs: Mapping[int, Measured],
     seeds: list[int],

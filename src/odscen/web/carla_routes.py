@@ -9,11 +9,11 @@ from contextlib import suppress
 from fastapi import APIRouter
 from starlette.responses import Response, StreamingResponse
 
-from odscen.errors import NotFoundError
-from odscen.sumo import layout
+from odscen.base.errors import NotFoundError
+from odscen.sumo.folder import layout
+from odscen.web.active_runs import Active
 from odscen.web.messages import CarlaInfo
 from odscen.web.run_routes import page_of_run
-from odscen.web.runs import Active
 from odscen.web.services import Shared
 
 router = APIRouter(prefix="/api")

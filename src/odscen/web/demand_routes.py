@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen import demands
-from odscen.errors import InputError
-from odscen.scenario.document import Identifier, Scenario
+from odscen.base.errors import InputError
+from odscen.scenario.document.scenario_document import Identifier, Scenario
 from odscen.web.messages import DayMade, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared

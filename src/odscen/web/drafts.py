@@ -13,20 +13,26 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from odscen.catalog.store import check_name
-from odscen.errors import ConflictError, InputError, NotFoundError, ScenarioError, WorkspaceError
-from odscen.scenario.files import dumps
+from odscen.base.errors import (
+    ConflictError,
+    InputError,
+    NotFoundError,
+    ScenarioError,
+    WorkspaceError,
+)
+from odscen.scenario.document.json_form import dumps
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
 from odscen.workflow import SUFFIX, write_text
+from odscen.workspace.store import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from odscen.catalog.store import Workspace
-    from odscen.scenario.document import Scenario
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True)

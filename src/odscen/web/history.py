@@ -15,13 +15,13 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from odscen.scenario.files import loads
+from odscen.scenario.document.json_form import loads
 from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.scenario.document import Scenario
+    from odscen.scenario.document.scenario_document import Scenario
 
 DEPTH = 200
 """Edits that can be undone."""
@@ -29,7 +29,7 @@ INDEX = "index.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class HistoryEntry:
     """A document after an edit; ``file`` in the history's folder holds it."""
 
     label: str
@@ -52,7 +52,7 @@ class History:
 
     version: int
     sha256: str
-    entries: tuple[Entry, ...]
+    entries: tuple[HistoryEntry, ...]
     position: int
 
     @property
@@ -81,7 +81,7 @@ def first(text: str, folder: Path, *, label: str) -> History:
 def grown(history: History, text: str, folder: Path, *, label: str) -> History:
     """Add a document; those that could be made again are forgotten. Written before it returns."""
     version = history.version + 1
-    entry = Entry(label, f"{version:08d}.json.z")
+    entry = HistoryEntry(label, f"{version:08d}.json.z")
     kept = history.entries[: history.position + 1][-DEPTH:]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / entry.file).write_bytes(zlib.compress(text.encode(), 1))
@@ -105,7 +105,7 @@ def read(folder: Path) -> History | None:
     """History in a folder; ``None`` if there is none that can be read."""
     try:
         data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
-        entries = tuple(Entry(**entry) for entry in data["entries"])
+        entries = tuple(HistoryEntry(**entry) for entry in data["entries"])
         history = History(int(data["version"]), str(data["sha256"]), entries, data["position"])
         return history if 0 <= history.position < len(entries) else None
     except (OSError, ValueError, KeyError, TypeError):

@@ -7,14 +7,14 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-from odscen.errors import NotFoundError, OdscenError
-from odscen.web.errors import error_info
+from odscen.base.errors import NotFoundError, OdscenError
+from odscen.web.error_answers import error_info
 from odscen.web.messages import ErrorInfo, JobInfo
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.catalog.store import Progress
+    from odscen.workspace.store import ProgressCallback
 
 _KEPT = 200
 """Finished jobs that are remembered."""
@@ -29,7 +29,7 @@ class Jobs:
         self._numbers = itertools.count(1)
         self._jobs: dict[str, JobInfo] = {}
 
-    def start(self, work: Callable[[Progress], str]) -> str:
+    def start(self, work: Callable[[ProgressCallback], str]) -> str:
         """Take on work that tells its progress and returns the name of what it made."""
         name = f"job-{next(self._numbers)}"
         self._set(JobInfo(id=name, state="queued", step="waiting", share=0.0))
@@ -54,7 +54,7 @@ class Jobs:
         """Drop what has not begun."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def _run(self, name: str, work: Callable[[Progress], str]) -> None:
+    def _run(self, name: str, work: Callable[[ProgressCallback], str]) -> None:
         def progress(step: str, share: float) -> None:
             self._set(JobInfo(id=name, state="running", step=step, share=min(1.0, share)))
 

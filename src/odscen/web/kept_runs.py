@@ -6,13 +6,13 @@ import hashlib
 import json
 from typing import TYPE_CHECKING, Any
 
-from odscen.catalog.store import check_name
-from odscen.durations import clock
-from odscen.errors import NotFoundError
-from odscen.sumo import layout
-from odscen.sumo.long_runs import about
-from odscen.sumo.status import going, read_status
+from odscen.base.durations import clock
+from odscen.base.errors import NotFoundError
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.run_status import going, read_status
+from odscen.sumo.runner.long_runs import about
 from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
+from odscen.workspace.store import check_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,12 +11,10 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
-from odscen.catalog.shipped import shipped_maps
-from odscen.catalog.store import check_name, name_from_file
-from odscen.categories import DEFAULT_BODY
-from odscen.errors import ConflictError
-from odscen.scenario.profiles import BUILT_IN
-from odscen.sumo.signals import scenario_lights
+from odscen.base.categories import DEFAULT_BODY
+from odscen.base.errors import ConflictError
+from odscen.scenario.demand.day_profiles import BUILT_IN
+from odscen.sumo.realize.program_files import scenario_lights
 from odscen.web.messages import (
     AssetsInfo,
     BlueprintInfo,
@@ -31,9 +29,11 @@ from odscen.web.messages import (
 from odscen.web.packed import answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
 from odscen.workflow import load_map
+from odscen.workspace.shipped import shipped_maps
+from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
-    from odscen.catalog.store import MapEntry, Progress
+    from odscen.workspace.store import MapEntry, ProgressCallback
 
 router = APIRouter(prefix="/api")
 
@@ -111,7 +111,7 @@ def add_map(
         shutil.rmtree(folder)
         raise
 
-    def work(progress: Progress) -> str:
+    def work(progress: ProgressCallback) -> str:
         try:
             return shared.workspace.add_map(source, name=name, progress=progress).name
         finally:
@@ -124,7 +124,7 @@ def add_map(
 def add_shipped_maps(shared: Shared) -> JobStarted:
     """Add the maps that ship with odscen."""
 
-    def work(progress: Progress) -> str:
+    def work(progress: ProgressCallback) -> str:
         paths = shipped_maps()
         for number, path in enumerate(paths):
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from odscen.categories import Category
-from odscen.scenario.document import Scenario
+from odscen.base.categories import Category
+from odscen.scenario.document.scenario_document import Scenario
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Version = Annotated[int, Field(ge=0, lt=2**53)]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from starlette.requests import Request
 
-    from odscen.catalog.store import MapEntry
+    from odscen.workspace.store import MapEntry
 
 
 class Packed(NamedTuple):

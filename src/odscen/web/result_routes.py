@@ -8,8 +8,8 @@ from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
 from odscen import demands
-from odscen.scenario.counting import place_points
-from odscen.sumo.layout import SCENARIO_FILE
+from odscen.scenario.demand.count_stations import place_points
+from odscen.sumo.folder.layout import SCENARIO_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
 from odscen.workflow import read_scenario

@@ -70,7 +70,7 @@ class RunStarted(Answer):
     run: str
 
 
-class Control(Body):
+class RunControl(Body):
     """Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
 
     ``interrupt`` ends a long run at once, so that it can go on later.

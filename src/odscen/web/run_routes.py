@@ -13,21 +13,21 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
-from odscen.errors import InputError, NotFoundError
-from odscen.results.curves import SpeedShares, run_curves
-from odscen.results.records import EventKind, Plan, event_row, events_from_json
-from odscen.results.replay import replay_columns
-from odscen.results.summary import actors_from_json
-from odscen.results.traces import Counts, SpeedCurve
-from odscen.sumo import layout
-from odscen.sumo.recorded import read_trajectories
-from odscen.web.live import LiveView
+from odscen.base.errors import InputError, NotFoundError
+from odscen.results.measures.curves import SpeedShares, run_curves
+from odscen.results.measures.summary import actors_from_json
+from odscen.results.records.replay import replay_columns
+from odscen.results.records.run_records import EventKind, Plan, event_row, events_from_json
+from odscen.results.records.traces import ActorCounts, SpeedCurve
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.recorded import read_trajectories
+from odscen.web.live_view import LiveView
 from odscen.web.packed import answer, pack
 from odscen.web.run_messages import (
-    Control,
     GoOn,
     NewRun,
     RunContent,
+    RunControl,
     RunCurve,
     RunCurves,
     RunEvents,
@@ -93,7 +93,7 @@ def remove(run: str, shared: Shared) -> None:
 
 
 @router.post("/{run}/control")
-def control(run: str, wish: Control, shared: Shared) -> RunInfo:
+def control(run: str, wish: RunControl, shared: Shared) -> RunInfo:
     """Pause, resume, step, change the speed of, or stop a run."""
     return shared.runs.control(run, wish)
 
@@ -206,7 +206,7 @@ def _sim_seconds(said: dict[str, Any]) -> float:
     return float(seconds) if isinstance(seconds, int | float) else 0.0
 
 
-def _lists(columns: Counts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
+def _lists(columns: ActorCounts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
     """Columns to four digits, as JSON has them: no number is null."""
     return {
         name: [None if math.isnan(v) else round(v, 4) for v in column.tolist()]

@@ -8,21 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
-from odscen.catalog.store import check_name, name_from_file
-from odscen.categories import Category
-from odscen.errors import InputError, NotFoundError
-from odscen.lanegraph.paths import Router
-from odscen.scenario.checks import check
-from odscen.scenario.document import Scenario
-from odscen.scenario.edits import eligible_segments, new_scenario, removable_segments
-from odscen.scenario.files import dumps, read_any
-from odscen.scenario.graphform import to_graphml
-from odscen.scenario.problems import Problem
-from odscen.scenario.region import Place as GraphPlace
-from odscen.scenario.region import name_of, place_of
-from odscen.sumo.paths import each_path
-from odscen.sumo.people import RoadUser
-from odscen.web.edits import EditRequest, apply_edit
+from odscen.base.categories import Category
+from odscen.base.errors import InputError, NotFoundError
+from odscen.lanegraph.shortest_paths import Router
+from odscen.scenario.checks.scenario_checks import check
+from odscen.scenario.document.json_form import dumps, read_any
+from odscen.scenario.document.problems import Problem
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.edits.scenario_edits import eligible_segments, new_scenario, removable_segments
+from odscen.scenario.forms.graph_form import to_graphml
+from odscen.scenario.placing.region import NodePlace as GraphPlace
+from odscen.scenario.placing.region import name_of, place_of
+from odscen.sumo.realize.road_users import RoadUser
+from odscen.sumo.realize.route_paths import each_path
+from odscen.web.edit_messages import EditRequest, apply_edit
 from odscen.web.messages import (
     CopyName,
     Goals,
@@ -37,9 +36,10 @@ from odscen.web.messages import (
 )
 from odscen.web.services import Services, Shared, region_of
 from odscen.workflow import SUFFIX, load_map
+from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
-    from odscen.scenario.region import Region
+    from odscen.scenario.placing.region import Region
     from odscen.web.drafts import Draft
 
 router = APIRouter(prefix="/api/scenarios")
@@ -98,7 +98,7 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
 
 @router.post("/{name}/edits")
 def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
-    """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
+    """Make edits, all or none; each kind is a function of ``odscen.scenario.edits.scenario_edits``."""
 
     def change(scenario: Scenario) -> Scenario:
         loaded = shared.map_of(scenario)

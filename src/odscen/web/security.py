@@ -16,7 +16,7 @@ from fastapi import HTTPException
 from starlette.datastructures import Headers
 from starlette.responses import RedirectResponse
 
-from odscen.web.errors import error_response
+from odscen.web.error_answers import error_response
 
 if TYPE_CHECKING:
     from collections.abc import Collection

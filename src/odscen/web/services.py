@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from odscen.catalog.store import Workspace
-from odscen.scenario.region import Region
-from odscen.web.carla import CarlaServer
+from odscen.scenario.placing.region import Region
+from odscen.web.active_runs import Runs
+from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
-from odscen.web.runs import Runs
 from odscen.workflow import LoadedMap, load_map
+from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
     from odscen.carla.client import Address
-    from odscen.scenario.document import Scenario
+    from odscen.scenario.document.scenario_document import Scenario
 
 
 @dataclass(slots=True)

@@ -1,0 +1,120 @@
+"""What commands share: options, JSON on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from odscen.base.errors import OdscenError
+
+WorkspaceOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--workspace",
+        help="Folder with maps, scenarios and runs. [default: $ODSCEN_WORKSPACE, "
+        "else the user's data folder]",
+        file_okay=False,
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")
+]
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Write one JSON object to stdout; NaN and infinity are refused rather than written."""
+    sys.stdout.write(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def log(message: str) -> None:
+    """Write a line for people to stderr."""
+    typer.echo(message, err=True)
+
+
+def report_error(error: OdscenError) -> None:
+    """Write an error to stderr, and as JSON to stdout if the command line asked for JSON."""
+    typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+    if "--json" in sys.argv[1:]:
+        print_json({"error": error_fields(error)})
+
+
+def report_usage(message: str) -> None:
+    """Write what is wrong with the command line as JSON to stdout, if it asked for JSON."""
+    if "--json" in sys.argv[1:]:
+        print_json({"error": {"type": "UsageError", "message": message}})
+
+
+def error_fields(error: OdscenError) -> dict[str, Any]:
+    """An error as data: its type, its message, and the file and element if it has them."""
+    places = {key: getattr(error, key, None) for key in ("file", "element")}
+    return {
+        "type": type(error).__name__,
+        "message": str(error),
+        **{key: value for key, value in places.items() if value is not None},
+    }
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Write a table to stdout; numbers are right-aligned. Without ``columns`` it has no head."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(
+        title=title or None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+        show_header=bool(columns),
+    )
+    for index in range(len(rows[0]) if rows else len(columns)):
+        numeric = bool(rows) and all(isinstance(row[index], int | float) for row in rows)
+        name = columns[index] if columns else ""
+        table.add_column(
+            name,
+            justify="right" if numeric else "left",
+            no_wrap=index == 0 or numeric,
+            overflow="fold",
+        )
+    for row in rows:
+        table.add_row(*(_cell(value) for value in row))
+    Console().print(table)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:,.2f}"
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}"
+    return "-" if value is None else str(value)
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[str, float], None]]:
+    """Yield a function that shows what is being done and the share done, 0 to 1, on stderr.
+
+    A bar on a terminal; nothing elsewhere, where a log of steps would only be noise.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _what, _share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[what]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0, what="")
+        yield lambda what, share: bar.update(task, completed=share, what=what)

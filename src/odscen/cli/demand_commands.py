@@ -1,0 +1,237 @@
+"""``odscen demand``: traffic around the placed actors, from tables or made up, and how it fits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from odscen.base.errors import InputError
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
+from odscen.cli.scenario_commands import ScenarioArgument
+
+if TYPE_CHECKING:
+    from odscen.sumo.calibrate.count_fit import CountFits
+
+app = typer.Typer(
+    help="Traffic from tables of trips and counts, or made up, and how well it fits counts.",
+    no_args_is_help=True,
+)
+
+OutOption = Annotated[
+    Path | None,
+    typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
+]
+NameOption = Annotated[
+    str | None, typer.Option("--id", help="Name of this part of the demand. [default: its kind]")
+]
+MixOption = Annotated[
+    str | None,
+    typer.Option(help="Relative shares of categories.", metavar="car=8,bus=1"),
+]
+DayOption = Annotated[
+    str | None,
+    typer.Option("--day", help="Day profile: weekday, weekend, or one of the scenario's own."),
+]
+
+
+@app.command("import")
+def import_(
+    scenario: ScenarioArgument,
+    trips: Annotated[
+        Path | None,
+        typer.Option("--od", help="Table of trips: from,to,trips[,begin,end].", metavar="CSV"),
+    ] = None,
+    counts: Annotated[
+        Path | None, typer.Option(help="Table of counts: place,begin,end,count.", metavar="CSV")
+    ] = None,
+    profile: Annotated[
+        Path | None, typer.Option(help="Table of a day profile: [time,]share.", metavar="CSV")
+    ] = None,
+    zones: Annotated[
+        Path | None, typer.Option(help="Table of zones: zone,segment.", metavar="CSV")
+    ] = None,
+    name: NameOption = None,
+    mix: MixOption = None,
+    day: DayOption = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Read tables into a scenario: zones, day profiles, trips from where to where, counts.
+
+    The scenario holds the values; the tables are not needed any more. What has the same name is
+    replaced.
+    """
+    from odscen import demands, workflow
+    from odscen.workspace.store import Workspace
+
+    store = Workspace.open(workspace)
+    document = workflow.read_scenario(scenario)
+    common: dict[str, Any] = {"mix": parse_mix(mix)} if mix else {}
+    tables = {"zones": zones, "profile": profile, "od": trips, "counts": counts}
+    given = {kind: file for kind, file in tables.items() if file is not None}
+    if not given:
+        msg = "name a table to import: --od, --counts, --profile or --zones"
+        raise InputError(msg)
+    for kind, file in given.items():
+        document = demands.import_table(
+            store, document, file, kind=kind, name=name, day=day, **common
+        )
+    path = workflow.write_scenario(document, out or scenario)
+    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+
+
+@app.command()
+def add(
+    scenario: ScenarioArgument,
+    fill: Annotated[
+        float | None, typer.Option(min=0, max=1, help="Share of the vehicles that fit.")
+    ] = None,
+    per_km: Annotated[
+        float | None, typer.Option(min=0, help="Vehicles per kilometre of lane.")
+    ] = None,
+    trips: Annotated[float | None, typer.Option(min=0, help="Trips until the end.")] = None,
+    name: NameOption = None,
+    mix: MixOption = None,
+    day: DayOption = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Add background traffic: vehicles that come and go anywhere in the region.
+
+    One of --fill, --per-km and --trips says how many; the first two say how many are to be on the
+    road at a time.
+    """
+    from odscen import demands, workflow
+    from odscen.workspace.store import Workspace
+
+    amounts = {"fill": fill, "per_km": per_km, "trips": trips}
+    fields: dict[str, Any] = {key: value for key, value in amounts.items() if value is not None}
+    if mix:
+        fields["mix"] = parse_mix(mix)
+    if day:
+        fields["profile"] = day
+    store = Workspace.open(workspace)
+    document = workflow.read_scenario(scenario)
+    document = demands.add_background(store, document, name=name or "background", **fields)
+    path = workflow.write_scenario(document, out or scenario)
+    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+
+
+@app.command()
+def weekday(
+    map_name: Annotated[str, typer.Option("--map", help="Map to use, the whole of it.")],
+    trips: Annotated[
+        float, typer.Option(min=1, help="Trips of the day, if the junctions carry so many.")
+    ] = 51_000,
+    day: Annotated[str, typer.Option(help="Day profile: weekday or weekend.")] = "weekday",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File. [default: in the workspace]")
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a day of traffic on a whole map, 24 hours from midnight on.
+
+    Trips start and end anywhere, fewer of them where junctions would be too busy; what that is
+    based on is printed. If the junctions do not carry as many as asked for, there are fewer.
+    """
+    from odscen import demands, workflow
+    from odscen.workspace.store import Workspace
+
+    store = Workspace.open(workspace)
+    document, load = demands.whole_day(store, map_name, trips=trips, day=day, seed=seed)
+    path = workflow.write_scenario(
+        document, out or store.scenarios / f"{map_name}-{day}{workflow.SUFFIX}"
+    )
+    log(
+        f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; then the busiest "
+        f"way into a junction, {load.place}, gets {load.volume:,.0f} of the {load.capacity:,.0f} "
+        f"vehicles that it carries ({load.volume / load.capacity:.0%})"
+    )
+    log(f"Wrote {path}")
+    if as_json:
+        print_json({"file": str(path), **load._asdict()})
+
+
+@app.command()
+def fit(
+    what: Annotated[
+        Path, typer.Argument(help="Scenario, or folder of a run.", metavar="SCENARIO_OR_RUN")
+    ],
+    every: Annotated[bool, typer.Option("--all", help="Show the counts that are met too.")] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Hold traffic against the counts of its scenario: GEH and RMSE, and what is not met and why.
+
+    Of a scenario, traffic as planned, with nobody in its way; of a run, as it was.
+    """
+    from odscen import demands
+    from odscen.workspace.store import Workspace
+
+    found = demands.fit(Workspace.open(workspace), what)
+    if as_json:
+        print_json({"file": str(what), **found.to_dict()})
+        return
+    show_fit(found, every=every)
+
+
+def show_fit(found: CountFits, *, every: bool) -> None:
+    """Print a fit for people."""
+    rows = [row for row in found.rows if every or not row.met]
+    if rows:
+        print_table(
+            "",
+            ("place", "from, s", "to, s", "counted", "traffic", "GEH", "why not"),
+            [
+                (row.place, row.begin, row.end, row.counted, row.modelled, row.geh, row.why)
+                for row in rows
+            ],
+        )
+    for message in found.contradictions:
+        log(f"contradictory: {message}")
+    met = sum(row.met for row in found.rows)
+    log(
+        f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "
+        f"{found.rmse or 0:.2f} vehicles; {found.vehicles} vehicles ({found.source}), "
+        f"{sum(row.counted for row in found.rows):g} passages counted, "
+        f"{sum(row.modelled for row in found.rows)} made"
+    )
+
+
+def parse_mix(text: str) -> dict[str, float]:
+    """Shares of categories from ``car=8,bus=1``.
+
+    Raises
+    ------
+    InputError
+        If it is not written so; names of categories are checked with the document.
+    """
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        category, _, share = part.strip().partition("=")
+        try:
+            found[category.strip()] = float(share or "1")
+        except ValueError:
+            msg = f"a mix is written as car=8,bus=1, not {text!r}"
+            raise InputError(msg) from None
+    return found
+
+
+def _report(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:
+    sizes = {
+        "zones": len(demand["zones"]),
+        "profiles": len(demand["profiles"]),
+        "trips": sum(row[2] for part in demand["matrices"] for row in part["trips"]),
+        "counts": sum(len(part["rows"]) for part in demand["counts"]),
+        "background": len(demand["background"]),
+    }
+    log(", ".join(f"{value:g} {name}" for name, value in sizes.items()))
+    log(f"Wrote {path}")
+    if as_json:
+        print_json({"file": str(path), **sizes})

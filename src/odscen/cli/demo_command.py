@@ -1,0 +1,41 @@
+"""``odscen demo``: the main job from end to end."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, progress
+from odscen.cli.run_commands import show_results
+
+DEMO_MAP = "town_5x5"
+DEMO_FILL = 0.3
+
+
+def demo(
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 1,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Build the maps that ship, sample a scenario, run it, and name the report to open."""
+    from odscen import workflow
+    from odscen.workspace.shipped import shipped_maps
+    from odscen.workspace.store import Workspace
+
+    store = Workspace.open(workspace)
+    for path in shipped_maps():
+        with progress(path.stem) as step:
+            entry = store.add_map(path, progress=step)
+        log(f"{entry.name}: {entry.info['graph']['nodes']:,} nodes ({entry.path('preview')})")
+    with progress("generating") as step:
+        scenarios = workflow.generate(
+            store, map_name=DEMO_MAP, seed=seed, fill=DEMO_FILL, roi_segments=60, progress=step
+        )
+    log(f"Scenario: {scenarios[0]}")
+    results = workflow.run(store, scenarios)
+    if as_json:
+        print_json(results[0].to_dict())
+    else:
+        show_results(results, as_json=False, several=False)
+    raise typer.Exit(results[0].exit_code)

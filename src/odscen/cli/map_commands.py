@@ -1,0 +1,309 @@
+"""``odscen maps``: the catalogue."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from odscen.base.errors import InputError, OdscenError
+from odscen.cli.console import (
+    JsonOption,
+    WorkspaceOption,
+    error_fields,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from odscen.convert.verify.fidelity_result import Fidelity
+    from odscen.workspace.store import MapEntry
+
+UNITS = dict.fromkeys(
+    ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"
+) | dict.fromkeys(("speed_limit_min", "speed_limit_max"), ", m/s")
+
+_WORST = 4
+"""Places shown of each kind of finding; JSON has all of them."""
+
+app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=True)
+
+
+@app.command()
+def add(
+    files: Annotated[list[Path], typer.Argument(help="OpenDRIVE files.", metavar="FILE.xodr...")],
+    name: Annotated[
+        str | None, typer.Option(help="Name in the catalogue. [default: the file's name]")
+    ] = None,
+    spacing: Annotated[float, typer.Option(help="Metres between nodes of the lane graph.")] = 2.0,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Add maps: build lane graph, SUMO network, statistics and drawing, once.
+
+    A map of the same name is replaced if its content differs, and kept as it is otherwise. Files
+    that cannot be used are refused with their reason; the others are added all the same.
+    """
+    from odscen.workspace.store import Workspace
+
+    if name is not None and len(files) > 1:
+        msg = f"--name takes one file, {len(files)} are given"
+        raise InputError(msg)
+    store = Workspace.open(workspace)
+    rows: list[dict[str, Any]] = []
+    worst = 0
+    for file, map_name in zip(files, names_for(files, name), strict=True):
+        try:
+            with progress(map_name) as step:
+                entry = store.add_map(file, name=map_name, spacing=spacing, progress=step)
+        except OdscenError as error:
+            worst = max(worst, error.exit_code)
+            rows.append({"name": map_name, "source": str(file), "error": error_fields(error)})
+            log(f"{file}: refused: {error}")
+        else:
+            rows.append({**_row(entry), "source": str(file)})
+            log(_added(entry))
+    if as_json:
+        print_json({"maps": rows})
+    raise typer.Exit(worst)
+
+
+def names_for(files: list[Path], name: str | None) -> list[str]:
+    """Names for the maps; files of the same name in one call also get their folder's name."""
+    from odscen.workspace.store import name_from_file
+
+    if name is not None:
+        return [name]
+    stems = Counter(name_from_file(file) for file in files)
+    return [
+        name_from_file(file)
+        if stems[name_from_file(file)] == 1
+        else name_from_file(Path(f"{file.absolute().parent.name}-{file.name}"))
+        for file in files
+    ]
+
+
+@app.command("list")
+def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
+    """List the maps with their statistics."""
+    from odscen.workspace.store import Workspace
+
+    rows = [_row(entry) for entry in Workspace.open(workspace).maps()]
+    if as_json:
+        print_json({"maps": rows})
+    elif not rows:
+        log("No maps yet. Add one with: odscen maps add FILE.xodr")
+    else:
+        shown = ("name", "rule", "road km", "junctions", "crosswalks", "lights", "nodes")
+        print_table(
+            "",
+            shown,
+            [
+                (
+                    row["name"],
+                    row["opendrive"]["rule"],
+                    row["statistics"]["road_length"] / 1000,
+                    row["statistics"]["junctions"],
+                    row["statistics"]["crosswalks"],
+                    row["statistics"]["traffic_lights"],
+                    row["graph"]["nodes"],
+                )
+                for row in rows
+            ],
+        )
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a map: statistics, graph, SUMO network, files, and what was lost on the way."""
+    from odscen.workspace.store import Workspace
+
+    entry = Workspace.open(workspace).map(name)
+    if as_json:
+        files = {key: str(entry.path(key)) for key in entry.info["files"]}
+        print_json({**entry.info, "files": files})
+        return
+    for part in ("opendrive", "statistics", "graph", "sumo", "report"):
+        values = entry.info[part]
+        if part == "report":
+            values = values["counts"]
+        rows = [(f"{key}{UNITS.get(key, '')}", _plain(value)) for key, value in values.items()]
+        print_table(part, (), rows)
+    lights = [
+        (", ".join(light["junctions"]) or light["id"], len(light["signals"]),
+         ", ".join(f"{green:g}" for green in light["green"]), f"{light['cycle']:g}")
+        for light in entry.info["lights"]
+    ]  # fmt: skip
+    if lights:
+        columns = ("junction", "signals", "green of its stages, s", "cycle, s")
+        print_table("traffic lights", columns, lights)
+    log(f"Drawing: {entry.path('preview')}")
+
+
+@app.command()
+def remove(
+    names: Annotated[list[str], typer.Argument(metavar="NAME...")],
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove maps from the catalogue."""
+    from odscen.workspace.store import Workspace
+
+    store = Workspace.open(workspace)
+    for name in names:
+        store.map(name)
+    for name in names:
+        store.remove_map(name)
+        log(f"Removed {name}")
+    if as_json:
+        print_json({"removed": names})
+
+
+@app.command()
+def render(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File ending in .svg or .png.")],
+    width: Annotated[
+        int, typer.Option(help="Width of a PNG in pixels.", min=100, max=16000)
+    ] = 2400,
+    graph: Annotated[bool, typer.Option("--graph", help="Draw the lane graph on top.")] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a map as SVG or PNG."""
+    from odscen.workspace.map_pictures import draw_map
+    from odscen.workspace.store import Workspace
+
+    draw_map(Workspace.open(workspace).map(name), out, width=width, with_graph=graph)
+    log(f"Wrote {out}")
+    if as_json:
+        print_json({"name": name, "file": str(out)})
+
+
+@app.command()
+def verify(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    drawing: Annotated[
+        Path | None,
+        typer.Option(help="Draw the map with the places found, as .svg or .png.", metavar="FILE"),
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how faithfully a map's SUMO network follows its OpenDRIVE file.
+
+    The exit code is 1 if a limit is not held.
+    """
+    from odscen.workspace.store import Workspace
+
+    entry = Workspace.open(workspace).map(name)
+    fidelity = entry.fidelity()
+    if drawing is not None:
+        from odscen.workspace.map_pictures import draw_fidelity
+
+        draw_fidelity(entry, fidelity, drawing)
+        log(f"Wrote {drawing}")
+    if as_json:
+        print_json({"name": name, **fidelity.to_dict()})
+    else:
+        _print_fidelity(name, fidelity)
+    raise typer.Exit(0 if fidelity.passed else 1)
+
+
+def _print_fidelity(name: str, fidelity: Fidelity) -> None:
+    rows = [
+        (
+            verdict.name,
+            _figure(verdict.value),
+            f"{'at most' if verdict.at_most else 'at least'} {_figure(verdict.limit)}",
+            "held" if verdict.ok else "NOT HELD",
+        )
+        for verdict in fidelity.verdicts
+    ]
+    print_table(name, ("measure", "found", "limit", "verdict"), rows)
+    counts = [
+        (f"driving lanes of SUMO, {where}", f"{found.lanes:,} lanes, {found.places:,} places")
+        for where, found in (("roads", fidelity.normal), ("junctions", fidelity.internal))
+    ]
+    counts += [
+        (f"distance, {where}", f"median {d.p50:.3f}, 95 % {d.p95:.3f}, largest {d.max:.3f} m")
+        for where, d in (("roads", fidelity.normal), ("junctions", fidelity.internal))
+    ]
+    counts += [
+        (what, f"{cover.length / 1000:.2f} km, {100 * cover.share:.2f} % covered")
+        for what, cover in (
+            ("drivable lanes, roads", fidelity.coverage_roads),
+            ("drivable lanes, junctions", fidelity.coverage_junctions),
+            ("walkable lanes", fidelity.sidewalks),
+        )
+    ]
+    signals = fidelity.signals
+    counts += [
+        ("relations", f"{fidelity.relations:,}"),
+        ("crosswalks", f"{fidelity.crosswalks:,}"),
+        (
+            "junctions with lights",
+            f"{signals.opendrive} in the map, {signals.sumo} in SUMO; "
+            f"lost: {', '.join(signals.lost) or 'none'}; "
+            f"invented: {', '.join(signals.invented) or 'none'}",
+        ),
+    ]
+    print_table("", (), counts)
+    worst = list(_worst(fidelity))
+    if worst:
+        print_table("worst places", ("what", "x, m", "y, m", "where"), worst)
+
+
+def _worst(fidelity: Fidelity) -> Iterator[tuple[str, float, float, str]]:
+    """Give the first few findings of each kind, with their place."""
+    for far in fidelity.far_places[:_WORST]:
+        yield "lane aside", far.x, far.y, f"{far.metres:.2f} m, SUMO lane {far.lane}"
+    for what, gaps in (
+        ("lane not covered", fidelity.gaps),
+        ("sidewalk not covered", fidelity.sidewalk_gaps),
+    ):
+        for gap in sorted(gaps, key=lambda found: -found.metres)[:_WORST]:
+            yield what, gap.x, gap.y, f"{gap.metres:.1f} m of lane {gap.lane}"
+    for one in fidelity.missing[:_WORST]:
+        yield "relation missing", one.x, one.y, f"lane {one.source} to {one.target}"
+    for one in fidelity.invented[:_WORST]:
+        text = f"lane {one.source} to {one.target}, SUMO lanes {one.sumo}"
+        yield "relation invented", one.x, one.y, text
+    for lost in sorted(fidelity.lost_crosswalks, key=lambda found: found.share)[:_WORST]:
+        text = f"road {lost.road}, object {lost.object_id}, {100 * lost.share:.0f} % overlapped"
+        yield "crosswalk lost", lost.x, lost.y, text
+    for pair in fidelity.unsafe_pairs[:_WORST]:
+        links = f"links {pair.links[0]} and {pair.links[1]}"
+        yield "unsafe green", pair.x, pair.y, f"light {pair.tl}, phase {pair.phase}, {links}"
+
+
+def _figure(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4f}"
+
+
+def _row(entry: MapEntry) -> dict[str, Any]:
+    keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
+    return {key: entry.info[key] for key in keys}
+
+
+def _added(entry: MapEntry) -> str:
+    graph = entry.info["graph"]
+    return (
+        f"{entry.name}: {graph['nodes']:,} nodes, {graph['segments']:,} segments, "
+        f"built in {entry.info['build_seconds']:.1f} s"
+    )
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, int | float | str | None) else json.dumps(value)

@@ -1,0 +1,121 @@
+"""``odscen test`` and ``odscen compare``: is it still as it was, and what is different."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from odscen.regression.gates import SuiteResult
+
+HtmlOption = Annotated[
+    Path | None, typer.Option("--html", help="Write a page for people.", dir_okay=False)
+]
+
+
+def gate(
+    suite: Annotated[Path, typer.Argument(help="Suite, as TOML.", metavar="SUITE.toml")],
+    update_baseline: Annotated[
+        bool, typer.Option("--update-baseline", help="Write the baselines of what comes out.")
+    ] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option(help="Keep the runs in this folder. [default: deleted]")
+    ] = None,
+    junit: Annotated[
+        Path | None, typer.Option(help="Write JUnit XML for CI.", dir_okay=False)
+    ] = None,
+    html: HtmlOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a suite of scenarios, each with several seeds, against expectations and baselines.
+
+    Exit code 0: all as it should be; 1: something differs or falls short; 2: bad input; 3: a run
+    failed.
+    """
+    from odscen.regression.gates import run_suite
+    from odscen.regression.junit import junit_xml
+    from odscen.regression.suite import read_suite
+    from odscen.regression.suite_page import suite_page
+    from odscen.regression.suite_words import to_dict
+    from odscen.workflow import write_text
+    from odscen.workspace.store import Workspace
+
+    read = read_suite(suite)
+    with progress("testing") as step:
+        result = run_suite(
+            Workspace.open(workspace),
+            read,
+            processes=jobs,
+            update_baseline=update_baseline,
+            out=out,
+            progress=step,
+        )
+    if junit is not None:
+        write_text(junit, junit_xml(result))
+    if html is not None:
+        write_text(html, suite_page(result))
+    if as_json:
+        print_json(to_dict(result))
+    _show(result, as_json=as_json)
+    raise typer.Exit(result.exit_code)
+
+
+def _show(result: SuiteResult, *, as_json: bool) -> None:
+    from odscen.regression.suite_words import lines
+
+    if not as_json:
+        rows = [
+            (
+                case.case.name,
+                "baseline written" if case.updated and not case.problems else case.status,
+                len(case.runs),
+                f"{case.wall_seconds:.1f} s",
+            )
+            for case in result.cases
+        ]
+        print_table(result.suite.name, ("scenario", "verdict", "runs", "computed in"), rows)
+    for case in result.cases:
+        for line in lines(case):
+            log(f"{case.case.name}: {line}")
+
+
+def compare(
+    run_a: Annotated[
+        Path, typer.Argument(help="Run, or a folder of runs (seeds of one scenario).")
+    ],
+    run_b: Annotated[Path, typer.Argument(help="What to hold against it.")],
+    html: HtmlOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
+    from odscen.regression.compare import compare_runs, read_runs
+    from odscen.regression.comparison_page import comparison_page
+    from odscen.workflow import write_text
+    from odscen.workspace.store import Workspace
+
+    # The page draws the map, if the workspace has it.
+    store = None if html is None else Workspace.open(workspace)
+    result = compare_runs(read_runs(run_a, store), read_runs(run_b, store))
+    if html is not None:
+        write_text(html, comparison_page(result))
+    if as_json:
+        print_json(result.to_dict())
+        return
+    rows = []
+    for row in result.rows:
+        if row.key.kind == "run":
+            figure, unit, a, b, difference, interval, says = row.cells
+            name = f"{figure}, {unit}" if unit else figure
+            rows.append((name, a, b, difference.split(" ")[0], interval or "-", says))
+    print_table("", ("figure", "A", "B", "B - A", "95 % interval", ""), rows)
+    for row in result.places:
+        log(f"changed most: {row.words}")
+    for note in result.notes:
+        log(note)

@@ -1,0 +1,56 @@
+"""``odscen report``: the report of a finished run, anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json
+
+
+def report(
+    run: Annotated[Path, typer.Argument(help="A finished run: its folder, or its name.")],
+    corridor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SEGMENT,SEGMENT,...",
+            help="Follow vehicles along these segments, in driving direction; junctions between "
+            "them may be left out. [default: the busiest way through several junctions]",
+        ),
+    ] = None,
+    first: Annotated[
+        str | None,
+        typer.Option("--from", metavar="SEGMENT", help="Follow vehicles on the shortest way from"),
+    ] = None,
+    last: Annotated[str | None, typer.Option("--to", metavar="SEGMENT", help="to here.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="File to write. [default: report.html of the run]", dir_okay=False),
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the report of a finished run anew, with a corridor of your choice."""
+    from odscen import workflow
+    from odscen.workspace.store import Workspace
+
+    if (first is None) != (last is None):
+        msg = "--from and --to belong together"
+        raise typer.BadParameter(msg)
+    if corridor is not None and first is not None:
+        msg = "give either --corridor, or --from and --to"
+        raise typer.BadParameter(msg)
+    segments = [name.strip() for name in (corridor or "").split(",") if name.strip()]
+    written = workflow.report(
+        Workspace.open(workspace),
+        run,
+        corridor=segments,
+        ends=None if first is None or last is None else (first, last),
+        out=out,
+    )
+    if as_json:
+        print_json({"report": str(written)})
+    else:
+        log(f"Report: {written}")

@@ -1,0 +1,223 @@
+"""``odscen run``: scenarios in SUMO."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.base.durations import clock, parse_duration
+from odscen.base.errors import InputError
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from odscen.sumo.realize.realization import SliceLength
+    from odscen.sumo.runner.run_jobs import RunJob, RunResult
+    from odscen.sumo.worker.protocol import Progress
+
+
+@contextmanager
+def _hint(folder: Path) -> Iterator[None]:
+    """Tell whoever interrupts long runs how to go on with them."""
+    from odscen.sumo.runner.long_runs import interrupted
+
+    before = set(interrupted(folder))
+    try:
+        yield
+    except KeyboardInterrupt:
+        for name in sorted(set(interrupted(folder)) - before):
+            log(f"{name} is interrupted; to go on with it: odscen resume {folder / name}")
+        raise
+
+
+def _duration(text: str) -> float:
+    try:
+        return parse_duration(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def run(
+    scenarios: Annotated[
+        list[Path],
+        typer.Argument(help="Scenarios, or folders of them.", metavar="SCENARIO..."),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the runs. [default: the workspace's runs]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")
+    ] = None,
+    until: Annotated[
+        float | None,
+        typer.Option(
+            parser=_duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
+        ),
+    ] = None,
+    step_length: Annotated[
+        float | None, typer.Option(min=0.01, max=1, help="Seconds per step.")
+    ] = None,
+    expect: Annotated[
+        list[str] | None,
+        typer.Option(help='Expectation, for example "arrived>=0.95"; repeatable.'),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    time_limit: Annotated[
+        float | None, typer.Option(min=1, help="Wall seconds after which a run has failed.")
+    ] = None,
+    weather: Annotated[
+        bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
+    ] = True,
+    trajectories: Annotated[
+        str | None,
+        typer.Option(
+            help="What of the trajectories is recorded: none, or every=TIME, "
+            "region=XMIN:YMIN:XMAX:YMAX and columns=lane+pos+slope, with commas between.",
+            metavar="WHAT",
+        ),
+    ] = None,
+    emissions: Annotated[
+        bool,
+        typer.Option(
+            "--emissions/--no-emissions",
+            help="Whether fuel, CO2 and pollutants are recorded for each lane; a run takes about a "
+            "fifth longer.",
+        ),
+    ] = True,
+    criticality: Annotated[
+        bool,
+        typer.Option(
+            "--criticality",
+            help="Measure how close road users come: time to collision, post-encroachment time, "
+            "braking needed. Takes twice as long; by itself where an expectation asks for it.",
+        ),
+    ] = False,
+    slice_: Annotated[
+        str,
+        typer.Option(
+            "--slice",
+            metavar="TIME",
+            help="A longer run goes in slices of this length and can be resumed; auto: 1h, from 6h "
+            "on a sixth of the run, at most 4h; none: never.",
+        ),
+    ] = "auto",
+    meso: Annotated[
+        bool,
+        typer.Option(
+            "--meso",
+            help="For scale: queues on road sections instead of single vehicles; see docs/runs.md "
+            "for what this leaves out.",
+        ),
+    ] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run scenarios in SUMO, without a window; write records, events, figures and a report.
+
+    Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input; 3: a run failed.
+    """
+    from odscen import workflow
+    from odscen.results.measures.expectations import parse_expectation
+    from odscen.sumo.realize.recording import Recording, parse_recording
+    from odscen.workspace.store import Workspace
+
+    recording = Recording() if trajectories is None else parse_recording(trajectories)
+    slice_length: SliceLength = "auto" if slice_ == "auto" else None
+    if slice_ not in ("auto", "none"):
+        slice_length = parse_duration(slice_)
+    expectations = [parse_expectation(text) for text in expect or ()]
+    paths = workflow.scenario_files(scenarios)
+    store = Workspace.open(workspace)
+    with _hint(out or store.runs), progress("running") as step:
+        results = workflow.run(
+            store,
+            paths,
+            out=out,
+            seed=seed,
+            until=until,
+            step_length=step_length,
+            weather=weather,
+            expectations=expectations,
+            processes=jobs,
+            time_limit=time_limit,
+            progress=_follow(step, len(paths)),
+            recording=replace(recording, emissions=emissions, criticality=criticality),
+            meso=meso,
+            slice_length=slice_length,
+            tell=log,
+        )
+    show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
+    raise typer.Exit(max(result.exit_code for result in results))
+
+
+def resume(
+    run: Annotated[Path, typer.Argument(help="An interrupted run: its folder, or its name.")],
+    time_limit: Annotated[
+        float | None, typer.Option(min=1, help="Wall seconds after which it is interrupted again.")
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Go on with an interrupted long run; it ends as if it had not been interrupted.
+
+    Exit codes as of ``run``.
+    """
+    from odscen import workflow
+    from odscen.workspace.store import Workspace
+
+    with progress("resuming") as step:
+
+        def follow(message: Progress) -> None:
+            step(_words(run.name, message), message.time / message.until)
+
+        result = workflow.resume(
+            Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
+        )
+    show_results([result], as_json=as_json, several=False)
+    raise typer.Exit(result.exit_code)
+
+
+def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) -> None:
+    """Print finished runs: a table for people, JSON for scripts."""
+    if as_json:
+        runs = [result.to_dict() for result in results]
+        print_json({"runs": runs} if several else runs[0])
+    else:
+        keys = ("planned", "inserted", "arrived", "teleported", "collided")
+        rows = []
+        for result in results:
+            counts = result.summary["actors"]
+            verdict = result.status if result.expectations_met else "expectation failed"
+            rows.append((result.folder.name, verdict, *(counts[key] for key in keys)))
+        print_table("", ("run", "status", *keys), rows)
+    for result in results:
+        for verdict in result.summary["expectations"]:
+            if not verdict["passed"]:
+                has = f"{verdict['expectation']} (is {verdict['value']})"
+                log(f"{result.folder.name}: failed: {has}")
+        if result.status == "failed":
+            log(f"{result.folder.name}: {result.summary['error']}")
+        else:
+            log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
+
+
+def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob, Progress], None]:
+    shares: dict[str, float] = {}
+
+    def follow(job: RunJob, message: Progress) -> None:
+        shares[job.name] = message.time / message.until if message.until else 0.0
+        step(_words(job.name, message), sum(shares.values()) / total)
+
+    return follow
+
+
+def _words(name: str, message: Progress) -> str:
+    told = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
+    if message.time_left is None:
+        return told
+    return f"{told}, about {clock(message.time_left + 59)} h left"

@@ -1,0 +1,1 @@
+"""Building the SUMO network: nodes, junctions, roundabouts, and the conversion report's findings."""

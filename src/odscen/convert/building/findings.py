@@ -1,0 +1,194 @@
+"""What the conversion report says: what became of lanes, connections, crosswalks and signals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.ids import LaneKey
+from odscen.convert.model.access import BICYCLE_TYPES, is_used
+from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
+from odscen.opendrive.objects import is_crosswalk, signal_kind
+from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.convert.lane_table.table import LaneTable
+    from odscen.convert.model.connections import PlannedConnections
+    from odscen.convert.model.net import Net
+    from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
+    from odscen.convert.signals.map_signals import Ruled
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.road_model import OpenDrive
+
+WORTH_TELLING = 0.5
+"""Metres of a lane without SUMO lane that make an entry."""
+
+AREA = 1.5
+"""Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
+VARYING = 0.25
+"""Metres that a lane's width may differ from its SUMO lane's without an entry."""
+
+
+class Findings(NamedTuple):
+    """Entries and figures of the report."""
+
+    entries: tuple[ReportEntry, ...]
+    figures: Mapping[str, float]
+
+
+def findings(
+    odr: OpenDrive,
+    table: RoadTable,
+    net: Net,
+    lanes: LaneTable,
+    found: PlannedConnections,
+    ruled: Ruled,
+    crosswalks: Sequence[PlacedCrosswalk],
+) -> Findings:
+    """Say what became of each element."""
+    entries = [
+        *_lanes(odr, table, lanes),
+        *_varying(table, lanes),
+        *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
+        *_crosswalks(odr, crosswalks),
+        *_signals(odr, net, ruled),
+    ]
+    lengths = _lengths(odr, table, lanes)
+    figures = {
+        **lengths,
+        "connections": float(len(found.ways)),
+        "connections_lost": float(len(found.lost)),
+        "crosswalks": float(len(crosswalks)),
+        "crossings": float(net.counts()["crossings"]),
+        "traffic_lights": float(len(net.lights)),
+        "signals": float(sum(len(road.signals) for road in odr.roads.values())),
+        "signals_unplaced": float(len(ruled.unplaced)),
+        "roundabouts": float(len(net.roundabouts)),
+    }
+    return Findings((*_kept(lengths, found), *entries), figures)
+
+
+def _kept(lengths: Mapping[str, float], found: PlannedConnections) -> Iterator[ReportEntry]:
+    """One line for each kind of thing of which there are thousands."""
+    for name, length in lengths.items():
+        if name.endswith("_length") and length > 0.0:
+            covered = lengths[name.replace("_length", "_covered")]
+            kind, where = name.removesuffix("_length").split("_")
+            reason = f"{covered:.0f} of {length:.0f} m of {kind} lanes lie on their centre lines"
+            yield ReportEntry(
+                ElementOutcome.KEPT, "junctions" if where == "junction" else "roads", reason
+            )
+    if found.ways:
+        yield ReportEntry(
+            ElementOutcome.KEPT, "map", f"{len(found.ways)} connections between lanes"
+        )
+
+
+def _place(road: str, section: int, lane: int) -> str:
+    return f"road {road} > laneSection {section} > lane {lane}"
+
+
+def _covered(lanes: LaneTable) -> dict[object, float]:
+    """Metres of s of each lane that have a SUMO lane."""
+    covered: dict[object, float] = {}
+    for span in lanes.spans:
+        key = lanes.lane_keys[span.lane]
+        covered[key] = covered.get(key, 0.0) + span.high - span.low
+    return covered
+
+
+def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+    covered = _covered(lanes)
+    for row, key in enumerate(table.lane_keys):
+        kind = table.lane_type[row]
+        if is_used(kind):
+            length = float(table.lane_s1[row] - table.lane_s0[row])
+            gap = length - covered.get(key, 0.0)
+            if gap > (AREA if kind in WALKABLE_TYPES and gap < length else WORTH_TELLING):
+                where = "" if odr.roads[key.road].junction is None else " of a connecting road"
+                reason = (
+                    f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
+                )
+                yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+        elif kind not in ("none", ""):
+            reason = f"lanes of type {kind} are open to nobody and left out"
+            yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
+
+
+def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, float]:
+    covered = _covered(lanes)
+    figures: dict[str, float] = {}
+    for row, key in enumerate(table.lane_keys):
+        lane_type = table.lane_type[row]
+        if not is_used(lane_type):
+            continue
+        kind = "driving" if lane_type in DRIVABLE_TYPES else "walking"
+        kind = "biking" if lane_type in BICYCLE_TYPES else kind
+        where = "road" if odr.roads[key.road].junction is None else "junction"
+        length = float(table.lane_s1[row] - table.lane_s0[row])
+        for name, value in (("length", length), ("covered", covered.get(key, 0.0))):
+            full = f"{kind}_{where}_{name}"
+            figures[full] = figures.get(full, 0.0) + value
+    return {name: round(value, 2) for name, value in sorted(figures.items())}
+
+
+def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
+    """SUMO lanes have one width; tell of lanes that differ from it."""
+    sumo = lanes.lane_list
+    for piece in lanes.pieces:
+        key = lanes.lane_keys[piece.lane]
+        width = sumo[piece.sumo].width
+        if not isinstance(key, LaneKey) or lanes.edges[sumo[piece.sumo].edge].function != "normal":
+            continue
+        row = table.lane_index[key]
+        if table.lane_type[row] not in DRIVABLE_TYPES:
+            continue
+        s = np.linspace(piece.s[0], piece.s[-1], 9)
+        true = table.lane_width(np.full(9, row), s)
+        low, high = float(true.min()), float(true.max())
+        if high - width > VARYING or width - low > VARYING:
+            reason = f"its width varies from {low:.2f} to {high:.2f} m, SUMO's is {width:.2f} m"
+            yield ReportEntry(ElementOutcome.GUESSED, _place(*key), reason)
+
+
+def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[ReportEntry]:
+    kept = {(one.crosswalk.road, one.crosswalk.object_id) for one in placed}
+    for road in odr.roads.values():
+        for thing in road.objects:
+            if not is_crosswalk(thing):
+                continue
+            element = f"road {road.id} > object {thing.id}"
+            if (road.id, thing.id) in kept:
+                yield ReportEntry(
+                    ElementOutcome.KEPT, element, "crosswalk, as a crossing of its place and width"
+                )
+            else:
+                yield ReportEntry(ElementOutcome.LOST, element, "crosswalk without any size")
+
+
+def _signals(odr: OpenDrive, net: Net, ruled: Ruled) -> Iterator[ReportEntry]:
+    unplaced = dict(ruled.unplaced)
+    for road in odr.roads.values():
+        for signal in road.signals:
+            element = f"road {road.id} > signal {signal.id}"
+            kind = signal_kind(signal)
+            if element in unplaced:
+                yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
+            elif kind in ("traffic_light", "stop", "yield"):
+                word = kind.replace("_", " ")
+                yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
+            elif kind == "pedestrian_light":
+                reason = (
+                    "every crossing of a junction with lights has a light, wherever poles stand"
+                )
+                yield ReportEntry(ElementOutcome.GUESSED, element, reason)
+    if net.lights:
+        reason = (
+            f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "
+            "timing; no two movements that meet have green together"
+        )
+        yield ReportEntry(ElementOutcome.GUESSED, "map", reason)

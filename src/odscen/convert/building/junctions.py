@@ -1,0 +1,368 @@
+"""One SUMO junction: internal lanes, links, right of way, crossings and its traffic light."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.convert.model.net import (
+    INTERNAL,
+    LEAST_LENGTH,
+    NetEdge,
+    NetJunction,
+    NetLane,
+    NetLink,
+    TrafficLight,
+)
+from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, requests
+from odscen.convert.signals.signal_programs import SignalGroup, plan_stages, program
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.convert.model.net import Request
+    from odscen.convert.model.right_of_way import Conflicts, Movement
+    from odscen.convert.pedestrian.pedestrian_network import PlacedCrossing
+
+FloatArray = NDArray[np.float64]
+
+BUS_LENGTH = 12.0
+"""Metres of the longest body that turns are made for."""
+
+MOST_SWEPT = 2.5
+"""Metres that are added to the width of an internal lane, at most."""
+
+_STRAIGHT = math.radians(30.0)
+_AROUND = math.radians(150.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """A movement with all that its internal lane needs.
+
+    ``lights`` are the OpenDRIVE signals that rule it.
+    """
+
+    movement: Movement
+    length: float
+    speed: float
+    allowed: frozenset[str]
+    type: str
+    xodr: tuple[str, ...]
+    lights: tuple[str, ...] = ()
+
+
+class Surroundings(NamedTuple):
+    """What a junction needs to know beside its passages.
+
+    Attributes
+    ----------
+    place, outline
+        Where it is: ``(x, y, z)`` and shape ``(K, 3)``.
+    incoming
+        Lanes that end there, with those that lead nowhere.
+    high_low
+        Pairs of OpenDRIVE roads, incoming or connecting, of which the first has priority.
+    controllers
+        Controller of each signal.
+    xodr
+        OpenDRIVE junctions, for the file.
+    """
+
+    place: tuple[float, float, float]
+    outline: FloatArray
+    incoming: tuple[SumoLaneId, ...]
+    high_low: frozenset[tuple[str, str]]
+    controllers: Mapping[str, str]
+    lefthand: bool
+    xodr: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BuiltJunction:
+    """The parts of a junction; ``lanes`` are the internal lanes of its passages, in their order."""
+
+    junction: NetJunction
+    inner: tuple[NetEdge, ...]
+    links: tuple[NetLink, ...]
+    light: TrafficLight | None
+    lanes: tuple[NetLane, ...]
+    conflicts: Conflicts
+
+
+def build_junction(
+    name: str,
+    passages: Sequence[Passage],
+    crossings: Sequence[PlacedCrossing],
+    around: Surroundings,
+) -> BuiltJunction:
+    """Make a junction.
+
+    Parameters
+    ----------
+    passages
+        Sorted by the lane that they come from: SUMO numbers links in that order.
+    crossings
+        Sorted by the walking area at which they start.
+    """
+    signalled = any(passage.lights for passage in passages)
+    if signalled:
+        passages = _obeying(passages)
+    movements = [
+        replace(p.movement, sign=max(p.movement.sign, Sign.YIELD))
+        if signalled and not p.lights
+        else p.movement
+        for p in passages
+    ]
+    conflicts = find_conflicts(movements, [crossing.walkway for crossing in crossings])
+    signs = {movement.source[0]: movement.sign for movement in movements}
+    all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
+    rules = Rules(around.high_low, lefthand=around.lefthand, all_stop=all_stop)
+    rights = requests(movements, conflicts, rules)
+    light, rows = None, dict[int, int]()
+    if signalled:
+        light, rows = _light(name, passages, conflicts, crossings, around.controllers)
+    equal = not any(signs.values()) and not around.high_low
+    states = [
+        _state(m, right, lit=n in rows, all_stop=all_stop, equal=equal)
+        for n, (m, right) in enumerate(zip(movements, rights, strict=False))
+    ]
+    lanes, inner, links = _passages(name, passages, states, rows)
+    walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
+    starts = [crossing.start for crossing in crossings]
+    kind = "traffic_light" if signalled else "allway_stop" if all_stop else ""
+    if not kind:
+        yielding = Sign.STOP in signs.values()
+        kind = "priority_stop" if yielding else "right_before_left" if equal else "priority"
+        kind = "priority" if not conflicts.pairs else kind
+    junction = NetJunction(
+        name,
+        kind if passages or crossings else "dead_end",
+        around.place,
+        around.outline,
+        tuple(dict.fromkeys((*_sources(passages), *around.incoming, *starts))),
+        (*(lane.id for lane in lanes), *(edge.lanes[0].id for edge in walked)),
+        rights,
+        around.xodr,
+    )
+    return BuiltJunction(
+        junction, (*inner, *walked), (*links, *walk_links), light, tuple(lanes), conflicts
+    )
+
+
+def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
+    return [SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)]
+
+
+def _obeying(passages: Sequence[Passage]) -> list[Passage]:
+    """Let passages without a signal obey those of the lane, or else edge, that they come from."""
+    result: list[Passage] = []
+    for passage in passages:
+        edge, lane = passage.movement.source
+        same = [
+            (other.movement.source[1] != lane, other.lights)
+            for other in passages
+            if other.lights and other.movement.source[0] == edge
+        ]
+        lights = passage.lights or (min(same)[1] if same else ())
+        result.append(replace(passage, lights=lights))
+    return result
+
+
+def _state(movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool) -> str:
+    """SUMO's letter for the right of way of a link."""
+    if lit:
+        return "o" if right.yields_to else "O"
+    if all_stop:
+        return "w"
+    if movement.sign is Sign.STOP:
+        return "s"
+    if not right.yields_to:
+        return "M"
+    return "=" if equal else "m"
+
+
+def direction(turn: float) -> str:
+    """SUMO's letter for a change of heading, radians, left positive."""
+    if abs(turn) < _STRAIGHT:
+        return "s"
+    if abs(turn) > _AROUND:
+        return "t"
+    return "l" if turn > 0.0 else "r"
+
+
+def _swept(passage: Passage) -> float:
+    """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
+
+    SUMO draws a body as the chord of its path, so that the middle lies inside of it by the sagitta
+    of a circle.
+    """
+    turn = abs(passage.movement.turn)
+    radius = passage.length / max(turn, 1e-3)
+    return min(BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
+
+
+def _passages(
+    name: str, passages: Sequence[Passage], states: Sequence[str], rows: Mapping[int, int]
+) -> tuple[list[NetLane], list[NetEdge], list[NetLink]]:
+    lanes: list[NetLane] = []
+    edges: list[NetEdge] = []
+    links: list[NetLink] = []
+    for number, (passage, state) in enumerate(zip(passages, states, strict=True)):
+        movement = passage.movement
+        edge = SumoEdgeId(f":{name}_{number}")
+        lane = NetLane(
+            SumoLaneId(f"{edge}_0"),
+            0,
+            round(max(passage.length, LEAST_LENGTH), 4),
+            passage.speed,
+            round(movement.width + _swept(passage), 2),
+            passage.allowed,
+            movement.shape,
+            passage.type,
+            xodr=passage.xodr,
+        )
+        lanes.append(lane)
+        edges.append(NetEdge(edge, INTERNAL, (lane,)))
+        (source, source_lane), (target, target_lane) = movement.source, movement.target
+        turn = direction(movement.turn)
+        light = name if number in rows else ""
+        links.append(
+            NetLink(
+                SumoEdgeId(source),
+                SumoEdgeId(target),
+                source_lane,
+                target_lane,
+                lane.id,
+                turn,
+                state,
+                light,
+                rows.get(number, -1),
+            )
+        )
+        links.append(NetLink(edge, SumoEdgeId(target), 0, target_lane, None, turn))
+    return lanes, edges, links
+
+
+def _crossings(
+    name: str,
+    passages: Sequence[Passage],
+    crossings: Sequence[PlacedCrossing],
+    conflicts: Conflicts,
+    rows: Mapping[int, int],
+    first: int,
+) -> tuple[list[NetEdge], list[NetLink]]:
+    edges: list[NetEdge] = []
+    links: list[NetLink] = []
+    for index, (crossing, crossed) in enumerate(zip(crossings, conflicts.crossed, strict=True)):
+        row = rows.get(first + index, -1)
+        over = dict.fromkeys(_nearer_edge(passages[n].movement, crossing) for n in crossed)
+        edges.append(replace(crossing.edge, crosses=tuple(over)))
+        start = SumoEdgeId(crossing.start.removesuffix("_0"))
+        light = name if row >= 0 else ""
+        links.append(NetLink(start, crossing.edge.id, light=light, light_index=row))
+        links.append(crossing.link)
+    return edges, links
+
+
+def _nearer_edge(movement: Movement, crossing: PlacedCrossing) -> SumoEdgeId:
+    """Edge whose end or start a crossing is nearer to: what SUMO calls the crossed edge."""
+    middle = crossing.walkway.axis[:, :2].mean(axis=0)
+    ends = movement.shape[[0, -1], :2]
+    gaps = np.hypot(*(ends - middle).T)
+    return SumoEdgeId(movement.source[0] if gaps[0] <= gaps[1] else movement.target[0])
+
+
+def _light(
+    name: str,
+    passages: Sequence[Passage],
+    conflicts: Conflicts,
+    crossings: Sequence[PlacedCrossing],
+    controllers: Mapping[str, str],
+) -> tuple[TrafficLight, dict[int, int]]:
+    """Traffic light of a junction, and the row in it of each link that it rules."""
+    ruled = [n for n, passage in enumerate(passages) if passage.lights]
+    count = len(passages)
+    rows = {link: row for row, link in enumerate((*ruled, *range(count, count + len(crossings))))}
+    foes = set(conflicts.pairs)
+    foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
+    heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
+    for lane in _lanes_of(passages, ruled):
+        # Who waits for the green of one lane must not be held up by those who wait for another.
+        key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
+        own = heads.setdefault(key, [])
+        fitting = next((group for group in own if not _meet(lane, group, foes)), None)
+        if fitting is None:
+            own.append(lane)
+        else:
+            fitting += lane
+    groups: list[SignalGroup] = []
+    members: list[list[int]] = []
+    for (_, lights), parts in heads.items():
+        for links in parts:
+            groups.append(
+                SignalGroup(
+                    tuple(rows[n] for n in links),
+                    controllers.get(lights[0], ""),
+                    walkers=False,
+                    speed=max(passages[n].movement.speed for n in links),
+                    way=max(passages[n].length for n in links),
+                )
+            )
+            members.append(links)
+    for index, crossing in enumerate(crossings):
+        link = count + index
+        length = crossing.edge.length
+        groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0, way=length))
+        members.append([link])
+    meeting = frozenset(
+        (i, j)
+        for i, one in enumerate(members)
+        for j, other in enumerate(members[i + 1 :], start=i + 1)
+        if _meet(one, other, foes)
+    )
+    phases = program(plan_stages(groups, meeting), len(rows))
+    signals = tuple(passages[n].lights if n < count else () for n in rows)
+    return TrafficLight(name, phases, signals=signals), rows
+
+
+def _lanes_of(passages: Sequence[Passage], ruled: Sequence[int]) -> list[list[int]]:
+    """Links by the lane that they leave and the signals that rule them, in order."""
+    found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
+    for link in ruled:
+        passage = passages[link]
+        found.setdefault((passage.movement.source, passage.lights), []).append(link)
+    return list(found.values())
+
+
+def _meet(one: Sequence[int], other: Sequence[int], foes: set[tuple[int, int]]) -> bool:
+    return any((min(a, b), max(a, b)) in foes for a in one for b in other)
+
+
+def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:
+    """Outline of a junction: around the ends of its lanes, shape ``(K, 3)``.
+
+    Parameters
+    ----------
+    lanes
+        Shape, width, and whether the lane ends there (or begins).
+    """
+    corners: list[FloatArray] = []
+    for shape, width, ends in lanes:
+        place = shape[-1] if ends else shape[0]
+        step = shape[-1] - shape[-2] if ends else shape[1] - shape[0]
+        length = max(float(np.hypot(step[0], step[1])), 1e-9)
+        normal = np.array([-step[1], step[0], 0.0]) / length * (width / 2.0)
+        corners += [place - normal, place + normal]
+    points = np.array(corners)
+    hull = shapely.MultiPoint(points[:, :2]).convex_hull
+    if hull.geom_type != "Polygon":
+        return points[[0, -1]]
+    ring = np.array(hull.exterior.coords)[:-1]
+    return np.column_stack((ring, np.full(len(ring), points[:, 2].mean())))

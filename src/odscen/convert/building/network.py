@@ -1,0 +1,355 @@
+"""From a road model to a SUMO network, the lane table and the conversion report.
+
+The network is written by odscen itself, lane by lane from the road model; why not by netconvert:
+``docs/decisions/0003-writing-the-network.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.convert.building.findings import findings
+from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
+from odscen.convert.building.nodes import find_nodes, plain_ids
+from odscen.convert.building.roundabouts import find_rings
+from odscen.convert.lane_table.table_build import build_table
+from odscen.convert.model.access import speed as lane_speed
+from odscen.convert.model.connections import find_ways
+from odscen.convert.model.conversion_report import ConversionReport, ElementOutcome, ReportEntry
+from odscen.convert.model.edge_plan import plan_edges
+from odscen.convert.model.lane_alignment import evaluate
+from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
+from odscen.convert.model.right_of_way import Movement, wrapped
+from odscen.convert.model.road_gaps import merge_gaps, side_gaps
+from odscen.convert.pedestrian.crosswalks import place_crosswalks
+from odscen.convert.pedestrian.pedestrian_network import build_walks
+from odscen.convert.signals.map_signals import rule
+from odscen.opendrive.topology import lane_successors, side_links
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.convert.building.junctions import BuiltJunction
+    from odscen.convert.building.nodes import Nodes
+    from odscen.convert.lane_table.table import LaneTable
+    from odscen.convert.model.connections import PlannedConnection, PlannedConnections
+    from odscen.convert.model.lane_alignment import Course, Line
+    from odscen.convert.pedestrian.pedestrian_network import WalkNet
+    from odscen.convert.signals.map_signals import Ruled
+    from odscen.lanegraph.graphs import PedestrianGraph
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.road_model import OpenDrive
+
+FloatArray = NDArray[np.float64]
+
+SIDEWAYS = 5.5
+"""m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""
+
+LEAST_TURN_SPEED = 2.0
+"""m/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class SumoNetwork:
+    """A network: its file, how to cross over to it, and how it came about."""
+
+    net_xml: bytes
+    table: LaneTable
+    report: ConversionReport
+
+
+def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> SumoNetwork:
+    """Make the SUMO network of a map.
+
+    Parameters
+    ----------
+    odr, table
+        The road model and its evaluation.
+    walks
+        The pedestrian graph of the map.
+    """
+    lefthand = _keeps_left(table)
+    successors = lane_successors(odr)
+    sides = side_links(odr)
+    crosswalks, under = place_crosswalks(odr, table)
+    gaps = merge_gaps(odr, under, side_gaps(sides))
+    plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
+    found = find_ways(table, successors, plans, sides)
+    nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
+    on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
+    builder = _NetworkBuilder(odr, table, found, nodes, on_foot, lefthand=lefthand)
+    net = builder.net()
+    lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
+    entries, figures = findings(odr, table, net, lanes, found, builder.ruled, crosswalks)
+    notes = [ReportEntry(ElementOutcome.REPAIRED, *_split(note)) for note in odr.notes]
+    report = ConversionReport.of([*notes, *entries], figures)
+    return SumoNetwork(net.to_xml(), lanes, report)
+
+
+def _split(note: str) -> tuple[str, str]:
+    """Divide a note of the parser into element and reason."""
+    element, mark, reason = note.partition(": ")
+    return (element, reason) if mark else ("map", note)
+
+
+def _keeps_left(table: RoadTable) -> bool:
+    """Whether most of the roads, by length, keep left: SUMO's networks know only one side."""
+    if not len(table.road_length):
+        return False
+    return float(table.road_length[~table.road_rht].sum()) > float(table.road_length.sum()) / 2.0
+
+
+class _NetworkBuilder:
+    """Puts the parts together; the order of everything follows from the order of the file."""
+
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        found: PlannedConnections,
+        nodes: Nodes,
+        walks: WalkNet,
+        *,
+        lefthand: bool,
+    ) -> None:
+        self._odr = odr
+        self._table = table
+        self._edges = found.edges
+        self._ways = found.ways
+        self._nodes = nodes
+        self._walks = walks
+        self._lefthand = lefthand
+        courses = [lane.course for edge in self._edges for lane in edge.lanes]
+        lines = evaluate([*courses, *(way.course for way in self._ways)], table)
+        self._lane_lines: list[list[Line]] = []
+        start = 0
+        for edge in self._edges:
+            self._lane_lines.append(lines[start : start + len(edge.lanes)])
+            start += len(edge.lanes)
+        self._way_lines = lines[start:]
+        self._ids = self._edge_ids()
+        self._net_edges = [self._edge(number) for number in range(len(self._edges))]
+        self._by_node: dict[str, list[int]] = {}
+        for number, way in enumerate(self._ways):
+            self._by_node.setdefault(nodes.ends[way.source], []).append(number)
+        self._rings = find_rings(
+            self._edges, self._ways, self._lane_lines, self._way_lines, lefthand=lefthand
+        )
+        self._ring_edges = {edge for ring in self._rings for edge in ring}
+        self._controllers = {
+            signal: controller.id
+            for controller in odr.controllers.values()
+            for signal, _ in controller.controls
+        }
+        self._starting = _by_value(nodes.starts)
+        self._ending = _by_value(nodes.ends)
+        self._walked: dict[str, list[SumoLaneId]] = {}
+        for walk in walks.lanes:
+            self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
+        self.ruled = self._rule()
+        self._via: dict[int, NetLane] = {}
+
+    def laid(self) -> list[tuple[NetLane, Line, Course]]:
+        """SUMO lanes with the lines and the courses that they are laid on."""
+        found = []
+        for number, edge in enumerate(self._edges):
+            for index, lane in enumerate(edge.lanes):
+                line = self._lane_lines[number][index]
+                found.append((self._net_edges[number].lanes[index], line, lane.course))
+        for number, inner in sorted(self._via.items()):
+            found.append((inner, self._way_lines[number], self._ways[number].course))
+        return found
+
+    def net(self) -> Net:
+        """Assemble everything."""
+        built = [self._junction(name) for name in self._names()]
+        walks = self._walks
+        shapes = [lane.shape for edge in self._net_edges for lane in edge.lanes]
+        shapes += [walk.line.shape for walk in walks.lanes]
+        points = np.concatenate(shapes) if shapes else np.zeros((1, 3))
+        low = points.min(axis=0)
+        inner = [edge for part in built for edge in part.inner]
+        return Net(
+            offset=(-math.floor(float(low[0])) + 0.0, -math.floor(float(low[1])) + 0.0),
+            lefthand=self._lefthand,
+            edges=(*inner, *walks.areas, *self._net_edges, *(walk.edge for walk in walks.lanes)),
+            links=(*(link for part in built for link in part.links), *walks.links),
+            junctions=(*(part.junction for part in built), *self._walk_junctions()),
+            lights=tuple(part.light for part in built if part.light),
+            roundabouts=self._roundabouts(),
+            flat=not points[:, 2].any(),
+        )
+
+    def _names(self) -> list[str]:
+        nodes = self._nodes
+        return list(dict.fromkeys((*nodes.starts, *nodes.ends, *nodes.crosswalks)))
+
+    # Junctions
+
+    def _junction(self, name: str) -> BuiltJunction:
+        numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._ways[n][:4])
+        crossings = self._walks.crossings.get(name, ())
+        passages = [self._passage(number) for number in numbers]
+        built = build_junction(name, passages, crossings, self._around(name))
+        for number, lane in zip(numbers, built.lanes, strict=True):
+            self._via[number] = lane
+        return built
+
+    def _around(self, name: str) -> Surroundings:
+        starts, ends = self._starting.get(name, []), self._ending.get(name, [])
+        lanes = [
+            (lane.shape, lane.width, is_end)
+            for edges, is_end in ((ends, True), (starts, False))
+            for edge in edges
+            for lane in self._net_edges[edge].lanes
+        ]
+        crossings = self._walks.crossings.get(name, ())
+        lanes += [
+            (c.walkway.axis, c.walkway.width, which) for c in crossings for which in (True, False)
+        ]
+        shape = outline(lanes)
+        incoming = [lane.id for edge in ends for lane in self._net_edges[edge].lanes]
+        x, y, z = (float(value) for value in shape.mean(axis=0))
+        junctions = self._nodes.xodr.get(name, ())
+        return Surroundings(
+            (x, y, z),
+            shape,
+            (*incoming, *self._walked.get(name, ())),
+            frozenset(
+                (str(priority.high), str(priority.low))
+                for junction in junctions
+                for priority in self._odr.junctions[junction].priorities
+            ),
+            self._controllers,
+            self._lefthand,
+            " ".join(junctions),
+        )
+
+    def _passage(self, number: int) -> Passage:
+        way, line = self._ways[number], self._way_lines[number]
+        source = self._net_edges[way.source].lanes[way.source_lane]
+        target = self._net_edges[way.target].lanes[way.target_lane]
+        before = self._lane_lines[way.source][way.source_lane]
+        after = self._lane_lines[way.target][way.target_lane]
+        table = self._table
+        over = [table.road_ids[table.lane_road[stretch.row]] for stretch in way.course]
+        connecting = [road for road in over if self._odr.roads[road].junction is not None]
+        incoming = table.road_ids[self._edges[way.source].road]
+        movement = Movement(
+            source=(self._ids[way.source], way.source_lane),
+            target=(self._ids[way.target], way.target_lane),
+            shape=line.shape,
+            width=min(source.width, target.width),
+            heading_in=before.headings()[1],
+            heading_out=after.headings()[0],
+            speed=source.speed,
+            sign=self.ruled.signs[number],
+            ring=way.source in self._ring_edges,
+            roads=frozenset(str(road) for road in (incoming, *connecting)),
+        )
+        return Passage(
+            movement,
+            line.length,
+            self._speed(way, line, min(source.speed, target.speed)),
+            source.allowed & target.allowed,
+            source.type,
+            self._origins(way.course),
+            self.ruled.lights[number],
+        )
+
+    def _speed(self, way: PlannedConnection, line: Line, around: float) -> float:
+        """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
+        table = self._table
+        rows = np.array([stretch.row for stretch in way.course])
+        middle = np.array([(stretch.start + stretch.end) / 2.0 for stretch in way.course])
+        limits = table.speed_limit(rows, middle)
+        own = [
+            lane_speed(float(limit), table.lane_type[row], "")
+            for limit, row in zip(limits, rows, strict=True)
+            if not math.isnan(limit)
+        ]
+        speed = min(own) if own else around
+        turn = abs(wrapped(line.headings()[1] - line.headings()[0]))
+        if turn > 0.1:
+            speed = min(speed, math.sqrt(SIDEWAYS * line.length / turn))
+        return round(max(speed, LEAST_TURN_SPEED), 2)
+
+    # Edges
+
+    def _edge_ids(self) -> list[SumoEdgeId]:
+        wanted = [
+            f"{self._table.road_ids[edge.road]}.{edge.stretch}.{'f' if edge.forward else 'b'}"
+            for edge in self._edges
+        ]
+        taken = plain_ids(wanted)
+        return [SumoEdgeId(taken[name]) for name in wanted]
+
+    def _edge(self, number: int) -> NetEdge:
+        plan, lines = self._edges[number], self._lane_lines[number]
+        length = max(float(np.mean([line.length for line in lines])), LEAST_LENGTH)
+        edge = self._ids[number]
+        lanes = tuple(
+            NetLane(
+                SumoLaneId(f"{edge}_{index}"),
+                index,
+                round(length, 4),
+                lane.speed,
+                round(max(line.widths[1], 0.5), 2),
+                lane.allowed,
+                line.shape,
+                lane.type,
+                lane.change_left,
+                lane.change_right,
+                self._origins(lane.course),
+            )
+            for index, (lane, line) in enumerate(zip(plan.lanes, lines, strict=True))
+        )
+        road = self._odr.roads[self._table.road_ids[plan.road]]
+        start, end = self._nodes.starts[number], self._nodes.ends[number]
+        return NetEdge(edge, NORMAL, lanes, start, end, road.name)
+
+    def _origins(self, course: Course) -> tuple[str, ...]:
+        keys = [self._table.lane_keys[stretch.row] for stretch in course]
+        return tuple(dict.fromkeys(f"{key.road}_{key.lane}" for key in keys))
+
+    def _roundabouts(self) -> tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...]:
+        return tuple(
+            (
+                tuple(dict.fromkeys(self._nodes.ends[edge] for edge in ring)),
+                tuple(self._ids[edge] for edge in ring),
+            )
+            for ring in self._rings
+        )
+
+    # Signals
+
+    def _rule(self) -> Ruled:
+        crossed = set(self._nodes.crosswalks)
+
+        def is_junction(edge: int) -> bool:
+            node = self._nodes.ends[edge]
+            return node in self._nodes.xodr or node in crossed
+
+        return rule(self._odr, self._table, self._edges, self._ways, is_junction)
+
+    # Persons
+
+    def _walk_junctions(self) -> list[NetJunction]:
+        return [
+            replace(junction, incoming=tuple(self._walked.get(junction.id, ())))
+            for junction in self._walks.junctions
+        ]
+
+
+def _by_value(values: Sequence[str]) -> dict[str, list[int]]:
+    """Positions of each value."""
+    found: dict[str, list[int]] = {}
+    for position, value in enumerate(values):
+        found.setdefault(value, []).append(position)
+    return found

@@ -1,0 +1,1 @@
+"""The lane table between OpenDRIVE lanes and SUMO lanes."""

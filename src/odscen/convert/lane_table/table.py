@@ -1,0 +1,365 @@
+"""The table between OpenDRIVE lanes and SUMO lanes: the one way to cross over.
+
+It also keeps what else is needed to know of the network, so that ``net.net.xml`` is not parsed
+again. Made by :mod:`odscen.convert.lane_table.table_build`, stored as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.base.errors import GraphFormatError
+from odscen.convert.lane_table.lookup import Lookup
+from odscen.convert.lane_table.mapping_intervals import Piece, Span, answering
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.base.ids import JunctionId, LaneKey, Roadside, SumoEdgeId, SumoLaneId
+    from odscen.convert.model.net import Phase
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
+
+VERSION = 3
+
+
+class SumoPlace(NamedTuple):
+    """A place on a SUMO lane.
+
+    ``pos`` and ``deviation`` (between the two lane centres there) in metres.
+    """
+
+    edge: SumoEdgeId
+    lane: SumoLaneId
+    index: int  # type: ignore[assignment]  # SUMO's word; hides tuple.index
+    pos: float
+    deviation: float
+    internal: bool
+
+
+class XodrPlace(NamedTuple):
+    """A place on an OpenDRIVE lane; ``s`` and ``deviation`` in metres."""
+
+    lane: LaneKey | Roadside
+    s: float
+    deviation: float
+
+
+class SumoPlaces(NamedTuple):
+    """Places on SUMO lanes, shape ``(N,)`` each.
+
+    Attributes
+    ----------
+    lane
+        Row of :attr:`LaneTable.lanes`, -1 where there is no SUMO lane.
+    pos, deviation
+        Metres; NaN where there is no SUMO lane.
+    """
+
+    lane: IntArray
+    pos: FloatArray
+    deviation: FloatArray
+
+
+class XodrPlaces(NamedTuple):
+    """Places on OpenDRIVE lanes, shape ``(N,)`` each; ``lane`` is a row of ``lane_keys`` or -1."""
+
+    lane: IntArray
+    s: FloatArray
+    deviation: FloatArray
+
+
+class SumoLane(NamedTuple):
+    """A lane of the network; ``allowed`` are vehicle classes, ``None`` for all."""
+
+    id: SumoLaneId
+    edge: SumoEdgeId
+    index: int  # type: ignore[assignment]
+    length: float
+    speed: float
+    width: float
+    allowed: frozenset[str] | None
+
+    def allows(self, vclass: str) -> bool:
+        """Whether vehicles of a class may use the lane."""
+        return self.allowed is None or vclass in self.allowed
+
+
+class SumoEdge(NamedTuple):
+    """An edge of the network.
+
+    ``function`` is normal, internal, crossing, walkingarea or connector; ``lanes`` by index.
+    """
+
+    id: SumoEdgeId
+    function: str
+    from_junction: str
+    to_junction: str
+    length: float
+    lanes: tuple[SumoLaneId, ...]
+
+
+class SumoLink(NamedTuple):
+    """A connection between lanes; ``via`` is the internal lane, ``tl`` the traffic light, or empty.
+
+    From a normal lane ``via`` is the first internal lane; the links from internal lanes lead on.
+    """
+
+    from_lane: SumoLaneId
+    to_lane: SumoLaneId
+    via: SumoLaneId
+    tl: str
+
+
+class SumoLight(NamedTuple):
+    """A traffic light of the network, with its program.
+
+    Attributes
+    ----------
+    junctions
+        OpenDRIVE junctions that it stands in; none at a crosswalk on the open road.
+    phases
+        In their order; the letters of a state are those of the links that the light rules.
+    offset
+        Seconds.
+    signals
+        For each link the OpenDRIVE signals behind it; none for crossings.
+    """
+
+    id: str
+    junctions: tuple[JunctionId, ...]
+    phases: tuple[Phase, ...]
+    offset: float
+    signals: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LaneTable:
+    """Where OpenDRIVE lanes are in the SUMO network, and back; immutable.
+
+    Attributes
+    ----------
+    lane_keys
+        OpenDRIVE lanes, drivable, walkable and for bicycles, and walks beside lanes.
+    lanes
+        All SUMO lanes by id, in the order of the file.
+    edges
+        All SUMO edges by id.
+    links
+        All connections.
+    walk_links
+        Pairs of edges (smaller id first, sorted) between which a person can walk either way.
+    pieces
+        The relation itself; ``Piece.lane`` is a row of ``lane_keys``, ``Piece.sumo`` of ``lanes``.
+    net_offset
+        SUMO position minus OpenDRIVE position, metres.
+    boundary
+        x_min, y_min, x_max, y_max in SUMO's frame, metres.
+    counts
+        Numbers of edges, lanes, junctions, tl_logics, crossings, ... for the catalogue.
+    elevation
+        Whether the network has heights.
+    lights
+        Traffic lights, in the order of the file.
+    """
+
+    lane_keys: tuple[LaneKey | Roadside, ...]
+    lanes: dict[SumoLaneId, SumoLane]
+    edges: dict[SumoEdgeId, SumoEdge]
+    links: tuple[SumoLink, ...]
+    walk_links: tuple[tuple[SumoEdgeId, SumoEdgeId], ...]
+    pieces: tuple[Piece, ...]
+    net_offset: tuple[float, float]
+    boundary: tuple[float, float, float, float]
+    lefthand: bool
+    counts: Mapping[str, int]
+    elevation: bool
+    lights: tuple[SumoLight, ...] = ()
+
+    # Crossing over
+
+    def to_sumo(self, lane: LaneKey | Roadside, s: float) -> SumoPlace | None:
+        """Find the SUMO place of road coordinate ``s`` on an OpenDRIVE lane, if there is one."""
+        places = self.sumo_places((lane,), np.zeros(1, dtype=np.int32), np.array([s]))
+        if places.lane[0] < 0:
+            return None
+        sumo = self.lane_list[places.lane[0]]
+        return SumoPlace(
+            sumo.edge,
+            sumo.id,
+            sumo.index,
+            float(places.pos[0]),
+            float(places.deviation[0]),
+            self.edges[sumo.edge].function == "internal",
+        )
+
+    def to_xodr(self, lane: SumoLaneId, pos: float) -> XodrPlace | None:
+        """Find the OpenDRIVE place of position ``pos`` on a SUMO lane, if there is one."""
+        row = self.lane_row.get(lane)
+        if row is None:
+            return None
+        places = self.xodr_places(np.array([row]), np.array([pos]))
+        if places.lane[0] < 0:
+            return None
+        key = self.lane_keys[places.lane[0]]
+        return XodrPlace(key, float(places.s[0]), float(places.deviation[0]))
+
+    def sumo_places(
+        self, lane_keys: Sequence[LaneKey | Roadside], lane: NDArray[np.integer[Any]], s: FloatArray
+    ) -> SumoPlaces:
+        """Find SUMO places for many nodes.
+
+        Parameters
+        ----------
+        lane_keys
+            Any list of lanes, for example ``LaneGraph.lanes.keys``.
+        lane
+            Shape ``(N,)``: index into ``lane_keys``.
+        s
+            Shape ``(N,)``: road coordinates, metres.
+        """
+        rows = np.array([self.key_row.get(key, -1) for key in lane_keys], dtype=np.int64)
+        own = rows[lane] if len(lane_keys) else np.full(len(s), -1)
+        piece, s_on, gap = self._by_s.find(own, s)
+        pos, deviation = self._by_s.value(piece, s_on)
+        none = piece < 0
+        return SumoPlaces(
+            np.where(none, -1, self._piece_sumo[piece]).astype(np.int32),
+            np.where(none, np.nan, pos),
+            np.where(none, np.nan, np.hypot(deviation, gap)),
+        )
+
+    def xodr_places(self, lane: NDArray[np.integer[Any]], pos: FloatArray) -> XodrPlaces:
+        """Find OpenDRIVE places for many positions; ``lane`` holds rows of ``lanes``."""
+        piece, pos_on, gap = self._by_pos.find(np.asarray(lane, dtype=np.int64), pos)
+        s, deviation = self._by_pos.value(piece, pos_on)
+        none = piece < 0
+        return XodrPlaces(
+            np.where(none, -1, self._piece_lane[piece]).astype(np.int32),
+            np.where(none, np.nan, s),
+            np.where(none, np.nan, np.hypot(deviation, gap)),
+        )
+
+    # The network
+
+    def allowed(self, lane: SumoLaneId, vclass: str) -> bool:
+        """Whether vehicles of a class may use a lane."""
+        return self.lanes[lane].allows(vclass)
+
+    def walk_connected(self, one: SumoEdgeId, other: SumoEdgeId) -> bool:
+        """Whether a person can walk from one edge to another at all."""
+        groups = self._walk_groups
+        return one == other or (one in groups and groups[one] == groups.get(other))
+
+    @cached_property
+    def walk_neighbours(self) -> dict[SumoEdgeId, tuple[SumoEdgeId, ...]]:
+        """Edges that can be walked to from each edge without using a third, sorted."""
+        found: dict[SumoEdgeId, set[SumoEdgeId]] = {}
+        for one, other in self.walk_links:
+            found.setdefault(one, set()).add(other)
+            found.setdefault(other, set()).add(one)
+        return {edge: tuple(sorted(others)) for edge, others in sorted(found.items())}
+
+    @cached_property
+    def links_from(self) -> dict[SumoLaneId, tuple[SumoLink, ...]]:
+        """Connections that leave each lane."""
+        found: dict[SumoLaneId, list[SumoLink]] = {}
+        for link in self.links:
+            found.setdefault(link.from_lane, []).append(link)
+        return {lane: tuple(links) for lane, links in found.items()}
+
+    @cached_property
+    def lane_list(self) -> tuple[SumoLane, ...]:
+        """The SUMO lanes by row."""
+        return tuple(self.lanes.values())
+
+    @cached_property
+    def lane_row(self) -> dict[SumoLaneId, int]:
+        """Row of each SUMO lane."""
+        return {lane: row for row, lane in enumerate(self.lanes)}
+
+    @cached_property
+    def key_row(self) -> dict[LaneKey | Roadside, int]:
+        """Row of each OpenDRIVE lane."""
+        return {key: row for row, key in enumerate(self.lane_keys)}
+
+    @cached_property
+    def spans(self) -> list[Span]:
+        """Which piece answers where on the OpenDRIVE lanes; sorted, without overlaps."""
+        return answering(self.pieces)
+
+    @cached_property
+    def _walk_groups(self) -> dict[SumoEdgeId, SumoEdgeId]:
+        groups: dict[SumoEdgeId, SumoEdgeId] = {}
+        for start in self.walk_neighbours:
+            if start in groups:
+                continue
+            todo = [start]
+            while todo:
+                edge = todo.pop()
+                if edge not in groups:
+                    groups[edge] = start
+                    todo += self.walk_neighbours[edge]
+        return groups
+
+    @cached_property
+    def _piece_sumo(self) -> IntArray:
+        return np.array([piece.sumo for piece in self.pieces] or [-1], dtype=np.int32)
+
+    @cached_property
+    def _piece_lane(self) -> IntArray:
+        return np.array([piece.lane for piece in self.pieces] or [-1], dtype=np.int32)
+
+    @cached_property
+    def _by_s(self) -> Lookup:
+        knots = [
+            (piece.s, piece.pos, piece.deviation)
+            if piece.s[0] < piece.s[-1]
+            else (piece.s[::-1], piece.pos[::-1], piece.deviation[::-1])
+            for piece in self.pieces
+        ]
+        return Lookup.of(
+            knots, [(span.lane, span.low, span.high, span.piece) for span in self.spans]
+        )
+
+    @cached_property
+    def _by_pos(self) -> Lookup:
+        knots = [(piece.pos, piece.s, piece.deviation) for piece in self.pieces]
+        spans = sorted(
+            (piece.sumo, float(piece.pos[0]), float(piece.pos[-1]), index)
+            for index, piece in enumerate(self.pieces)
+        )
+        return Lookup.of(knots, spans)
+
+    # On disk
+
+    def to_json(self) -> str:
+        """One JSON document; the same table gives the same text."""
+        from odscen.convert.lane_table.table_json import to_data
+
+        return json.dumps(to_data(self), separators=(",", ":"), allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> LaneTable:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        GraphFormatError
+            If the text is not a lane table of this version.
+        """
+        from odscen.convert.lane_table.table_json import from_data
+
+        try:
+            return from_data(json.loads(text))
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            msg = f"not a lane table: {type(error).__name__}: {error}"
+            raise GraphFormatError(msg) from error

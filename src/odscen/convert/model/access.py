@@ -1,0 +1,76 @@
+"""Who may use a lane, and how fast: SUMO's vehicle classes and default speeds by lane type."""
+
+from __future__ import annotations
+
+import math
+
+from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+
+BICYCLE_TYPES = frozenset({"biking"})
+
+PEDESTRIAN = frozenset({"pedestrian"})
+BICYCLE = frozenset({"bicycle"})
+
+_MOTOR = frozenset(
+    {"private", "emergency", "authority", "army", "vip", "passenger", "hov", "taxi", "bus", "coach"}
+    | {"delivery", "truck", "trailer", "motorcycle", "evehicle", "custom1", "custom2"}
+)
+_SLOW = frozenset({"bicycle", "moped"})
+_RAMP_TYPES = frozenset({"onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit"})
+_RESERVED = {
+    "bus": frozenset({"bus", "coach", "emergency", "authority"}),
+    "taxi": frozenset({"taxi", "emergency", "authority"}),
+    "HOV": frozenset({"hov", "bus", "coach", "motorcycle", "emergency", "authority"}),
+}
+
+DEFAULT_SPEED = 50.0 / 3.6
+"""m/s, where neither lane nor road says anything."""
+
+NO_LIMIT = 130.0 / 3.6
+"""m/s for "no limit": the advisory speed of German motorways."""
+
+WALKING_SPEED = 2.78
+"""m/s, SUMO's own limit for sidewalks."""
+
+CYCLING_SPEED = 25.0 / 3.6
+
+_ROAD_SPEEDS = {
+    "motorway": NO_LIMIT,
+    "rural": 100.0 / 3.6,
+    "town": DEFAULT_SPEED,
+    "townArterial": 70.0 / 3.6,
+    "townPrivate": 30.0 / 3.6,
+    "lowSpeed": 30.0 / 3.6,
+    "pedestrian": 10.0 / 3.6,
+    "bicycle": CYCLING_SPEED,
+}
+
+
+def allowed(lane_type: str) -> frozenset[str]:
+    """Vehicle classes on a lane; empty for lanes that nobody drives on.
+
+    Walkable lanes are not asked for here: persons have edges of their own.
+    """
+    if lane_type in BICYCLE_TYPES:
+        return BICYCLE
+    if lane_type in _RESERVED:
+        return _RESERVED[lane_type]
+    if lane_type in DRIVABLE_TYPES:
+        return _MOTOR if lane_type in _RAMP_TYPES else _MOTOR | _SLOW
+    return frozenset()
+
+
+def is_used(lane_type: str) -> bool:
+    """Whether lanes of a type become part of the network."""
+    return lane_type in DRIVABLE_TYPES | WALKABLE_TYPES | BICYCLE_TYPES
+
+
+def speed(limit: float, lane_type: str, road_type: str) -> float:
+    """Speed of a lane in m/s from its limit: infinite for "no limit", NaN for not given."""
+    if lane_type in BICYCLE_TYPES:
+        return CYCLING_SPEED
+    if math.isinf(limit):
+        return NO_LIMIT
+    if math.isnan(limit) or limit <= 0.0:
+        return _ROAD_SPEEDS.get(road_type, DEFAULT_SPEED)
+    return limit

@@ -1,0 +1,308 @@
+"""Edges: every road divided into stretches of unchanging lanes, one edge per driving direction.
+
+A road is cut where the lanes of its sections do not simply continue, where speed limits,
+permissions or the right to change lanes change, and at crosswalks, which become junctions of their
+own: cars give way to persons only where SUMO has a crossing, and crossings belong to junctions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.convert.model.access import allowed, speed
+from odscen.convert.model.lane_alignment import Course, Stretch
+from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.base.ids import LaneKey, RoadId
+    from odscen.convert.model.road_gaps import RoadGap
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.road_model import OpenDrive, Road
+
+LEAST_EDGE = 0.05
+"""Metres: shorter stretches of lanes are passed over on the way from one edge to the next."""
+
+LEAST_CUT = 1.0
+"""Metres that a change of limit or mark must lie from the next cut to be one of its own."""
+
+LEAST_WIDTH = 0.3
+"""Metres: lanes that are nowhere wider are none; bad files have them where a lane has ended."""
+
+NO_WIDTH = 0.05
+"""Metres: where a lane is narrower there is no SUMO lane."""
+
+WIDTH_STEP = 0.5
+"""Metres between the places at which widths are looked at."""
+
+MARKS_LEAST = 10.0
+"""Metres: a stretch on which only the right to change lanes differs must be this long.
+
+A shorter one is joined to its neighbours, and the change is permitted on all of it: what a driver
+does within a few metres of broken line SUMO's drivers need the length of an edge for.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeLane:
+    """A lane to be; ``course`` runs in driving direction."""
+
+    course: Course
+    allowed: frozenset[str]
+    speed: float
+    change_left: bool
+    change_right: bool
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class EdgePlan:
+    """An edge to be: ``lanes`` by index, from s ``start`` to ``end`` in driving direction.
+
+    ``stretch`` counts the stretches of the road from its start; ``road`` is a row of the table.
+    """
+
+    road: int
+    stretch: int
+    forward: bool
+    start: float
+    end: float
+    lanes: tuple[EdgeLane, ...]
+
+
+class _LaneState(NamedTuple):
+    """What one lane is like between two cuts; equal ones can be joined."""
+
+    row: int
+    allowed: frozenset[str]
+    speed: float
+    change_left: bool
+    change_right: bool
+    type: str
+
+
+class _RoadPart(NamedTuple):
+    """A road between two cuts: its lanes in SUMO's order, those with growing s first."""
+
+    start: float
+    end: float
+    forward: tuple[_LaneState, ...]
+    backward: tuple[_LaneState, ...]
+
+
+def plan_edges(
+    odr: OpenDrive,
+    table: RoadTable,
+    successors: Mapping[LaneKey, Sequence[LaneKey]],
+    gaps: Mapping[RoadId, Sequence[RoadGap]],
+    *,
+    lefthand: bool,
+) -> tuple[EdgePlan, ...]:
+    """Divide all roads outside junctions into edges.
+
+    Parameters
+    ----------
+    successors
+        Lanes after each lane in driving direction.
+    gaps
+        By road: parts that are left to junctions, sorted, disjoint.
+    lefthand
+        Whether the network numbers lanes from the left.
+    """
+    planner = _Planner(odr, table, successors, lefthand=lefthand)
+    plans: list[EdgePlan] = []
+    for road in odr.roads.values():
+        if road.junction is None:
+            plans += planner.road(road, gaps.get(road.id, ()))
+    return tuple(plans)
+
+
+class _Planner:
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        successors: Mapping[LaneKey, Sequence[LaneKey]],
+        *,
+        lefthand: bool,
+    ) -> None:
+        self._odr = odr
+        self._table = table
+        self._successors = successors
+        self._lefthand = lefthand
+
+    def road(self, road: Road, gaps: Sequence[RoadGap]) -> list[EdgePlan]:
+        row = self._table.road_index[road.id]
+        groups: list[list[_RoadPart]] = []
+        for part in self._parts(road, row, gaps):
+            if groups and self._continues(groups[-1][-1], part):
+                groups[-1].append(part)
+            else:
+                groups.append([part])
+        plans: list[EdgePlan] = []
+        for number, group in enumerate(groups):
+            for forward in (True, False):
+                plan = self._edge(row, number, group, forward=forward)
+                if plan is not None:
+                    plans.append(plan)
+        return plans
+
+    def _parts(self, road: Road, row: int, gaps: Sequence[RoadGap]) -> list[_RoadPart]:
+        borders = {0.0, road.length, *(section.s for section in road.sections)}
+        borders |= {bound for gap in gaps for bound in gap}
+        others = {kind.s for kind in road.types} | self._narrow_ends(road)
+        for section in road.sections:
+            for lane in section.lanes.values():
+                others |= {speed.s for speed in lane.speeds}
+                others |= {mark.s for mark in lane.road_marks}
+        kept = sorted(s for s in borders if 0.0 <= s <= road.length)
+        for place in sorted(others):
+            if 0.0 < place < road.length and all(abs(place - s) >= LEAST_CUT for s in kept):
+                kept.append(place)
+        kept.sort()
+        parts: list[_RoadPart] = []
+        for start, end in pairwise(kept):
+            middle = 0.5 * (start + end)
+            if end - start < LEAST_EDGE or any(gap.start < middle < gap.end for gap in gaps):
+                continue
+            parts.append(self._part(road, row, start, end))
+        return parts
+
+    def _part(self, road: Road, row: int, start: float, end: float) -> _RoadPart:
+        table, middle = self._table, 0.5 * (start + end)
+        kinds = [kind.type for kind in road.types if kind.s <= middle + 1e-6]
+        road_type = kinds[-1] if kinds else ""
+        rows = [
+            int(r)
+            for r in table.lanes_at(row, middle)
+            if allowed(table.lane_type[r])
+            and float(table.lane_s1[r] - table.lane_s0[r]) >= LEAST_EDGE
+            and self._widest(int(r), start, end) >= LEAST_WIDTH
+        ]
+        if not rows:
+            return _RoadPart(start, end, (), ())
+        lanes, at = np.array(rows), np.full(len(rows), middle)
+        outer = table.lane_change_at(lanes, at)
+        inner = table.inner_lane_change_at(lanes, at)
+        limits = table.speed_limit(lanes, at)
+        states: dict[bool, list[_LaneState]] = {True: [], False: []}
+        # Rows ascend in lane id, from right to left as s grows.
+        for index, lane in enumerate(rows):
+            kind, forward = table.lane_type[lane], bool(table.lane_forward[lane])
+            positive = table.lane_id[lane] > 0
+            upper, lower = (outer, inner) if positive else (inner, outer)
+            up = bool(upper[index] & LANE_CHANGE_INCREASE)
+            down = bool(lower[index] & LANE_CHANGE_DECREASE)
+            states[forward].append(
+                _LaneState(
+                    lane,
+                    allowed(kind),
+                    round(speed(float(limits[index]), kind, road_type), 2),
+                    up if forward else down,
+                    down if forward else up,
+                    kind,
+                )
+            )
+        right_first = (tuple(states[True]), tuple(reversed(states[False])))
+        if self._lefthand:
+            right_first = (right_first[0][::-1], right_first[1][::-1])
+        return _RoadPart(start, end, *right_first)
+
+    def _narrow_ends(self, road: Road) -> set[float]:
+        """Where lanes become too narrow to be one, or wide enough."""
+        found: set[float] = set()
+        first = int(self._table.section_first[self._table.road_index[road.id]])
+        for number, section in enumerate(road.sections):
+            rows = range(*(int(n) for n in self._table.section_lanes[first + number :][:2]))
+            lanes = [r for r in rows if allowed(self._table.lane_type[r])]
+            if not lanes:
+                continue
+            count = max(2, int(np.ceil((section.s_end - section.s) / WIDTH_STEP)) + 1)
+            s = np.linspace(section.s, section.s_end, count)
+            width = self._table.lane_width(np.repeat(lanes, count), np.tile(s, len(lanes)))
+            narrow = (width < NO_WIDTH).reshape(len(lanes), count)
+            lane, place = np.nonzero(narrow[:, 1:] != narrow[:, :-1])
+            found |= {
+                self._change(lanes[i], float(s[j]), float(s[j + 1]))
+                for i, j in zip(lane.tolist(), place.tolist(), strict=True)
+            }
+        return found
+
+    def _change(self, row: int, low: float, high: float) -> float:
+        """Where between two places a lane's width passes :data:`NO_WIDTH`, to a millimetre."""
+        ends = self._table.lane_width(np.array([row, row]), np.array([low, high])) < NO_WIDTH
+        while high - low > 1e-3:
+            middle = 0.5 * (low + high)
+            narrow = self._table.lane_width(np.array([row]), np.array([middle]))[0] < NO_WIDTH
+            low, high = (middle, high) if narrow == ends[0] else (low, middle)
+        return high if ends[0] else low
+
+    def _widest(self, row: int, start: float, end: float) -> float:
+        s = np.linspace(start, end, 5)
+        return float(self._table.lane_width(np.full(5, row), s).max())
+
+    def _continues(self, one: _RoadPart, other: _RoadPart) -> bool:
+        if other.start - one.end > 1e-6:
+            return False
+        # A few metres of another mark are no reason for an edge of their own.
+        short = min(one.end - one.start, other.end - other.start) < MARKS_LEAST
+        return all(
+            len(before) == len(after)
+            and all(
+                self._same(*pair, marks=not short, forward=forward)
+                for pair in zip(before, after, strict=True)
+            )
+            for before, after, forward in (
+                (one.forward, other.forward, True),
+                (one.backward, other.backward, False),
+            )
+        )
+
+    def _same(self, one: _LaneState, other: _LaneState, *, marks: bool, forward: bool) -> bool:
+        if (one.allowed, one.speed, one.type) != (other.allowed, other.speed, other.type):
+            return False
+        if marks and one[3:5] != other[3:5]:
+            return False
+        if one.row == other.row:
+            return True
+        source, target = (one, other) if forward else (other, one)
+        keys = self._table.lane_keys
+        return tuple(self._successors[keys[source.row]]) == (keys[target.row],)
+
+    def _edge(
+        self, road: int, number: int, group: list[_RoadPart], *, forward: bool
+    ) -> EdgePlan | None:
+        parts = group if forward else group[::-1]
+        sides = [part.forward if forward else part.backward for part in parts]
+        if not sides[0]:
+            return None
+        longest = max(range(len(parts)), key=lambda i: parts[i].end - parts[i].start)
+        lanes: list[EdgeLane] = []
+        for index, state in enumerate(sides[longest]):
+            course: list[Stretch] = []
+            for part, side in zip(parts, sides, strict=True):
+                start, end = (part.start, part.end) if forward else (part.end, part.start)
+                row = side[index].row
+                if course and course[-1].row == row:
+                    course[-1] = Stretch(row, course[-1].start, end)
+                else:
+                    course.append(Stretch(row, start, end))
+            lanes.append(
+                EdgeLane(
+                    tuple(course),
+                    state.allowed,
+                    state.speed,
+                    any(side[index].change_left for side in sides),
+                    any(side[index].change_right for side in sides),
+                    state.type,
+                )
+            )
+        start, end = group[0].start, group[-1].end
+        if not forward:
+            start, end = end, start
+        return EdgePlan(road, number, forward, start, end, tuple(lanes))

@@ -1,0 +1,255 @@
+"""Right of way in a junction: which movements meet, and who lets whom go first.
+
+Conflicts are found on the ground, between the true courses of the movements. Of two movements that
+meet, the first of these rules that tells them apart decides:
+
+1. vehicles give way to persons on crossings;
+2. in a roundabout, what comes from outside gives way to the ring;
+3. stop gives way to yield and yield to everybody else;
+4. ``<priority>`` of the OpenDRIVE junction;
+5. where lanes only merge, the faster road goes first, and then the straighter way;
+6. one who turns across gives way to oncoming traffic that does not;
+7. right before left (left before right where traffic keeps left).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from odscen.convert.model.net import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FloatArray = NDArray[np.float64]
+
+MOST_WIDTH = 2.0
+"""Metres between two courses on which vehicles are taken to touch; less for narrow lanes."""
+
+WIDTH_SHARE = 0.45
+"""Share of the sum of two lanes' widths that takes the place of :data:`MOST_WIDTH` if smaller."""
+
+LEVEL = 3.0
+"""Metres of height between movements that do not meet."""
+
+WALKER_REACH = 1.0
+"""Metres beside a movement's course that a vehicle needs free of persons."""
+
+_FASTER = 2.0
+"""m/s by which a road must be faster to go first where lanes merge."""
+
+
+class Sign(IntEnum):
+    """What tells an approach to wait; more has less right."""
+
+    NONE = 0
+    YIELD = 1
+    STOP = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Movement:
+    """A way through a junction.
+
+    Attributes
+    ----------
+    source, target
+        Lanes as (edge, index): equal ones are the same lane.
+    shape
+        Shape ``(K, 3)``.
+    width
+        Metres, of the narrower of the lanes before and after.
+    heading_in, heading_out
+        Radians.
+    speed
+        m/s, of the edge before.
+    sign
+        What stands at the approach.
+    ring
+        Whether it comes from within a roundabout.
+    roads
+        OpenDRIVE road that it comes from, and connecting roads that it runs over: files name either
+        in ``<priority>``.
+    """
+
+    source: tuple[str, int]
+    target: tuple[str, int]
+    shape: FloatArray
+    width: float
+    heading_in: float
+    heading_out: float
+    speed: float
+    sign: Sign
+    ring: bool
+    roads: frozenset[str]
+
+    @property
+    def turn(self) -> float:
+        """Change of heading in (-pi, pi], left is positive."""
+        return wrapped(self.heading_out - self.heading_in)
+
+
+class Walkway(NamedTuple):
+    """A crossing: its middle line ``(2, 3)`` and width, metres."""
+
+    axis: FloatArray
+    width: float
+
+
+class Conflicts(NamedTuple):
+    """Pairs of movements that meet (smaller first), and for each crossing the movements over it."""
+
+    pairs: tuple[tuple[int, int], ...]
+    merging: frozenset[tuple[int, int]]
+    crossed: tuple[tuple[int, ...], ...]
+
+
+def wrapped(angle: float) -> float:
+    """Angle in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+def find_conflicts(movements: Sequence[Movement], walkways: Sequence[Walkway]) -> Conflicts:
+    """Find what meets in one junction.
+
+    Movements that come from one edge, or lead to one edge, run side by side there: they meet only
+    if they cross. All others meet if they come closer than a vehicle is wide.
+    """
+    lines = [shapely.LineString(movement.shape[:, :2]) for movement in movements]
+    pairs: list[tuple[int, int]] = []
+    merging: set[tuple[int, int]] = set()
+    if len(movements) > 1:
+        tree = shapely.STRtree(lines)
+        near = tree.query(lines, predicate="dwithin", distance=MOST_WIDTH)
+        for i, j in sorted(zip(*near.tolist(), strict=True)):
+            if i >= j:
+                continue
+            kind = _meeting(movements[i], movements[j], lines[i], lines[j])
+            if kind:
+                pairs.append((i, j))
+                if kind == "merge":
+                    merging.add((i, j))
+    crossed = tuple(_crossed(walkway, movements, lines) for walkway in walkways)
+    return Conflicts(tuple(pairs), frozenset(merging), crossed)
+
+
+def _meeting(
+    one: Movement, other: Movement, line: shapely.LineString, line2: shapely.LineString
+) -> str:
+    if one.source == other.source:
+        return ""
+    if one.target == other.target:
+        return "merge"
+    if one.source[0] == other.source[0] or one.target[0] == other.target[0]:
+        return "cross" if _truly_cross(line, line2) else ""
+    reach = min(MOST_WIDTH, WIDTH_SHARE * (one.width + other.width))
+    if line.distance(line2) >= reach or not _level(one.shape, other.shape):
+        return ""
+    return "cross"
+
+
+def _truly_cross(one: shapely.LineString, other: shapely.LineString) -> bool:
+    """Whether lines cross elsewhere than where they begin or end."""
+    if not one.intersects(other):
+        return False
+    shared = one.intersection(other)
+    ends = shapely.MultiPoint([one.coords[0], one.coords[-1], other.coords[0], other.coords[-1]])
+    rest = shared.difference(ends.buffer(0.5))
+    return not rest.is_empty
+
+
+def _level(one: FloatArray, other: FloatArray) -> bool:
+    low = max(float(one[:, 2].min()), float(other[:, 2].min()))
+    high = min(float(one[:, 2].max()), float(other[:, 2].max()))
+    return low - high < LEVEL
+
+
+def _crossed(
+    walkway: Walkway, movements: Sequence[Movement], lines: Sequence[shapely.LineString]
+) -> tuple[int, ...]:
+    area = shapely.LineString(walkway.axis[:, :2]).buffer(walkway.width / 2.0, cap_style="flat")
+    return tuple(
+        index
+        for index, (movement, line) in enumerate(zip(movements, lines, strict=True))
+        if area.distance(line) < WALKER_REACH and _level(walkway.axis, movement.shape)
+    )
+
+
+class Rules(NamedTuple):
+    """What a junction says on right of way, beyond its movements."""
+
+    high_low: frozenset[tuple[str, str]] = frozenset()
+    lefthand: bool = False
+    all_stop: bool = False
+
+
+def requests(
+    movements: Sequence[Movement], conflicts: Conflicts, rules: Rules
+) -> tuple[Request, ...]:
+    """Requests of all links of a junction: first the movements, then the crossings."""
+    count = len(movements)
+    foes: list[set[int]] = [set() for _ in range(count + len(conflicts.crossed))]
+    yields: list[set[int]] = [set() for _ in foes]
+    only_merges = len(conflicts.merging) == len(conflicts.pairs)
+    for i, j in conflicts.pairs:
+        foes[i].add(j)
+        foes[j].add(i)
+        if rules.all_stop:
+            yields[i].add(j)
+            yields[j].add(i)
+        elif _waits(movements[i], movements[j], rules, (i, j) in conflicts.merging, only_merges):
+            yields[i].add(j)
+        else:
+            yields[j].add(i)
+    for number, crossed in enumerate(conflicts.crossed):
+        for link in crossed:
+            foes[link].add(count + number)
+            foes[count + number].add(link)
+            yields[link].add(count + number)
+    return tuple(
+        Request(frozenset(before), frozenset(met)) for before, met in zip(yields, foes, strict=True)
+    )
+
+
+def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merges: bool) -> bool:
+    """Whether ``one`` gives way to ``other``; exactly one of the two does."""
+    if one.ring != other.ring:
+        return other.ring
+    if one.sign != other.sign:
+        return one.sign > other.sign
+    ruled = _ruled(one, other, rules)
+    if ruled is not None:
+        return ruled
+    if merge and (only_merges or abs(wrapped(one.heading_in - other.heading_in)) < math.pi / 4):
+        if abs(one.speed - other.speed) > _FASTER:
+            return one.speed < other.speed
+        if abs(abs(one.turn) - abs(other.turn)) > 0.05:
+            return abs(one.turn) > abs(other.turn)
+    return _waits_by_place(one, other, -1.0 if rules.lefthand else 1.0)
+
+
+def _ruled(one: Movement, other: Movement, rules: Rules) -> bool | None:
+    """What ``<priority>`` says on who gives way, if anything that does not contradict itself."""
+    pairs = [(mine, theirs) for mine in one.roads for theirs in other.roads]
+    waits = any((theirs, mine) in rules.high_low for mine, theirs in pairs)
+    goes = any(pair in rules.high_low for pair in pairs)
+    return waits if waits != goes else None
+
+
+def _waits_by_place(one: Movement, other: Movement, side: float) -> bool:
+    """Oncoming traffic before those who turn across, then right before left (``side`` 1)."""
+    angle = side * wrapped(other.heading_in - one.heading_in)
+    if abs(angle) > 0.75 * math.pi:
+        own_turn, their_turn = side * one.turn, side * other.turn
+        if abs(own_turn - their_turn) > 0.1:
+            return own_turn > their_turn
+    elif abs(angle) > 0.05:
+        return angle > 0.0
+    return (one.source, one.target) > (other.source, other.target)

@@ -1,0 +1,1 @@
+"""Pedestrians in SUMO's network: crossings, walking areas and sidewalks."""

@@ -1,0 +1,543 @@
+"""The pedestrian network: the pedestrian graph in SUMO's terms.
+
+Every way along the graph becomes an edge for persons only, every crosswalk a crossing, and wherever
+they meet is a walking area. SUMO lets persons cross a junction only on walking areas and crossings
+of that same junction; so a walking area at a crosswalk belongs to the junction whose traffic the
+crosswalk stops, all others are small junctions of their own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.convert.model.access import PEDESTRIAN, WALKING_SPEED
+from odscen.convert.model.connections import Groups, NodeKey
+from odscen.convert.model.lane_alignment import Course, Line, Stretch, evaluate
+from odscen.convert.model.net import (
+    CROSSING,
+    LEAST_LENGTH,
+    NORMAL,
+    WALKING_AREA,
+    NetEdge,
+    NetJunction,
+    NetLane,
+    NetLink,
+)
+from odscen.convert.model.right_of_way import Walkway
+from odscen.lanegraph.graphs import WalkKind
+from odscen.lanegraph.pedestrian_graph import ROADSIDE_OFFSET, ROADSIDE_WIDTH
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
+    from odscen.lanegraph.graphs import PedestrianGraph
+    from odscen.opendrive.lanes import RoadTable
+
+FloatArray = NDArray[np.float64]
+
+TRIM = 0.6
+"""Metres that an edge keeps off the middle of a walking area."""
+
+APART = 1.0
+"""Metres between places of one walk where crosswalks begin, unless they are the same place."""
+
+TOGETHER = 2.5
+"""Metres between the ends of crosswalks of one junction that share a walking area."""
+
+
+class WalkLane(NamedTuple):
+    """A pedestrian edge and what it lies on."""
+
+    edge: NetEdge
+    line: Line
+    course: Course
+
+
+class PlacedCrossing(NamedTuple):
+    """A crossing of a junction and the walking area at which it starts."""
+
+    edge: NetEdge
+    walkway: Walkway
+    start: SumoLaneId
+    link: NetLink
+
+
+@dataclass(frozen=True, slots=True)
+class WalkNet:
+    """All that persons walk on.
+
+    ``crossings`` are those of each junction, in the order in which the junction counts them;
+    ``junctions`` those that exist for persons only.
+    """
+
+    lanes: tuple[WalkLane, ...]
+    areas: tuple[NetEdge, ...]
+    crossings: dict[str, tuple[PlacedCrossing, ...]]
+    links: tuple[NetLink, ...]
+    walk_links: tuple[tuple[SumoEdgeId, SumoEdgeId], ...]
+    junctions: tuple[NetJunction, ...]
+
+
+@dataclass(slots=True, eq=False)
+class _WalkingArea:
+    """A place where ways meet; ``junction`` is empty until one is known."""
+
+    junction: str = ""
+    arms: list[tuple[FloatArray, float]] = field(default_factory=list)  # cross lines: (2, 3)
+    edges: list[tuple[SumoEdgeId, bool]] = field(default_factory=list)  # and whether they end here
+    crossings: int = 0
+    area: SumoEdgeId | None = None
+
+
+class _Arc(NamedTuple):
+    """A part of a walk between two hubs; ``walk`` is a row of the graph's lane keys."""
+
+    walk: int
+    start: float
+    end: float
+    first: NodeKey
+    last: NodeKey
+
+
+class _CrosswalkEnd(NamedTuple):
+    """A crosswalk's end on a walk."""
+
+    s: float
+    crosswalk: int
+    which: int
+
+
+def build_walks(
+    graph: PedestrianGraph,
+    table: RoadTable,
+    crosswalks: Sequence[PlacedCrosswalk],
+    junctions: Sequence[str],
+) -> WalkNet:
+    """Make the pedestrian network.
+
+    Parameters
+    ----------
+    graph
+        The pedestrian graph of the map.
+    crosswalks
+        All crosswalks of the map.
+    junctions
+        The junction of each crosswalk.
+    """
+    return _WalkNetBuilder(graph, table, crosswalks, junctions).build()
+
+
+class _WalkNetBuilder:
+    def __init__(
+        self,
+        graph: PedestrianGraph,
+        table: RoadTable,
+        crosswalks: Sequence[PlacedCrosswalk],
+        junctions: Sequence[str],
+    ) -> None:
+        self._graph = graph
+        self._table = table
+        self._crosswalks = crosswalks
+        self._junctions = junctions
+        self._rows = [table.lane_index[key] for key in graph.lane_keys]
+        self._hubs: dict[NodeKey, _WalkingArea] = {}
+        self._ends: dict[tuple[int, int], NodeKey] = {}  # hub of each end of each crosswalk
+        self._lanes: list[WalkLane] = []
+        self._number = 0
+        self._own: list[NetJunction] = []
+
+    def build(self) -> WalkNet:
+        clusters = self._clusters()
+        arcs = self._arcs(clusters)
+        chains = self._chains(arcs)
+        self._free_ends()
+        self._lay(chains)
+        crossings = self._crossings()
+        areas, links, pairs = self._areas(crossings)
+        return WalkNet(
+            tuple(self._lanes),
+            tuple(areas),
+            {junction: tuple(own) for junction, own in crossings.items()},
+            tuple(links),
+            tuple(sorted(pairs)),
+            tuple(self._own),
+        )
+
+    # Topology
+
+    def _clusters(self) -> Groups:
+        """Ends ``(walk, 0 or 1)`` of walks, joined where the graph joins them."""
+        graph, groups = self._graph, Groups()
+        for walk in range(len(graph.lane_keys)):
+            groups.find((walk, 0))
+            groups.find((walk, 1))
+        joints = np.flatnonzero(graph.kind == WalkKind.JOINT)
+        if len(joints):
+            places = self._end_places()
+            for edge in joints.tolist():
+                one, other = int(graph.source[edge]), int(graph.target[edge])
+                groups.join(self._end_of(one, other, places), self._end_of(other, one, places))
+        return groups
+
+    def _end_places(self) -> FloatArray:
+        """Places of both ends of all walks, shape ``(W, 2, 3)``."""
+        lines = evaluate([(self._stretch(w, *self._bounds(w)),) for w in range(len(self._rows))],
+                         self._table)  # fmt: skip
+        return np.array([(line.shape[0], line.shape[-1]) for line in lines])
+
+    def _end_of(self, node: int, other: int, places: FloatArray) -> tuple[int, int]:
+        graph = self._graph
+        walk = int(graph.lane[node])
+        first, last = int(graph.first_node[walk]), int(graph.first_node[walk + 1]) - 1
+        if first < last:
+            return (walk, 0) if node == first else (walk, 1)
+        # A walk of one node: the end on the side of the other walk.
+        there = places[int(graph.lane[other])]
+        gaps = [float(np.linalg.norm(there - place, axis=1).min()) for place in places[walk]]
+        return (walk, int(gaps[1] < gaps[0]))
+
+    def _bounds(self, walk: int) -> tuple[float, float]:
+        row = self._rows[walk]
+        return float(self._table.lane_s0[row]), float(self._table.lane_s1[row])
+
+    def _stretch(self, walk: int, start: float, end: float) -> Stretch:
+        if self._graph.roadside[walk]:
+            return Stretch(self._rows[walk], start, end, 1.0, ROADSIDE_OFFSET)
+        return Stretch(self._rows[walk], start, end)
+
+    def _crosswalk_ends(self) -> dict[int, list[_CrosswalkEnd]]:
+        """Where crosswalks begin on each walk, by s."""
+        graph = self._graph
+        index = {
+            f"{placed.crosswalk.road}:{placed.crosswalk.object_id}": number
+            for number, placed in enumerate(self._crosswalks)
+        }
+        found: dict[int, list[_CrosswalkEnd]] = {}
+        for edge in np.flatnonzero(graph.kind == WalkKind.CROSSWALK).tolist():
+            number = index[graph.crosswalk[edge]]
+            axis = self._crosswalks[number].crosswalk.axis
+            nodes = [int(graph.source[edge]), int(graph.target[edge])]
+            places = np.array([(graph.x[node], graph.y[node]) for node in nodes])
+            straight = np.linalg.norm(places - axis, axis=1).sum()
+            swapped = np.linalg.norm(places[::-1] - axis, axis=1).sum()
+            for which, node in enumerate(nodes if straight <= swapped else nodes[::-1]):
+                end = _CrosswalkEnd(float(graph.s[node]), number, which)
+                found.setdefault(int(graph.lane[node]), []).append(end)
+        return {walk: sorted(ends) for walk, ends in found.items()}
+
+    def _arcs(self, clusters: Groups) -> list[_Arc]:
+        """Divide the walks at the ends of crosswalks."""
+        ends = self._crosswalk_ends()
+        arcs: list[_Arc] = []
+        for walk in range(len(self._rows)):
+            low, high = self._bounds(walk)
+            before: tuple[float, NodeKey] = (low, clusters.find((walk, 0)))
+            last: NodeKey = clusters.find((walk, 1))
+            for end in ends.get(walk, ()):
+                junction = self._junctions[end.crosswalk]
+                hub = self._hubs.get(before[1])
+                near = end.s - before[0]
+                if near < TOGETHER and hub is not None and hub.junction == junction:
+                    self._attach(end, before[1], junction)
+                    continue
+                if near < APART and self._takes(before[1], junction):
+                    self._attach(end, before[1], junction)
+                    continue
+                if high - end.s < APART and self._takes(last, junction):
+                    self._attach(end, last, junction)
+                    continue
+                place = max(end.s, before[0] + min(APART, 0.3 * (high - before[0])))
+                key = ("crosswalk", end.crosswalk, end.which)
+                self._attach(end, key, junction)
+                arcs.append(_Arc(walk, before[0], place, before[1], key))
+                before = (place, key)
+            arcs.append(_Arc(walk, before[0], high, before[1], last))
+        return arcs
+
+    def _takes(self, key: NodeKey, junction: str) -> bool:
+        hub = self._hubs.get(key)
+        return hub is None or hub.junction in ("", junction)
+
+    def _attach(self, end: _CrosswalkEnd, key: NodeKey, junction: str) -> None:
+        hub = self._hubs.setdefault(key, _WalkingArea())
+        hub.junction = junction
+        hub.crossings += 1
+        self._ends[end.crosswalk, end.which] = key
+
+    def _chains(self, arcs: Sequence[_Arc]) -> list[list[tuple[_Arc, bool]]]:
+        """Join arcs that simply follow each other; the flag says gone along from start to end."""
+        degree = Counter(key for arc in arcs for key in (arc.first, arc.last))
+        meeting: dict[object, list[int]] = {}
+        for number, arc in enumerate(arcs):
+            meeting.setdefault(arc.first, []).append(number)
+            meeting.setdefault(arc.last, []).append(number)
+        passed = {key for key, count in degree.items() if count == 2 and key not in self._hubs}
+        used: set[int] = set()
+        chains: list[list[tuple[_Arc, bool]]] = []
+
+        def follow(number: int, key: NodeKey) -> list[tuple[_Arc, bool]]:
+            chain: list[tuple[_Arc, bool]] = []
+            while number not in used:
+                used.add(number)
+                arc = arcs[number]
+                along = arc.first == key
+                chain.append((arc, along))
+                key = arc.last if along else arc.first
+                if key not in passed:
+                    break
+                number = next((n for n in meeting[key] if n not in used), number)
+            return chain
+
+        for number, arc in enumerate(arcs):
+            start = next((key for key in (arc.first, arc.last) if key not in passed), None)
+            if number not in used and start is not None:
+                chains.append(follow(number, start))
+        for number, arc in enumerate(arcs):  # what is left are rings
+            if number not in used:
+                passed.discard(arc.first)
+                chains.append(follow(number, arc.first))
+        return chains
+
+    def _free_ends(self) -> None:
+        """Give crosswalk ends without a walk a hub of their own; ends side by side share one."""
+        free: dict[str, list[tuple[NodeKey, FloatArray]]] = {}
+        for number, placed in enumerate(self._crosswalks):
+            junction = self._junctions[number]
+            for which in (0, 1):
+                if (number, which) in self._ends:
+                    continue
+                place = placed.crosswalk.axis[which]
+                known = free.setdefault(junction, [])
+                key = next(
+                    (k for k, p in known if float(np.linalg.norm(p - place)) < TOGETHER),
+                    ("crosswalk", number, which),
+                )
+                known.append((key, place))
+                self._attach(_CrosswalkEnd(0.0, number, which), key, junction)
+
+    # Geometry
+
+    def _lay(self, chains: Sequence[list[tuple[_Arc, bool]]]) -> None:
+        """Make an edge of each chain, of three parts if both ends are at one junction."""
+        courses: list[Course] = []
+        ends: list[tuple[NodeKey, NodeKey]] = []
+        for chain in chains:
+            course = tuple(
+                self._stretch(arc.walk, *((arc.start, arc.end) if along else (arc.end, arc.start)))
+                for arc, along in chain
+            )
+            first = chain[0][0].first if chain[0][1] else chain[0][0].last
+            last = chain[-1][0].last if chain[-1][1] else chain[-1][0].first
+            course = tuple(s for s in course if s.extent > 1e-3)
+            if sum(s.extent for s in course) < LEAST_LENGTH:
+                continue
+            one, other = self._hub(first), self._hub(last)
+            if one is other or (one.junction and one.junction == other.junction):
+                # Of two parts both would join the same junctions, and SUMO could not tell
+                # whether a walk from one to the other goes over the middle or round the ends.
+                keys = [("part", len(courses)), ("part", len(courses) + 1)]
+                courses += _thirds(course)
+                ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
+            else:
+                courses.append(course)
+                ends.append((first, last))
+        meetings = Counter(key for pair in ends for key in pair)
+
+        def meets(key: NodeKey) -> bool:
+            return meetings[key] + self._hub(key).crossings > 1
+
+        trimmed = [
+            _trimmed(course, start=meets(pair[0]), end=meets(pair[1]))
+            for course, pair in zip(courses, ends, strict=True)
+        ]
+        for line, course, pair in zip(evaluate(trimmed, self._table), trimmed, ends, strict=True):
+            self._edge(line, course, pair)
+
+    def _hub(self, key: NodeKey) -> _WalkingArea:
+        return self._hubs.setdefault(key, _WalkingArea())
+
+    def _edge(self, line: Line, course: Course, ends: tuple[NodeKey, NodeKey]) -> None:
+        roadside = course[0].at == 1.0
+        name = f"w{self._number}"
+        self._number += 1
+        edge, lane = SumoEdgeId(name), SumoLaneId(f"{name}_0")
+        width = ROADSIDE_WIDTH if roadside else max(line.widths[1], 0.5)
+        junctions: list[str] = []
+        for key, which in ((ends[0], 0), (ends[1], -1)):
+            hub = self._hub(key)
+            if not hub.junction:
+                hub.junction = f"walk{len(self._own)}"
+                ends_at = _across(line.shape, which, width)
+                self._own.append(
+                    NetJunction(hub.junction, "dead_end", _triple(line.shape[which]), ends_at)
+                )
+            junctions.append(hub.junction)
+            hub.arms.append((_across(line.shape, which, width), width))
+            hub.edges.append((edge, which == -1))
+        walk = NetLane(
+            lane,
+            0,
+            round(max(line.length, LEAST_LENGTH), 4),
+            WALKING_SPEED,
+            round(width, 2),
+            PEDESTRIAN,
+            line.shape,
+            type="roadside" if roadside else "sidewalk",
+            xodr=tuple(dict.fromkeys(self._name(stretch.row) for stretch in course)),
+        )
+        net_edge = NetEdge(edge, NORMAL, (walk,), junctions[0], junctions[1], priority=0)
+        self._lanes.append(WalkLane(net_edge, line, course))
+
+    def _name(self, row: int) -> str:
+        key = self._table.lane_keys[row]
+        return f"{key.road}_{key.lane}"
+
+    def _crossings(self) -> dict[str, list[PlacedCrossing]]:
+        """Crossings by junction; walking areas get their names here, in the order of need."""
+        counts: Counter[str] = Counter()
+
+        def area(key: NodeKey) -> SumoEdgeId:
+            hub = self._hubs[key]
+            if hub.area is None:
+                hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")
+                counts[hub.junction] += 1
+            return hub.area
+
+        found: dict[str, list[PlacedCrossing]] = {}
+        order = sorted(
+            range(len(self._crosswalks)),
+            key=lambda n: (self._junctions[n], str(self._ends[n, 0]), n),
+        )
+        for number in order:
+            placed, junction = self._crosswalks[number], self._junctions[number]
+            start, end = area(self._ends[number, 0]), area(self._ends[number, 1])
+            own = found.setdefault(junction, [])
+            edge = SumoEdgeId(f":{junction}_c{len(own)}")
+            thing = placed.crosswalk
+            axis = np.column_stack((thing.axis, np.full(2, thing.z)))
+            length = float(np.linalg.norm(axis[1] - axis[0]))
+            width = max(thing.width, 0.5)
+            lane = NetLane(
+                SumoLaneId(f"{edge}_0"),
+                0,
+                round(max(length, LEAST_LENGTH), 4),
+                WALKING_SPEED,
+                round(width, 2),
+                PEDESTRIAN,
+                axis,
+                xodr=(f"{thing.road}:{thing.object_id}",),
+            )
+            for which in (0, 1):
+                across = _across(axis, 0 if which == 0 else -1, width)
+                self._hubs[self._ends[number, which]].arms.append((across, width))
+            link = NetLink(edge, end)
+            crossing = NetEdge(edge, CROSSING, (lane,))
+            walkway = Walkway(axis, width)
+            own.append(PlacedCrossing(crossing, walkway, SumoLaneId(f"{start}_0"), link))
+        for hub in self._hubs.values():
+            if hub.area is None and len(hub.edges) > 1:
+                hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")
+                counts[hub.junction] += 1
+        return found
+
+    def _areas(
+        self, crossings: dict[str, list[PlacedCrossing]]
+    ) -> tuple[list[NetEdge], list[NetLink], set[tuple[SumoEdgeId, SumoEdgeId]]]:
+        areas: list[NetEdge] = []
+        links: list[NetLink] = []
+        pairs: set[tuple[SumoEdgeId, SumoEdgeId]] = set()
+
+        def pair(one: SumoEdgeId, other: SumoEdgeId) -> None:
+            pairs.add((one, other) if one < other else (other, one))
+
+        for hub in self._hubs.values():
+            if hub.area is None:
+                continue
+            outline = _outline([arm for arm, _ in hub.arms])
+            size = float(np.ptp(outline[:, :2], axis=0).max())
+            lane = NetLane(
+                SumoLaneId(f"{hub.area}_0"),
+                0,
+                round(max(size, 0.5), 4),
+                WALKING_SPEED,
+                round(min(width for _, width in hub.arms), 2),
+                PEDESTRIAN,
+                outline,
+            )
+            areas.append(NetEdge(hub.area, WALKING_AREA, (lane,)))
+            for edge, ends_here in hub.edges:
+                links.append(NetLink(edge, hub.area) if ends_here else NetLink(hub.area, edge))
+                pair(hub.area, edge)
+        for own in crossings.values():
+            for crossing in own:
+                start = SumoEdgeId(crossing.start.removesuffix("_0"))
+                pair(start, crossing.edge.id)
+                pair(crossing.edge.id, crossing.link.target)
+        return areas, links, pairs
+
+
+def _triple(place: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in place)
+    return x, y, z
+
+
+def _across(shape: FloatArray, which: int, width: float) -> FloatArray:
+    """Line across the start (0) or the end (-1) of a shape, shape ``(2, 3)``."""
+    step = shape[1] - shape[0] if which == 0 else shape[-1] - shape[-2]
+    length = max(float(np.hypot(step[0], step[1])), 1e-9)
+    normal = np.array([-step[1], step[0], 0.0]) / length * (width / 2.0)
+    result: FloatArray = np.stack([shape[which] - normal, shape[which] + normal])
+    return result
+
+
+def _outline(arms: Sequence[FloatArray]) -> FloatArray:
+    points = np.concatenate(list(arms))
+    z = float(points[:, 2].mean())
+    hull = shapely.MultiPoint(points[:, :2]).convex_hull
+    if hull.geom_type != "Polygon" or hull.area < 0.05:
+        hull = hull.buffer(TRIM, quad_segs=1)
+    outline = np.array(hull.exterior.coords)[:-1]
+    return np.column_stack((outline, np.full(len(outline), z)))
+
+
+def _thirds(course: Course) -> list[Course]:
+    """Divide a course into three parts of about the same extent."""
+    third = sum(stretch.extent for stretch in course) / 3.0
+    head, rest = _divided(course, third)
+    return [head, *_divided(rest, third)]
+
+
+def _divided(course: Course, extent: float) -> tuple[Course, Course]:
+    """Divide a course after ``extent`` metres of s."""
+    for index, stretch in enumerate(course):
+        if extent < stretch.extent or index == len(course) - 1:
+            share = min(max(extent / stretch.extent, 0.1), 0.9)
+            middle = stretch.start + share * (stretch.end - stretch.start)
+            head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
+            return (*course[:index], head), (tail, *course[index + 1 :])
+        extent -= stretch.extent
+    raise AssertionError
+
+
+def _trimmed(course: Course, *, start: bool, end: bool) -> Course:
+    """Take :data:`TRIM` off the ends that meet others, at most a quarter of the last stretch."""
+    result = list(course)
+    if start:
+        old = result[0]
+        result[0] = old._replace(start=old.start + _cut(old))
+    if end:
+        old = result[-1]
+        result[-1] = old._replace(end=old.end - _cut(old))
+    return tuple(result)
+
+
+def _cut(stretch: Stretch) -> float:
+    return min(TRIM, stretch.extent / 4.0) * (1.0 if stretch.end > stretch.start else -1.0)

@@ -1,0 +1,1 @@
+"""Traffic lights: the map's signals, and the programs made from them."""

@@ -1,0 +1,1 @@
+"""How faithfully a SUMO network follows its map, measured anew."""

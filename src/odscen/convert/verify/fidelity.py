@@ -1,0 +1,284 @@
+"""How faithfully a SUMO network follows the map it was made from, measured anew.
+
+Everything is compared by geometry: neither the lane table nor the ids of the network are used, and
+nothing of the conversion is. What the map says is taken from the road model
+(:mod:`odscen.opendrive`), what SUMO has from the text of its ``.net.xml``.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from odscen.convert.verify.fidelity_result import (
+    CROSSWALK_SHARE,
+    MAX_P99,
+    NEAR,
+    Cover,
+    Deviation,
+    FarPlace,
+    Fidelity,
+    LaneRelation,
+    LostCrosswalk,
+    UncoveredStretch,
+)
+from odscen.convert.verify.lane_relations import (
+    is_between_roads,
+    lane_relations,
+    passed_over,
+    sumo_ends,
+    ways_over_short_lanes,
+)
+from odscen.convert.verify.net_reader import read_net
+from odscen.convert.verify.polyline_finder import STEP, Finder, Polylines
+from odscen.convert.verify.signal_safety import compare_signals, unsafe_pairs
+from odscen.opendrive.objects import crosswalks
+from odscen.opendrive.profiles import offsets
+from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.convert.verify.lane_relations import LanePair, RoadLane
+    from odscen.convert.verify.net_reader import NetFile, NetFileLane
+    from odscen.convert.verify.polyline_finder import FloatArray, IntArray
+    from odscen.opendrive.lanes import BoolArray, RoadTable
+    from odscen.opendrive.road_model import OpenDrive
+
+REACH = 10.0
+"""Metres beyond which no lane is looked for; a lane with none so near counts as that far off."""
+
+_PLACE_STEP = 1.0
+_MIN_WIDTH = 0.05
+"""Where a lane is narrower than this, in metres, it is not there yet."""
+_MIN_GAP = 1.0
+
+
+def verify(net_xml: bytes, odr: OpenDrive, table: RoadTable) -> Fidelity:
+    """Compare a SUMO network with the map it was made from.
+
+    Parameters
+    ----------
+    net_xml
+        Text of the ``.net.xml``.
+    odr, table
+        Road model of the map and its evaluation.
+
+    Raises
+    ------
+    InputError
+        If the network cannot be read.
+    """
+    net = read_net(net_xml)
+    drivable = _MapLanes(odr, table, DRIVABLE_TYPES)
+    walkable = _MapLanes(odr, table, WALKABLE_TYPES)
+    drives = net.driving("normal", "internal")
+    on_roads, far_on_roads = _deviation(net.driving("normal"), drivable)
+    inside, far_inside = _deviation(net.driving("internal"), drivable)
+    covered = drivable.covered(drives, directed=True)
+    walks = [
+        ln for ln in net.lanes.values() if ln.function == "normal" and ln.walks and not ln.cars
+    ]
+    walked = walkable.covered(walks, directed=False)
+    relations, missing, invented = _relations(net, odr, drivable)
+    shown, lost = _crosswalks(net, odr, table)
+    return Fidelity(
+        normal=on_roads,
+        internal=inside,
+        far_places=tuple(sorted(far_on_roads + far_inside, key=lambda far: -far.metres)),
+        coverage=drivable.cover(covered, drivable.everywhere),
+        coverage_roads=drivable.cover(covered, ~drivable.inside),
+        coverage_junctions=drivable.cover(covered, drivable.inside),
+        gaps=drivable.gaps(covered),
+        relations=relations,
+        missing=missing,
+        invented=invented,
+        sidewalks=walkable.cover(walked, walkable.everywhere),
+        sidewalk_gaps=walkable.gaps(walked),
+        crosswalks=shown,
+        lost_crosswalks=lost,
+        cars_on_sidewalks=_cars_on(walkable, drivable, drives),
+        signals=compare_signals(net, odr, drivable.finder, drivable.junctions()),
+        unsafe_pairs=unsafe_pairs(net),
+        wrong_side=odr.rule != "mixed" and net.left_hand != (odr.rule == "LHT"),
+    )
+
+
+class _MapLanes:
+    """Lanes of the map of some types, cut into pieces.
+
+    Attributes
+    ----------
+    rows
+        Shape ``(L,)``: rows of ``RoadTable.lane_keys``; line k of ``lines`` is lane ``rows[k]``.
+    finder
+        Over pieces of the lanes' centres, in driving direction.
+    places
+        A metre apart, where the lanes are wide enough to be there.
+    inside
+        Shape ``(P,)``: which of the places lie on connecting roads.
+    """
+
+    def __init__(self, odr: OpenDrive, table: RoadTable, types: frozenset[str]) -> None:
+        self.odr, self.table = odr, table
+        chosen = [row for row, kind in enumerate(table.lane_type) if kind in types]
+        self.rows: IntArray = np.array(chosen, dtype=np.int64)
+        self.lines = _centre_lines(table, self.rows)
+        self.finder = Finder(self.lines.cut(STEP))
+        places = self.lines.cut(_PLACE_STEP)
+        self.places = places.take(places.width >= _MIN_WIDTH)
+        in_junction = [
+            self.odr.roads[table.lane_keys[row].road].junction is not None for row in chosen
+        ]
+        self.lane_inside = np.array(in_junction, dtype=bool)
+        self.inside = self.lane_inside[self.places.owner]
+        self.everywhere = np.ones_like(self.inside)
+
+    def junctions(self) -> list[str | None]:
+        """Junction of the road of each lane; shape ``(L,)``."""
+        keys = self.table.lane_keys
+        return [self.odr.roads[keys[row].road].junction for row in self.rows]
+
+    def covered(self, lanes: list[NetFileLane], *, directed: bool) -> BoolArray:
+        """Whether each place has one of the lanes beside it."""
+        finder = Finder(Polylines.of([lane.shape for lane in lanes]).cut(STEP))
+        distance, row = finder.nearest(self.places, 2.0 * NEAR, directed=directed)
+        return (row >= 0) & (distance <= NEAR)
+
+    def cover(self, covered: BoolArray, among: BoolArray) -> Cover:
+        """Length of the places among which to count, and the share of it that is covered."""
+        length = self.places.length[among]
+        total = float(length.sum())
+        share = float(length[covered[among]].sum()) / total if total else 1.0
+        return Cover(total, share)
+
+    def gaps(self, covered: BoolArray) -> tuple[UncoveredStretch, ...]:
+        """Lanes that lack more than a metre, in the order of the map."""
+        bare = self.places.take(~covered)
+        lacking = np.bincount(bare.owner, weights=bare.length, minlength=len(self.rows))
+        gaps = []
+        for lane in np.flatnonzero(lacking > _MIN_GAP):
+            where = np.flatnonzero(bare.owner == lane)
+            place = _xy(bare.xy[where[len(where) // 2]])
+            key = self.table.lane_keys[self.rows[lane]]
+            gaps.append(UncoveredStretch(str(key), *place, float(lacking[lane])))
+        return tuple(gaps)
+
+
+def _centre_lines(table: RoadTable, rows: IntArray) -> Polylines:
+    """Centre lines of lanes in driving direction, a point every 0.25 m of s."""
+    s0, s1 = table.lane_s0[rows], table.lane_s1[rows]
+    count = np.ceil((s1 - s0) / STEP).astype(np.int64) + 1
+    count = np.maximum(count, 2)
+    first = offsets(count)
+    line = np.repeat(np.arange(len(rows)), count)
+    share = (np.arange(first[-1]) - first[line]) / (count[line] - 1)
+    forward = table.lane_forward[rows][line]
+    share = np.where(forward, share, 1.0 - share)
+    points = table.lane_points(rows[line], s0[line] + share * (s1 - s0)[line])
+    return Polylines(np.stack([points.x, points.y, points.width], axis=1), first)
+
+
+def _deviation(lanes: list[NetFileLane], drivable: _MapLanes) -> tuple[Deviation, list[FarPlace]]:
+    """Distance of SUMO lanes from the map's, and the farthest place of each lane that is far."""
+    places = Polylines.of([lane.shape for lane in lanes]).cut(_PLACE_STEP)
+    distance, _ = drivable.finder.nearest(places, REACH)
+    if not len(distance):
+        return Deviation(len(lanes), 0, 0.0, 0.0, 0.0, 0.0, 0.0), []
+    p50, p95, p99 = np.percentile(distance, (50, 95, 99)).tolist()
+    far = float(np.mean(distance > NEAR))
+    order = np.lexsort((-distance, places.owner))
+    owner, at = np.unique(places.owner[order], return_index=True)
+    worst = order[at]
+    found = [
+        FarPlace(lanes[lane].id, *_xy(places.xy[row]), float(distance[row]))
+        for lane, row in zip(owner.tolist(), worst.tolist(), strict=True)
+        if distance[row] > MAX_P99
+    ]
+    return Deviation(len(lanes), len(distance), p50, p95, p99, float(distance.max()), far), found
+
+
+def _cars_on(walkable: _MapLanes, drivable: _MapLanes, lanes: list[NetFileLane]) -> tuple[str, ...]:
+    """Lanes for cars that run along walkable lanes, and not along drivable ones, for the most."""
+    cars = [lane for lane in lanes if lane.cars]
+    places = Polylines.of([lane.shape for lane in cars]).cut(_PLACE_STEP)
+    walked, _ = walkable.finder.nearest(places, 2.0 * NEAR, directed=False)
+    driven, _ = drivable.finder.nearest(places, 2.0 * NEAR)
+    on = np.where((walked <= NEAR) & (driven > NEAR), places.length, 0.0)
+    length = np.bincount(places.owner, weights=on, minlength=len(cars))
+    total = np.bincount(places.owner, weights=places.length, minlength=len(cars))
+    return tuple(cars[k].id for k in np.flatnonzero(length > 0.5 * total))
+
+
+def _relations(
+    net: NetFile, odr: OpenDrive, drivable: _MapLanes
+) -> tuple[int, tuple[LaneRelation, ...], tuple[LaneRelation, ...]]:
+    """Count the map's relations; list the missing and the invented ones."""
+    keys = [drivable.table.lane_keys[row] for row in drivable.rows]
+    stated = lane_relations(odr, keys)
+    pieces = drivable.finder.pieces
+    outer = Finder(pieces.take(~drivable.lane_inside[pieces.owner]))
+    lanes = {lane.id: lane for lane in net.driving("normal")}
+    lane_of = [(key.road, key.lane) for key in keys]
+    ends = sumo_ends(list(lanes.values()), outer, lane_of)
+    lengths: dict[RoadLane, float] = defaultdict(float)
+    for lane, length in zip(lane_of, drivable.lines.lengths.tolist(), strict=True):
+        lengths[lane] += length
+    ways = ways_over_short_lanes(stated, lengths) | {pair: {pair} for pair in stated}
+    held: set[LanePair] = set()
+    for pair in passed_over(list(lanes.values()), outer, lane_of):
+        held |= ways.get(pair, set())
+    invented = []
+    for link in net.links:
+        if link.source not in lanes or link.target not in lanes:
+            continue
+        sources, targets = ends[link.source].end, ends[link.target].start
+        pairs = [(a, b) for a in sources for b in targets]
+        found = [pair for pair in pairs if pair in ways]
+        held.update(*(ways[pair] for pair in found))
+        # Within one side of a road SUMO may well divide and join edges as it needs.
+        if not found and (not pairs or all(is_between_roads(*pair) for pair in pairs)):
+            names = f"{link.source} to {link.target}"
+            place = _xy(lanes[link.source].shape[-1])
+            invented.append(LaneRelation(_named(sources), _named(targets), *place, names))
+    line = {key: k for k, key in enumerate(keys)}
+    last = drivable.lines.first[1:] - 1
+    missing = [
+        LaneRelation(_named([a]), _named([b]), *_xy(drivable.lines.points[last[line[start]]]))
+        for (a, b), start in stated.items()
+        if (a, b) not in held
+    ]
+    return len(stated), tuple(missing), tuple(invented)
+
+
+def _xy(point: FloatArray) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
+
+
+def _named(lanes: Sequence[RoadLane]) -> str:
+    return f"{lanes[0][0]}.{lanes[0][1]}" if lanes else "?"
+
+
+def _crosswalks(
+    net: NetFile, odr: OpenDrive, table: RoadTable
+) -> tuple[int, tuple[LostCrosswalk, ...]]:
+    """Count the crosswalks; list those that no crossing lies on."""
+    crossings = [
+        shapely.LineString(lane.shape).buffer(0.5 * lane.width, cap_style="flat")
+        for lane in net.lanes.values()
+        if lane.function == "crossing" and len(lane.shape) > 1
+    ]
+    tree = shapely.STRtree(crossings)
+    found = crosswalks(odr, table)
+    lost = []
+    for crosswalk in found:
+        area = shapely.make_valid(shapely.Polygon(crosswalk.polygon))
+        over = [area.intersection(crossings[k]).area for k in tree.query(area).tolist()]
+        share = max(over, default=0.0) / area.area
+        if share <= CROSSWALK_SHARE:
+            place = _xy(crosswalk.polygon.mean(axis=0))
+            lost.append(LostCrosswalk(crosswalk.road, crosswalk.object_id, *place, share))
+    return len(found), tuple(lost)

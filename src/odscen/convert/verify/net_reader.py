@@ -1,0 +1,217 @@
+"""A ``.net.xml`` read for :mod:`odscen.convert.verify.fidelity`: what the file says, nothing looked up.
+
+A reader of its own, so that the check shares nothing with what wrote the network. Ids serve only to
+follow references within the file. Source: sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from odscen.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+FloatArray = NDArray[np.float64]
+
+MOTOR_CLASSES = ("passenger", "bus", "taxi", "hov")
+"""A lane open to one of these is a driving lane."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetFileLane:
+    """One ``<lane>``; ``shape`` is ``(K, 2)``, metres, OpenDRIVE frame (netOffset taken away)."""
+
+    id: str
+    function: str
+    width: float
+    shape: FloatArray
+    drives: bool
+    cars: bool
+    walks: bool
+
+
+class NetFileLink(NamedTuple):
+    """One ``<connection>``; lanes by id; what is absent is empty, or -1."""
+
+    source: str
+    target: str
+    via: str
+    tl: str
+    link_index: int
+
+
+class NetFileJunction(NamedTuple):
+    """One ``<junction>`` but the internal ones; ``foes[i]`` are the links that conflict with i."""
+
+    id: str
+    type: str
+    incoming: tuple[str, ...]
+    foes: dict[int, frozenset[int]]
+
+
+class NetFileProgram(NamedTuple):
+    """One ``<tlLogic>``; ``states`` has the state of each phase, a letter per link index."""
+
+    tl: str
+    states: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetFile:
+    """What the check needs of a network; ``lanes`` by id, in the order of the file."""
+
+    left_hand: bool
+    lanes: dict[str, NetFileLane]
+    links: tuple[NetFileLink, ...]
+    junctions: tuple[NetFileJunction, ...]
+    programs: tuple[NetFileProgram, ...]
+
+    def driving(self, *functions: str) -> list[NetFileLane]:
+        """Lanes that motor vehicles may use, of edges of the given functions."""
+        return [ln for ln in self.lanes.values() if ln.drives and ln.function in functions]
+
+    def request_rows(self) -> dict[str, list[NetFileLink]]:
+        """Links of each junction (by its id) in the order of its ``<request>`` rows.
+
+        As SUMO counts them: by incoming lane, then in the order of the connections in the file;
+        of the walking areas only the ways onto crossings.
+        """
+        leaving: dict[str, list[NetFileLink]] = defaultdict(list)
+        for link in self.links:
+            leaving[link.source].append(link)
+        return {
+            junction.id: [
+                link
+                for lane in junction.incoming
+                for link in leaving[lane]
+                if self._is_requested(link)
+            ]
+            for junction in self.junctions
+        }
+
+    def _is_requested(self, link: NetFileLink) -> bool:
+        source, target = self.lanes[link.source].function, self.lanes[link.target].function
+        if source == "walkingarea":
+            return target == "crossing"
+        return target != "walkingarea"
+
+
+def read_net(content: bytes) -> NetFile:
+    """Read a ``.net.xml``.
+
+    Raises
+    ------
+    InputError
+        If it is not a complete SUMO network.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+    try:
+        root = etree.fromstring(content, parser)
+        lanes, edges = _lanes(root)
+        return NetFile(
+            left_hand=root.get("lefthand") == "true",
+            lanes=lanes,
+            links=tuple(_links(root, edges)),
+            junctions=tuple(_junctions(root)),
+            programs=tuple(
+                NetFileProgram(
+                    _text(logic, "id"), tuple(_text(p, "state") for p in logic.iterfind("phase"))
+                )
+                for logic in root.iterfind("tlLogic")
+            ),
+        )
+    except (etree.XMLSyntaxError, LookupError, ValueError) as error:
+        msg = f"the SUMO network cannot be read: {type(error).__name__}: {error}"
+        raise InputError(msg) from error
+
+
+def _lanes(root: etree._Element) -> tuple[dict[str, NetFileLane], dict[str, dict[str, str]]]:
+    """Lanes by id, and the ids of the lanes of each edge by their index."""
+    location = root.find("location")
+    if location is None:
+        msg = "<location> is missing"
+        raise ValueError(msg)
+    offset = np.array([float(part) for part in _text(location, "netOffset").split(",")])
+    lanes: dict[str, NetFileLane] = {}
+    edges: dict[str, dict[str, str]] = {}
+    for edge in root.iterfind("edge"):
+        ids = edges.setdefault(_text(edge, "id"), {})
+        for lane in edge.iterfind("lane"):
+            lane_id = ids[_text(lane, "index")] = _text(lane, "id")
+            lanes[lane_id] = NetFileLane(
+                id=lane_id,
+                function=edge.get("function", "normal"),
+                width=float(lane.get("width", "3.2")),
+                shape=_shape(_text(lane, "shape"), offset),
+                drives=any(_allows(lane, vclass) for vclass in MOTOR_CLASSES),
+                cars=_allows(lane, "passenger"),
+                walks=_allows(lane, "pedestrian"),
+            )
+    return lanes, edges
+
+
+def _shape(text: str, offset: FloatArray) -> FloatArray:
+    shape = np.array([[float(part) for part in xyz.split(",")[:2]] for xyz in text.split()])
+    shape = shape - offset
+    if shape.ndim != 2 or not np.isfinite(shape).all():
+        msg = f"{text[:40]!r} is not the shape of a lane"
+        raise ValueError(msg)
+    return shape
+
+
+def _text(element: etree._Element, name: str) -> str:
+    value = element.get(name)
+    if value is None:
+        msg = f"attribute {name} of <{element.tag}> is missing"
+        raise KeyError(msg)
+    return value
+
+
+def _allows(lane: etree._Element, vclass: str) -> bool:
+    allow, disallow = lane.get("allow"), lane.get("disallow")
+    if allow is not None:
+        return bool({"all", vclass} & set(allow.split()))
+    return disallow is None or not {"all", vclass} & set(disallow.split())
+
+
+def _links(root: etree._Element, edges: dict[str, dict[str, str]]) -> Iterator[NetFileLink]:
+    known = {lane for lanes in edges.values() for lane in lanes.values()}
+    for link in root.iterfind("connection"):
+        via = link.get("via", "")
+        if via and via not in known:
+            msg = f"connection via {via}, which is no lane"
+            raise ValueError(msg)
+        yield NetFileLink(
+            edges[_text(link, "from")][_text(link, "fromLane")],
+            edges[_text(link, "to")][_text(link, "toLane")],
+            via,
+            link.get("tl", ""),
+            int(link.get("linkIndex", "-1")),
+        )
+
+
+def _junctions(root: etree._Element) -> Iterator[NetFileJunction]:
+    for junction in root.iterfind("junction"):
+        if junction.get("type") == "internal":
+            continue
+        foes = {
+            # The last letter stands for link 0.
+            int(_text(r, "index")): frozenset(
+                k for k, letter in enumerate(reversed(_text(r, "foes"))) if letter == "1"
+            )
+            for r in junction.iterfind("request")
+        }
+        yield NetFileJunction(
+            _text(junction, "id"),
+            junction.get("type", ""),
+            tuple(junction.get("incLanes", "").split()),
+            foes,
+        )

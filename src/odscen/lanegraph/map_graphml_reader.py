@@ -1,0 +1,319 @@
+"""Reads the GraphML that :mod:`odscen.lanegraph.map_graphml` writes, also after networkx rewrote it."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from lxml import etree
+
+from odscen.base.errors import GraphFormatError
+from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
+from odscen.lanegraph.columns import NODE_COLUMNS, WALK_NODE_COLUMNS, Array, check_map_graph
+from odscen.lanegraph.graphs import (
+    IntArray,
+    LaneGraph,
+    Lanes,
+    MapGraph,
+    PedestrianGraph,
+    Relation,
+    SegmentPart,
+    Segments,
+    WalkKind,
+)
+from odscen.lanegraph.query import WALK_PREFIX, split_node_id
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+NAMESPACE = "{http://graphml.graphdrawing.org/xmlns}"
+FORMAT = "odscen-map-graph"
+VERSION = 1
+SEGMENT_PREFIX = "segment."
+
+Attributes = dict[str, str]
+
+
+@dataclass
+class _GraphmlDocument:
+    """What the file says, before it is understood; each node and edge a dict of texts."""
+
+    about: Attributes = field(default_factory=dict)
+    nodes: dict[str, list[Attributes]] = field(
+        default_factory=lambda: {"segment": [], "vehicle": [], "pedestrian": []}
+    )
+    edges: list[Attributes] = field(default_factory=list)
+
+
+def from_graphml(data: bytes, *, file: str | None = None) -> MapGraph:
+    """Inverse of :func:`~odscen.lanegraph.map_graphml.to_graphml`.
+
+    Raises
+    ------
+    GraphFormatError
+        If the bytes are not such a document.
+    """
+    try:
+        return check_map_graph(_map_graph(_parse(data)))
+    except GraphFormatError as error:
+        error.file = error.file or file
+        raise
+    except etree.XMLSyntaxError as err:
+        problem = f"it is not XML: {err.msg}"
+        raise GraphFormatError(problem, file=file) from err
+
+
+def _parse(data: bytes) -> _GraphmlDocument:
+    document = _GraphmlDocument()
+    names: dict[str, str] = {}
+    tags = [NAMESPACE + tag for tag in ("key", "node", "edge", "graph")]
+    source = io.BytesIO(data)
+    for _, element in etree.iterparse(
+        source, events=("end",), tag=tags, resolve_entities=False, no_network=True, load_dtd=False
+    ):
+        tag = element.tag[len(NAMESPACE) :]
+        if tag == "key":
+            names[element.get("id", "")] = element.get("attr.name", "")
+            continue
+        values = {
+            names.get(child.get("key", ""), ""): child.text or ""
+            for child in element.iterchildren(NAMESPACE + "data")
+        }
+        if tag == "graph":
+            document.about = values
+            continue
+        _take(document, tag, element, values)
+        element.clear()
+        parent = element.getparent()
+        while parent is not None and parent[0] is not element and parent[0].tag in tags[1:3]:
+            del parent[0]
+    return document
+
+
+def _take(document: _GraphmlDocument, tag: str, element: Any, values: Attributes) -> None:
+    if tag == "edge":
+        values["source"] = element.get("source", "")
+        values["target"] = element.get("target", "")
+        document.edges.append(values)
+        return
+    values["id"] = element.get("id", "")
+    kind = values.get("kind", "")
+    if kind not in document.nodes:
+        _fail(f"node {values['id']}", f"its kind is {kind!r}")
+    document.nodes[kind].append(values)
+
+
+def _map_graph(document: _GraphmlDocument) -> MapGraph:
+    about = document.about
+    if about.get("format") != FORMAT:
+        problem = "it is not an odscen map graph"
+        raise GraphFormatError(problem)
+    if about.get("version") != str(VERSION):
+        problem = f"version is {about.get('version')}; this odscen reads {VERSION}"
+        raise GraphFormatError(problem)
+    index = {
+        node["id"]: (kind, row)
+        for kind, nodes in document.nodes.items()
+        for row, node in enumerate(nodes)
+    }
+    edges = _EdgeRows(document.edges, index)
+    segment_rows = {
+        node["id"].removeprefix(SEGMENT_PREFIX): row
+        for row, node in enumerate(document.nodes["segment"])
+    }
+    return MapGraph(
+        map_name=_text(about, "map_name", "graph"),
+        map_sha256=_text(about, "map_sha256", "graph"),
+        segments=_segments(document.nodes["segment"], edges),
+        lanes=_lane_graph(document, segment_rows, edges),
+        walks=_walks(document, segment_rows, edges),
+    )
+
+
+class _EdgeRows:
+    """The edges by what they relate, as rows of node numbers, sorted as the model wants them."""
+
+    def __init__(self, edges: list[Attributes], index: dict[str, tuple[str, int]]) -> None:
+        self._index = index
+        self._of: dict[str, list[tuple[int, int, int, Attributes]]] = {}
+        codes = {
+            **{relation.name.lower(): ("vehicle", int(relation)) for relation in Relation},
+            **{kind.name.lower(): ("pedestrian", int(kind)) for kind in WalkKind},
+            "adjacent": ("segment", 0),
+        }
+        for edge in edges:
+            place = f"edge {edge['source']} -> {edge['target']}"
+            kind, code = codes.get(edge.get("relation", ""), ("", 0))
+            if not kind:
+                _fail(place, f"its relation is {edge.get('relation', '')!r}")
+            source, target = self._end(edge["source"], kind), self._end(edge["target"], kind)
+            self._of.setdefault(kind, []).append((source, target, code, edge))
+
+    def _end(self, name: str, kind: str) -> int:
+        actual, row = self._index.get(name, ("", 0))
+        if actual != kind:
+            _fail(f"node {name}", f"an edge needs it as {kind}; it is {actual or 'not there'}")
+        return row
+
+    def directed(self, kind: str) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+        """Source, target, code and attributes, sorted by (source, code, target)."""
+        rows = sorted(self._of.get(kind, []), key=lambda row: (row[0], row[2], row[1]))
+        return _transposed(rows)
+
+    def undirected(self, kind: str) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+        """Return the same with source < target, sorted by (source, target)."""
+        rows = [(min(i, j), max(i, j), code, edge) for i, j, code, edge in self._of.get(kind, [])]
+        rows.sort(key=lambda row: row[:3])
+        return _transposed(rows)
+
+
+def _transposed(
+    rows: list[tuple[int, int, int, Attributes]],
+) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+    return (
+        np.array([row[0] for row in rows], dtype=np.int32),
+        np.array([row[1] for row in rows], dtype=np.int32),
+        np.array([row[2] for row in rows], dtype=np.uint8),
+        [row[3] for row in rows],
+    )
+
+
+def _segments(nodes: list[Attributes], edges: _EdgeRows) -> Segments:
+    source, target, _, _ = edges.undirected("segment")
+    kinds: Any = tuple(_text(node, "segment_kind", node["id"]) for node in nodes)
+    return Segments(
+        ids=tuple(SegmentId(node["id"].removeprefix(SEGMENT_PREFIX)) for node in nodes),
+        kinds=kinds,
+        parts=tuple(_parts(node) for node in nodes),
+        lengths=_column(nodes, "length", np.float64),
+        adjacency=np.stack([source, target], axis=1),
+    )
+
+
+def _parts(node: Attributes) -> tuple[SegmentPart, ...]:
+    text = _text(node, "parts", node["id"])
+    try:
+        return tuple(
+            SegmentPart(RoadId(str(road)), float(s_from), float(s_to))
+            for road, s_from, s_to in json.loads(text)
+        )
+    except (ValueError, TypeError, RecursionError):
+        _fail(f"node {node['id']}", f"its parts are {text[:60]!r}")
+
+
+def _lane_graph(
+    document: _GraphmlDocument, segment_rows: dict[str, int], edges: _EdgeRows
+) -> LaneGraph:
+    nodes = document.nodes["vehicle"]
+    keys, first_node = _lanes_of(nodes, "")
+    heads = [nodes[row] for row in first_node[:-1].tolist()]
+    lane_rows = {"": -1, **{str(key): row for row, key in enumerate(keys)}}
+    source, target, relation, of_edges = edges.directed("vehicle")
+    return LaneGraph(
+        spacing=_spacing(document.about, "spacing"),
+        lanes=Lanes(
+            keys=keys,
+            types=tuple(_text(node, "lane_type", node["id"]) for node in heads),
+            junctions=tuple(JunctionId(node.get("junction", "")) or None for node in heads),
+            lengths=_column(heads, "lane_length", np.float64),
+            forward=_column(heads, "forward", np.bool_),
+            first_node=first_node,
+        ),
+        lane=np.repeat(np.arange(len(keys), dtype=np.int32), np.diff(first_node)),
+        left_lane=_rows(nodes, "left_lane", lane_rows),
+        right_lane=_rows(nodes, "right_lane", lane_rows),
+        segment=_rows(nodes, "segment", segment_rows),
+        source=source,
+        target=target,
+        relation=relation,
+        length=_column(of_edges, "length", np.float64),
+        **{name: _column(nodes, name, kind) for name, kind in NODE_COLUMNS.items()},
+    )
+
+
+def _walks(
+    document: _GraphmlDocument, segment_rows: dict[str, int], edges: _EdgeRows
+) -> PedestrianGraph:
+    nodes = document.nodes["pedestrian"]
+    keys, first_node = _lanes_of(nodes, WALK_PREFIX)
+    heads = [nodes[row] for row in first_node[:-1].tolist()]
+    source, target, kind, of_edges = edges.undirected("pedestrian")
+    return PedestrianGraph(
+        spacing=_spacing(document.about, "walk_spacing"),
+        lane_keys=keys,
+        roadside=_column(heads, "roadside", np.bool_),
+        first_node=first_node,
+        lane=np.repeat(np.arange(len(keys), dtype=np.int32), np.diff(first_node)),
+        segment=_rows(nodes, "segment", segment_rows),
+        source=source,
+        target=target,
+        kind=kind,
+        length=_column(of_edges, "length", np.float64),
+        crosswalk=tuple(edge.get("crosswalk", "") for edge in of_edges),
+        **{name: _column(nodes, name, type_) for name, type_ in WALK_NODE_COLUMNS.items()},
+    )
+
+
+def _lanes_of(nodes: Sequence[Attributes], prefix: str) -> tuple[tuple[LaneKey, ...], IntArray]:
+    """Find the lanes of the nodes, and the first node of each; nodes must be in order."""
+    keys: list[LaneKey] = []
+    first: list[int] = []
+    for row, node in enumerate(nodes):
+        name = node["id"]
+        try:
+            key, k = split_node_id(name.removeprefix(prefix))
+        except ValueError:
+            _fail(f"node {name}", f"its id is not {prefix}road.section.lane.k")
+        if k == 0:
+            keys.append(key)
+            first.append(row)
+        elif not keys or key != keys[-1] or k != row - first[-1]:
+            _fail(f"node {name}", "it does not follow the node before it on its lane")
+    if len(set(keys)) != len(keys):
+        _fail("nodes", "a lane occurs twice")
+    return tuple(keys), np.array([*first, len(nodes)], dtype=np.int32)
+
+
+_PARSERS: dict[type, Callable[[str], Any]] = {
+    np.float64: float,
+    np.uint8: int,
+    np.bool_: lambda text: {"true": True, "false": False}[text.lower()],
+}
+
+
+def _column(rows: Sequence[Attributes], name: str, kind: type) -> Any:
+    try:
+        texts = [row[name] for row in rows]
+    except KeyError:
+        _fail("data", f"{name!r} is missing at some nodes or edges")
+    try:
+        return np.array(list(map(_PARSERS[kind], texts)), dtype=kind)
+    except (ValueError, KeyError, OverflowError) as err:
+        _fail("data", f"{name!r} has a value of the wrong type: {err}")
+
+
+def _rows(nodes: Sequence[Attributes], name: str, known: dict[str, int]) -> IntArray:
+    try:
+        return np.array([known[node.get(name, "")] for node in nodes], dtype=np.int32)
+    except KeyError as err:
+        _fail("data", f"{name!r} names {err.args[0]!r}, which is not there")
+
+
+def _spacing(about: Attributes, name: str) -> float:
+    try:
+        return float(_text(about, name, "graph"))
+    except ValueError:
+        _fail("graph", f"{name} is {about[name]!r}")
+
+
+def _text(values: Attributes, name: str, place: str) -> str:
+    if name not in values:
+        _fail(place, f"{name!r} is missing")
+    return values[name]
+
+
+def _fail(place: str, problem: str) -> NoReturn:
+    raise GraphFormatError(problem, element=place)

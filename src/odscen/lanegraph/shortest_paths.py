@@ -1,0 +1,415 @@
+"""Reachability, goal candidates and shortest paths, on the lane graph and on the pedestrian graph.
+
+All paths are shortest by length. A router is made once for a region and answers many queries; the
+functions below make one for a single query.
+"""
+
+from __future__ import annotations
+
+import graphlib
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from odscen.base.errors import InputError
+from odscen.lanegraph.query import node_id, walk_node_id
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from odscen.lanegraph.graphs import BoolArray, FloatArray, IntArray, MapGraph
+
+MIN_EDGE_LENGTH = 1e-6
+"""Metres; scipy's sparse graphs drop edges of weight zero."""
+
+_NO_PREDECESSOR = -9999
+
+
+class _PathFinder:
+    """Shortest paths inside ``mask``; node numbers outside are the whole map's.
+
+    An *end* is a node that is left by at most ``end_degree`` edges. The last source's tree is kept:
+    a caller asks for goals first and for the path to one of them next.
+    """
+
+    end_degree = 0
+
+    def __init__(
+        self,
+        count: int,
+        source: IntArray,
+        target: IntArray,
+        length: FloatArray,
+        lane: IntArray,
+        mask: BoolArray | None,
+        *,
+        directed: bool,
+    ) -> None:
+        self.mask = np.ones(count, dtype=np.bool_) if mask is None else mask
+        self.nodes = np.flatnonzero(self.mask)
+        self._local = np.cumsum(self.mask) - 1
+        inside = self.mask[source] & self.mask[target]
+        rows, columns = self._local[source[inside]], self._local[target[inside]]
+        self._directed = directed
+        self._lane = lane[self.nodes]
+        self._matrix = _shortest_edges(len(self.nodes), rows, columns, length[inside])
+        self.out_degree = np.bincount(rows, minlength=len(self.nodes))
+        if not directed:
+            self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
+        self._tree: tuple[int, FloatArray, IntArray] | None = None
+
+    def distances(self, source: int) -> FloatArray:
+        """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
+        result = np.full(len(self.mask), np.inf)
+        result[self.nodes] = self._from(source)[0]
+        return result
+
+    def reachable(self, source: int) -> BoolArray:
+        """Nodes that can be reached from ``source`` in the region, itself included; ``(N,)``."""
+        return np.isfinite(self.distances(source))
+
+    def path(self, source: int, target: int) -> IntArray:
+        """Nodes of the shortest path, both ends included; empty if there is none."""
+        distances, predecessors = self._from(source)
+        if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
+            return np.empty(0, dtype=np.int32)
+        steps = [int(self._local[target])]
+        while (before := int(predecessors[steps[-1]])) != _NO_PREDECESSOR:
+            steps.append(before)
+        return self.nodes[steps[::-1]].astype(np.int32)
+
+    def ways_to(self, target: int) -> WaysTo:
+        """Shortest ways from everywhere to one node, for many sources with the same target."""
+        distances, nexts = csgraph.dijkstra(
+            self._reversed,
+            directed=self._directed,
+            indices=np.asarray(self._local[target]),
+            return_predecessors=True,
+        )
+        return WaysTo(self.nodes, self._local, distances, nexts)
+
+    @cached_property
+    def _reversed(self) -> sparse.csr_matrix[np.float64]:
+        return self._matrix.T.tocsr()
+
+    def leads(self, sources: IntArray, targets: IntArray) -> BoolArray:
+        """Whether a way leads from each source to the target in the same place; shape ``(K,)``.
+
+        One pass for all, whatever their number. Sources and targets lie in the region.
+        """
+        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
+        if not self._directed:
+            return np.asarray(starts == ends, dtype=np.bool_)
+        reached, columns = self._reached(ends)
+        pairs = zip(starts.tolist(), ends.tolist(), strict=True)
+        return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
+
+    def reach(self, sources: IntArray, targets: IntArray) -> tuple[IntArray, BoolArray]:
+        """Which of the targets each source can get to.
+
+        Returns
+        -------
+        For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
+        the same can be reached share one. Nobody needs a way from a node to itself: it counts.
+        """
+        starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
+        parts, rows = np.unique(starts, return_inverse=True)
+        row = rows.astype(np.int32)
+        if not self._directed:
+            return row, np.equal.outer(parts, ends)
+        reached, columns = self._reached(ends)
+        table = np.zeros((len(parts), len(columns)), dtype=np.bool_)
+        for index, part in enumerate(parts.tolist()):
+            bits = reached[part]
+            while bits:
+                low = bits & -bits
+                table[index, low.bit_length() - 1] = True
+                bits ^= low
+        return row, table[:, [columns[part] for part in ends.tolist()]]
+
+    def _reached(self, parts: IntArray) -> tuple[dict[int, int], dict[int, int]]:
+        """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
+        columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
+        reached: dict[int, int] = {}
+        for part in graphlib.TopologicalSorter(self._part_successors).static_order():
+            bits = 1 << columns[part] if part in columns else 0
+            for after in self._part_successors[part]:
+                bits |= reached[after]
+            reached[part] = bits
+        return reached, columns
+
+    def has_goals(self, spawn: int) -> bool:
+        """Whether there is any goal candidate: whether anything can be reached."""
+        return bool(self.out_degree[self._local[spawn]] > 0)
+
+    def goal_candidates(self, spawn: int) -> IntArray:
+        """Nodes that may be the goal of an actor that starts at ``spawn``, ascending (R38).
+
+        Ends that can be reached. Where there is none (a ring, a closed town), the farthest
+        reachable node of each lane. Empty if nothing can be reached.
+
+        Raises
+        ------
+        InputError
+            If ``spawn`` is outside the region.
+        """
+        distances = self._from(spawn)[0]
+        if not self.has_goals(spawn):
+            return np.empty(0, dtype=np.int32)
+        if not self._reaches_end(spawn):
+            return self._farthest_per_lane(spawn, distances)
+        ends = np.isfinite(distances) & self._is_end
+        ends[self._local[spawn]] = False
+        return self.nodes[ends].astype(np.int32)
+
+    def is_candidate(self, spawn: int, goal: int) -> bool:
+        """Whether ``goal``, which can be reached, is among the candidates of ``spawn``."""
+        if self._reaches_end(spawn):
+            return bool(self._is_end[self._local[goal]])
+        return goal in self.goal_candidates(spawn)
+
+    @cached_property
+    def _is_end(self) -> BoolArray:
+        return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
+
+    @cached_property
+    def _parts(self) -> IntArray:
+        """Number of the strongly connected part that each node of the region is in."""
+        labels: IntArray = csgraph.connected_components(
+            self._matrix, directed=self._directed, connection="strong"
+        )[1]
+        return labels
+
+    @cached_property
+    def _part_successors(self) -> dict[int, set[int]]:
+        after: dict[int, set[int]] = {part: set() for part in np.unique(self._parts).tolist()}
+        edges = self._matrix.tocoo()
+        parts = np.stack([self._parts[edges.row], self._parts[edges.col]], axis=1)
+        for one, other in np.unique(parts[parts[:, 0] != parts[:, 1]], axis=0).tolist():
+            after[one].add(other)
+        return after
+
+    @cached_property
+    def _ends_ahead(self) -> IntArray:
+        """At least how many ends, itself included, can be reached from each node of the region."""
+        ends = np.flatnonzero(self._is_end)
+        if not self._directed:
+            per_part = np.bincount(self._parts[ends], minlength=len(self.nodes))
+            return per_part[self._parts].astype(np.int32)
+        if not len(ends):
+            return np.zeros(len(self.nodes), dtype=np.int32)
+        back = csgraph.dijkstra(self._matrix.T.tocsr(), indices=ends, min_only=True)
+        return np.isfinite(back).astype(np.int32)
+
+    def _reaches_end(self, spawn: int) -> bool:
+        row = self._local[spawn]
+        return bool(self._ends_ahead[row] > int(self._is_end[row]))
+
+    def _from(self, source: int) -> tuple[FloatArray, IntArray]:
+        if not 0 <= source < len(self.mask) or not self.mask[source]:
+            msg = f"{self._name(source)} is outside the region of interest"
+            raise InputError(msg)
+        if self._tree is None or self._tree[0] != source:
+            distances, predecessors = csgraph.dijkstra(
+                self._matrix,
+                directed=self._directed,
+                indices=np.asarray(self._local[source]),
+                return_predecessors=True,
+            )
+            self._tree = source, distances, predecessors
+        return self._tree[1], self._tree[2]
+
+    def _name(self, node: int) -> str:
+        return f"node {node}"
+
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+        """Return the farthest reachable node of each lane, the first where several are."""
+        away = np.where(np.isfinite(distances), distances, -1.0)
+        away[self._local[spawn]] = -1.0
+        lane_starts = np.flatnonzero(np.r_[True, self._lane[1:] != self._lane[:-1]])
+        farthest = np.maximum.reduceat(away, lane_starts)
+        sizes = np.diff(np.r_[lane_starts, len(away)])
+        hits = np.flatnonzero((away == np.repeat(farthest, sizes)) & (away >= 0))
+        _, first = np.unique(self._lane[hits], return_index=True)
+        return np.sort(self.nodes[hits[first]]).astype(np.int32)
+
+
+class WaysTo:
+    """Shortest ways to one node, found at once; nodes are numbered as the whole map's.
+
+    Attributes
+    ----------
+    distances
+        Metres from each node of ``nodes``; inf where no way leads.
+    """
+
+    def __init__(
+        self,
+        nodes: NDArray[np.integer],
+        local: NDArray[np.integer],
+        distances: FloatArray,
+        nexts: IntArray,
+    ) -> None:
+        self.nodes = nodes
+        self.distances = distances
+        self._local = local
+        self._next = nexts
+
+    def distance(self, sources: IntArray) -> FloatArray:
+        """Metres from each source, which lies in the region."""
+        return np.asarray(self.distances[self._local[sources]], dtype=np.float64)
+
+    def paths(self, sources: IntArray) -> list[IntArray]:
+        """Nodes of the way from each source, both ends included; empty where there is none."""
+        current = self._local[sources]
+        steps = [current]
+        counts = np.ones(len(sources), dtype=np.intp)
+        while (going := self._next[current] != _NO_PREDECESSOR).any():
+            current = np.where(going, self._next[current], current)
+            counts += going
+            steps.append(current)
+        counts[~np.isfinite(self.distances[steps[0]])] = 0
+        table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
+        return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
+
+    def stretches(
+        self, sources: NDArray[np.integer], marks: IntArray
+    ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
+        """Follow the marks of the nodes along each way, each run of equal ones once.
+
+        Parameters
+        ----------
+        marks
+            A number from 0 on for each node of the map, such as the row of its segment.
+
+        Returns
+        -------
+        Marks in the order in which they are met, and the first node with each: two arrays of shape
+        ``(len(sources), most)``, with -1 behind the end of a way.
+        """
+        after = self._after(marks)
+        steps = [self._local[sources]]
+        while (steps[-1] >= 0).any():
+            steps.append(np.where(steps[-1] >= 0, after[steps[-1]], -1))
+        table = np.stack(steps[:-1], axis=1)
+        nodes = np.where(table >= 0, self.nodes[table], -1)
+        return np.where(table >= 0, marks[nodes], -1), nodes
+
+    def _after(self, marks: IntArray) -> NDArray[np.integer]:
+        """First node on the way from each node of the region that has another mark, or -1."""
+        mark = marks[self.nodes]
+        jump = np.where(self._next == _NO_PREDECESSOR, np.arange(len(mark)), self._next)
+        # Pointers are doubled: as many rounds as the logarithm of the longest stretch.
+        while (going := (mark[jump] == mark) & (jump[jump] != jump)).any():
+            jump = np.where(going, jump[jump], jump)
+        return np.where(mark[jump] != mark, jump, -1)
+
+
+class Router(_PathFinder):
+    """Paths and goals of vehicles inside a region; ends are nodes that no edge leaves.
+
+    Parameters
+    ----------
+    graph
+        The map.
+    mask
+        Lane-graph nodes of the region, shape ``(N,)``; ``None`` for the whole map.
+    """
+
+    def __init__(self, graph: MapGraph, mask: BoolArray | None = None) -> None:
+        lanes = graph.lanes
+        super().__init__(
+            len(lanes.x), lanes.source, lanes.target, lanes.length, lanes.lane, mask, directed=True
+        )
+        self._graph = graph
+        inside_junction = np.array([name is not None for name in lanes.lanes.junctions], np.bool_)
+        self._in_junction = inside_junction[lanes.lane]
+
+    def is_terminal(self, node: int) -> bool:
+        """Whether no edge leaves ``node`` inside the region."""
+        return bool(self._is_end[self._local[node]])
+
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+        """Leave lanes inside junctions out if others remain."""
+        farthest = super()._farthest_per_lane(spawn, distances)
+        on_roads = farthest[~self._in_junction[farthest]]
+        return on_roads if len(on_roads) else farthest
+
+    def _name(self, node: int) -> str:
+        inside_map = 0 <= node < len(self.mask)
+        return f"node {node_id(self._graph, node) if inside_map else node}"
+
+
+class WalkRouter(_PathFinder):
+    """Paths and goals of pedestrians inside a region; ends are dead ends.
+
+    Parameters
+    ----------
+    graph
+        The map.
+    mask
+        Pedestrian nodes of the region, shape ``(P,)``; ``None`` for the whole map.
+    """
+
+    end_degree = 1
+
+    def __init__(self, graph: MapGraph, mask: BoolArray | None = None) -> None:
+        walks = graph.walks
+        super().__init__(
+            len(walks.x), walks.source, walks.target, walks.length, walks.lane, mask, directed=False
+        )
+        self._graph = graph
+
+    def _name(self, node: int) -> str:
+        inside_map = 0 <= node < len(self.mask)
+        return f"node {walk_node_id(self._graph, node) if inside_map else node}"
+
+
+def goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> IntArray:
+    """Goal candidates of a vehicle; see :meth:`Router.goal_candidates`."""
+    return Router(graph, roi_mask).goal_candidates(spawn)
+
+
+def walk_goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> IntArray:
+    """Goal candidates of a walker; see :meth:`WalkRouter.goal_candidates`."""
+    return WalkRouter(graph, roi_mask).goal_candidates(spawn)
+
+
+def shortest_path(
+    graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
+) -> IntArray:
+    """Lane-graph nodes of the shortest path, both ends included; empty if there is none."""
+    return Router(graph, mask).path(source, target)
+
+
+def walk_shortest_path(
+    graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
+) -> IntArray:
+    """Pedestrian nodes of the shortest path, both ends included; empty if there is none."""
+    return WalkRouter(graph, mask).path(source, target)
+
+
+def reachable(graph: MapGraph, source: int, mask: BoolArray | None = None) -> BoolArray:
+    """Lane-graph nodes that can be reached from ``source``, itself included; shape ``(N,)``."""
+    return Router(graph, mask).reachable(source)
+
+
+def walk_reachable(graph: MapGraph, source: int, mask: BoolArray | None = None) -> BoolArray:
+    """Pedestrian nodes that can be reached from ``source``, itself included; shape ``(P,)``."""
+    return WalkRouter(graph, mask).reachable(source)
+
+
+def _shortest_edges(
+    count: int, rows: IntArray, columns: IntArray, length: FloatArray
+) -> sparse.csr_matrix[np.float64]:
+    """CSR matrix with the shortest of parallel edges (scipy would add them up)."""
+    weight = np.maximum(length, MIN_EDGE_LENGTH)
+    order = np.lexsort((weight, columns, rows))
+    rows, columns, weight = rows[order], columns[order], weight[order]
+    first = np.ones(len(rows), dtype=np.bool_)
+    first[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
+    shape = (count, count)
+    return sparse.csr_matrix((weight[first], (rows[first], columns[first])), shape=shape)

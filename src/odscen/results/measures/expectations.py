@@ -1,0 +1,169 @@
+"""Expectations of a run, such as ``arrived>=0.95`` or ``mean_delay <= 40 s`` (requirement R58).
+
+``NAME OP NUMBER [UNIT]`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds,
+the counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
+mean_travel_time, ...). A *count* compared with a number from 0 to 1 that is written with a decimal
+point, or followed by ``%``, is taken as a share of the planned actors: ``arrived>=0.95``,
+``arrived>=95%`` and ``arrived==1.0`` are shares, ``arrived>=1`` and ``collided==0`` are counts.
+A unit may be another one of the same kind: ``mean_speed >= 30 km/h``; without one it is SI.
+"""
+
+from __future__ import annotations
+
+import difflib
+import operator
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import InputError
+from odscen.results.measures.conflicts import CONFLICT_FIGURES
+from odscen.results.measures.run_traffic import TRAFFIC_FIGURES
+from odscen.results.measures.units import in_unit_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+COUNTS = (
+    "planned",
+    "inserted",
+    "arrived",
+    "running",
+    "waiting",
+    "teleported",
+    "collided",
+    "emergency_stopped",
+)
+FIGURES = (
+    "insertion_error_max",
+    "insertion_error_mean",
+    "depart_delay_max",
+    "mean_travel_time",
+    "median_travel_time",
+    "p95_travel_time",
+    "mean_speed",
+    "mean_delay",
+    "mean_waiting_time",
+    "mean_stops",
+    "pedestrian_mean_travel_time",
+    "pedestrian_median_travel_time",
+    "pedestrian_p95_travel_time",
+    "pedestrian_mean_speed",
+    "pedestrian_mean_delay",
+    "pedestrian_mean_waiting_time",
+    *TRAFFIC_FIGURES,
+    *CONFLICT_FIGURES,
+)
+NAMES = ("sim_seconds", *COUNTS, *FIGURES)
+
+_OPERATORS: dict[str, Callable[[float, float], bool]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    "==": operator.eq,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+_PATTERN = re.compile(
+    r"\s*(?P<name>[A-Za-z_]\w*)\s*(?P<op>>=|<=|==|>|<)\s*"
+    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>%|[A-Za-z][A-Za-z/]*)?\s*"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """One expectation; ``share`` if the value is divided by the number of planned actors first."""
+
+    text: str
+    name: str
+    op: str
+    bound: float
+    share: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectationVerdict:
+    """An expectation and what the run had; ``value`` ``None`` if the run has no such figure."""
+
+    expectation: str
+    value: float | None
+    passed: bool
+
+
+def parse_expectation(text: str) -> Expectation:
+    """Read one expectation.
+
+    Raises
+    ------
+    InputError
+        If it is not ``NAME OP NUMBER [UNIT]``, or the name is not known, or the unit does not fit.
+    """
+    match = _PATTERN.fullmatch(text)
+    if match is None:
+        msg = (
+            f"expectation {text!r} is not of the form NAME OP NUMBER, "
+            "for example arrived>=0.95 (OP is one of >= <= > < ==)"
+        )
+        raise InputError(msg)
+    name, number, unit = match["name"], match["number"], match["unit"] or ""
+    percent = unit == "%"
+    if name not in NAMES:
+        close = difflib.get_close_matches(name, NAMES, n=3, cutoff=0.5)
+        hint = f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(NAMES)}"
+        msg = f"expectation {text!r}: no figure is named {name!r}; {hint}"
+        raise InputError(msg)
+    if percent and name not in COUNTS:
+        msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
+        raise InputError(msg)
+    if percent:
+        bound = float(number) / 100.0
+    else:
+        try:
+            bound = in_unit_of(name, float(number), unit)
+        except InputError as error:
+            msg = f"expectation {text!r}: {error.problem}"
+            raise InputError(msg) from error
+    written_as_share = ("." in number or "e" in number.lower()) and 0.0 <= bound <= 1.0
+    return Expectation(
+        text=text.strip(),
+        name=name,
+        op=match["op"],
+        bound=bound,
+        share=name in COUNTS and (percent or written_as_share),
+    )
+
+
+def needs_criticality(expectations: Iterable[Expectation]) -> bool:
+    """Whether one of them is about how close road users came, which is not measured by itself."""
+    return any(expectation.name in CONFLICT_FIGURES for expectation in expectations)
+
+
+def evaluate(
+    expectations: Sequence[Expectation], summary: Mapping[str, Any]
+) -> tuple[ExpectationVerdict, ...]:
+    """Hold a run's summary against expectations.
+
+    A figure that the run does not have (nobody arrived, the run failed) fails its expectation.
+    """
+    return tuple(_verdict(expectation, summary) for expectation in expectations)
+
+
+def _verdict(expectation: Expectation, summary: Mapping[str, Any]) -> ExpectationVerdict:
+    value = _value(expectation, summary)
+    passed = value is not None and _OPERATORS[expectation.op](value, expectation.bound)
+    return ExpectationVerdict(expectation.text, value, passed)
+
+
+def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
+    if expectation.name in COUNTS:
+        actors = summary.get("actors") or {}
+        count = actors.get(expectation.name)
+        if count is None:
+            return None
+        if not expectation.share:
+            return float(count)
+        return count / actors["planned"] if actors["planned"] else None
+    if expectation.name == "sim_seconds":
+        value = summary.get("sim_seconds")
+    else:
+        value = (summary.get("figures") or {}).get(expectation.name)
+    return None if value is None else float(value)

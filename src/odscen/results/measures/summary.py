@@ -1,0 +1,339 @@
+"""From plan, events and trips to what became of each actor, and the figures of a run.
+
+Everything here is a pure function of plan, events and trips; wall-clock figures are added by the
+runner to ``summary.json`` only, so that all other files of a run are the same bytes for the same
+seed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter, defaultdict
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import orjson
+
+from odscen.base.errors import InputError
+from odscen.results.records.run_records import (
+    ACTORS_FORMAT,
+    VERSION,
+    Event,
+    EventKind,
+    Plan,
+    PlannedActor,
+    rounded,
+    row_text,
+    text_with_rows,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+ActorStatus = Literal["arrived", "running", "waiting"]
+"""``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
+
+
+class Trip(NamedTuple):
+    """What SUMO has measured on the way of an actor: seconds, and how many halts.
+
+    ``time_loss`` is ``None`` for a person who has not arrived, ``stops`` for every person.
+    """
+
+    time_loss: float | None
+    waiting_time: float | None
+    stops: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class ActorOutcome:
+    """What was planned for an actor and what became of it; seconds, metres, m/s.
+
+    Attributes
+    ----------
+    inserted
+        When it appeared on the road; ``None`` if it never did.
+    depart_delay
+        Seconds it waited beyond its planned departure.
+    insertion_error
+        Metres between the centre of its body and its planned place when it appeared.
+    travel_time
+        From appearing to arriving.
+    delay
+        Of an actor that arrived: its ``time_loss``.
+    mean_speed
+        Route length over travel time.
+    problem
+        Why the SUMO network had no way for it, if so; it is then ``waiting``.
+    time_loss
+        Seconds lost by driving, or walking, below the speed that it wished for; also while it was
+        getting up to that speed.
+    waiting_time
+        Seconds that it stood, below 0.1 m/s.
+    stops
+        How many times a vehicle came to a halt.
+    """
+
+    id: str
+    category: str
+    model: str | None
+    ego: bool
+    flow: str | None
+    spawn: str
+    goal: str | None
+    status: ActorStatus
+    depart: float
+    inserted: float | None
+    depart_delay: float | None
+    insertion_error: float | None
+    arrived: float | None
+    travel_time: float | None
+    free_flow_time: float | None
+    delay: float | None
+    route_length: float | None
+    mean_speed: float | None
+    teleports: int
+    collisions: int
+    emergency_stops: int
+    problem: str | None = None
+    time_loss: float | None = None
+    waiting_time: float | None = None
+    stops: int | None = None
+
+
+_COLUMNS = tuple(field.name for field in fields(ActorOutcome))
+
+
+@dataclass(slots=True)
+class _Fate:
+    """What has been heard of an actor so far."""
+
+    departure: Event | None = None
+    arrival: Event | None = None
+    teleports: int = 0
+    collisions: int = 0
+    emergency_stops: int = 0
+
+    def hear(self, event: Event) -> None:
+        match event.kind:
+            case EventKind.DEPARTED:
+                self.departure = event
+            case EventKind.ARRIVED:
+                self.arrival = event
+            case EventKind.TELEPORT_START:
+                self.teleports += 1
+            case EventKind.COLLISION:
+                self.collisions += 1
+            case EventKind.EMERGENCY_STOP:
+                self.emergency_stops += 1
+
+
+_NO_TRIPS: Mapping[str, Trip] = MappingProxyType({})
+_NO_TRIP = Trip(None, None, None)
+
+
+class Fates:
+    """What becomes of the actors of a plan, told bit by bit."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._actors = {actor.id: actor for actor in plan.actors}
+        self._fates: defaultdict[str, _Fate] = defaultdict(_Fate)
+        self._trips: dict[str, Trip] = {}
+        self._rows: dict[str, str] = {}
+
+    def hear(self, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS) -> None:
+        """Take in what has happened, in order of time, and what was measured, by id."""
+        fates = self._fates
+        for event in events:
+            fates[event.actor].hear(event)
+            if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
+                fates[str(event.partner)].hear(event)
+        self._trips.update(trips)
+
+    def settle(self) -> None:
+        """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker."""
+        for name, fate in self._fates.items():
+            if fate.arrival is not None and name in self._actors and name not in self._rows:
+                self._rows[name] = outcome_row(self._outcome(name))
+
+    def outcomes(self) -> tuple[ActorOutcome, ...]:
+        """One outcome per planned actor, in the plan's order."""
+        return tuple(map(self._outcome, self._actors))
+
+    def rows(self) -> Iterator[str]:
+        """The same as rows of ``actors.json``."""
+        for name in self._actors:
+            yield self._rows.get(name) or outcome_row(self._outcome(name))
+
+    def _outcome(self, name: str) -> ActorOutcome:
+        fate = self._fates.get(name) or _Fate()
+        return _outcome(self._actors[name], fate, self._trips.get(name, _NO_TRIP))
+
+
+def actor_outcomes(
+    plan: Plan, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS
+) -> tuple[ActorOutcome, ...]:
+    """One outcome per planned actor, in the plan's order.
+
+    Parameters
+    ----------
+    trips
+        By id; whoever has none has no delay, waiting time and stops.
+    """
+    fates = Fates(plan)
+    fates.hear(events, trips)
+    return fates.outcomes()
+
+
+def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
+    departure, arrival = fate.departure, fate.arrival
+    status: ActorStatus = "arrived" if arrival else "running" if departure else "waiting"
+    inserted = departure.time if departure else None
+    travel_time = arrival.travel_time if arrival else None
+    mean_speed = None
+    if travel_time and actor.route_length is not None:
+        mean_speed = actor.route_length / travel_time
+    return ActorOutcome(
+        id=actor.id,
+        category=actor.category,
+        model=actor.model,
+        ego=actor.ego,
+        flow=actor.flow,
+        spawn=actor.spawn,
+        goal=actor.goal,
+        status=status,
+        depart=actor.depart,
+        inserted=inserted,
+        depart_delay=None if inserted is None else inserted - actor.depart,
+        insertion_error=departure.error if departure else None,
+        arrived=arrival.time if arrival else None,
+        travel_time=travel_time,
+        free_flow_time=actor.free_flow_time,
+        delay=trip.time_loss if arrival else None,
+        route_length=actor.route_length,
+        mean_speed=mean_speed,
+        teleports=fate.teleports,
+        collisions=fate.collisions,
+        emergency_stops=fate.emergency_stops,
+        problem=actor.problem,
+        time_loss=trip.time_loss,
+        waiting_time=trip.waiting_time,
+        stops=trip.stops,
+    )
+
+
+def actors_to_json(outcomes: Iterable[ActorOutcome]) -> str:
+    """``actors.json``: one actor per line."""
+    return "".join(actors_text(map(outcome_row, outcomes)))
+
+
+def actors_text(rows: Iterable[str]) -> Iterator[str]:
+    """``actors.json`` piece by piece, from what :func:`outcome_row` gives."""
+    return text_with_rows({"format": ACTORS_FORMAT, "version": VERSION}, "actors", rows)
+
+
+def outcome_row(outcome: ActorOutcome) -> str:
+    """One actor as it stands in ``actors.json``, without indentation and comma."""
+    return row_text({name: getattr(outcome, name) for name in _COLUMNS})
+
+
+def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
+    """Inverse of :func:`actors_to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is not a list of actors of this version.
+    """
+    try:
+        data = orjson.loads(text)
+        if (data["format"], data["version"]) != (ACTORS_FORMAT, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a list of actors"
+            raise InputError(msg)
+        return tuple(ActorOutcome(**actor) for actor in data["actors"])
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not a list of actors: {error!r}"
+        raise InputError(msg) from error
+
+
+def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
+    """How many actors were planned, and how many of them met each fate.
+
+    ``inserted`` = ``arrived`` + ``running``; ``planned`` = ``inserted`` + ``waiting``.
+    ``teleported`` and ``collided`` count actors, not events.
+    """
+    status = Counter(outcome.status for outcome in outcomes)
+    return {
+        "planned": len(outcomes),
+        "inserted": status["arrived"] + status["running"],
+        "arrived": status["arrived"],
+        "running": status["running"],
+        "waiting": status["waiting"],
+        "teleported": sum(outcome.teleports > 0 for outcome in outcomes),
+        "collided": sum(outcome.collisions > 0 for outcome in outcomes),
+        "emergency_stopped": sum(outcome.emergency_stops > 0 for outcome in outcomes),
+    }
+
+
+def key_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
+    """Figures of the whole run; vehicles and pedestrians apart, as they mix badly.
+
+    Times in seconds, speeds in m/s; ``None`` where nobody arrived. ``mean_speed`` is the space
+    mean: metres of all who arrived over their seconds.
+    """
+    figures: dict[str, float | None] = {
+        "insertion_error_max": _largest([o.insertion_error for o in outcomes]),
+        "insertion_error_mean": _mean([o.insertion_error for o in outcomes]),
+        "depart_delay_max": _largest([o.depart_delay for o in outcomes]),
+    }
+    vehicles = [o for o in outcomes if o.category != "pedestrian"]
+    pedestrians = [o for o in outcomes if o.category == "pedestrian"]
+    figures.update(_travel_figures(vehicles))
+    figures.update(
+        {f"pedestrian_{name}": value for name, value in _travel_figures(pedestrians).items()}
+    )
+    figures["mean_stops"] = _mean([o.stops for o in vehicles if o.status == "arrived"])
+    return rounded(figures)
+
+
+def _travel_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
+    times = sorted(o.travel_time for o in outcomes if o.travel_time is not None)
+    moved = [
+        (o.route_length, o.travel_time)
+        for o in outcomes
+        if o.travel_time and o.route_length is not None
+    ]
+    seconds = sum(time for _, time in moved)
+    return {
+        "mean_travel_time": _mean(times),
+        "median_travel_time": _percentile(times, 0.5),
+        "p95_travel_time": _percentile(times, 0.95),
+        "mean_speed": sum(length for length, _ in moved) / seconds if seconds else None,
+        "mean_delay": _mean([o.delay for o in outcomes]),
+        "mean_waiting_time": _mean([o.waiting_time for o in outcomes if o.status == "arrived"]),
+    }
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _largest(values: Sequence[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _percentile(ordered: Sequence[float], share: float) -> float | None:
+    """Linear between the two nearest ranks, as ``numpy.percentile`` does."""
+    if not ordered:
+        return None
+    position = share * (len(ordered) - 1)
+    low = int(position)
+    high = min(low + 1, len(ordered) - 1)
+    return ordered[low] + (position - low) * (ordered[high] - ordered[low])
+
+
+def summary_to_json(summary: Mapping[str, Any]) -> str:
+    """``summary.json``; NaN and infinity are refused."""
+    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

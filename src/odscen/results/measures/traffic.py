@@ -1,0 +1,189 @@
+"""Figures of traffic by place and time, from what SUMO sums up per lane and interval.
+
+Definitions, each used everywhere:
+
+flow, density, speed
+    Edie's generalized definitions (L. C. Edie, *Discussion of traffic stream measurements and
+    definitions*, Proc. 2nd Int. Symp. on the Theory of Traffic Flow, 1963). In an interval of ``T``
+    hours on a place of ``L`` km: ``flow = distance / (L T)``, ``density = seconds / (L T)``,
+    ``speed = distance / seconds``, with what all vehicles drove and the time that they spent there.
+    ``speed`` is the space mean, and ``flow = density * speed``.
+L
+    Segment: its length along the road, so that flow is that of all lanes and directions together.
+    Junction, movement: mean length of the ways through. Network: sum over the lanes, so that flow
+    and density are per lane, as in macroscopic fundamental diagrams (N. Geroliminis and C. F.
+    Daganzo, Transportation Research B 42, 2008).
+delay
+    SUMO's time loss, the sum of ``(1 - speed / desired speed) dt``, in seconds per vehicle. So
+    ``seconds - time_loss`` is the time that the same way takes at desired speed: free-flow time.
+standing, waiting
+    Of vehicles below 0.1 m/s: their mean number, and seconds per vehicle.
+delay and waiting of a junction
+    Those on the ways to it (from the junction before, over all segments between) and in it, per
+    vehicle that enters it: the control delay of the Highway Capacity Manual (HCM, 7th edition),
+    with what is lost behind other vehicles on the way.
+delay and waiting of a movement
+    Vehicles that use one lane share its delay alike, as in a lane group of the HCM: that of the
+    last edge by lane, that of the edges before it all together.
+
+A junction or movement that nobody got into, though somebody stood all the time, has no delay per
+vehicle and level F. Places are defined in :mod:`odscen.results.measures.lane_places`, levels of service in
+:mod:`odscen.results.measures.level_of_service`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+from odscen.results.measures.level_of_service import junction_level, street_level
+from odscen.results.measures.traffic_sums import (
+    INTERVAL,
+    SUMS,
+    intervals,
+    junction_sums,
+    movement_sums,
+    network_sums,
+    segment_sums,
+    summable,
+)
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.results.measures.lane_places import LanePlaces
+
+TableName = Literal["network", "segments", "junctions", "movements"]
+TABLES: tuple[TableName, ...] = get_args(TableName)
+
+_KEYS = ("segment", "movement", "junction", "control")
+_QUEUES = ("queue_max", "queue_p95")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrafficFigures:
+    """Four tables: one row for each place and interval of time, sorted by place and begin.
+
+    A place that nobody came to is in no table; a place has a row for every interval, also without
+    anybody. Columns of all tables:
+
+    - ``begin``, ``end``: s.
+    - ``vehicles``: that came into the place or started there; of the network: that were under way.
+    - ``flow`` (veh/h), ``density`` (veh/km), ``speed`` (m/s; null without anybody).
+    - ``delay``, ``waiting``: s per vehicle; null without anybody who passed.
+    - ``standing``: mean number of vehicles that stand, the mean queue.
+    - ``co2``, ``co``, ``hc``, ``nox``, ``pmx``, ``fuel``: g, at the place itself; null if not
+      recorded.
+    - ``length``: km, ``L`` of the definitions above.
+    - ``seconds``, ``time_loss``, ``standing_seconds`` (vehicle-seconds), ``distance`` (m): what
+      the others are made of.
+
+    Attributes
+    ----------
+    network
+        Also ``running`` (mean number under way), ``departed``, ``arrived``.
+    segments
+        Also ``segment``, ``travel_time`` and ``free_flow_time`` (s, along the whole segment; null
+        without anybody), ``level``.
+    junctions
+        Also ``junction``, ``control``, ``level``, ``queue_max`` and ``queue_p95`` (vehicles that
+        stand at one time on the ways to it and in it; null without trajectories), ``throughput``
+        (the same as ``vehicles``).
+    movements
+        Also ``movement`` (``r1>j10>r2``), ``junction``, ``control``, ``level``.
+    """
+
+    network: pl.DataFrame
+    segments: pl.DataFrame
+    junctions: pl.DataFrame
+    movements: pl.DataFrame
+
+
+def traffic_figures(
+    lanes: pl.DataFrame, places: LanePlaces, *, end: float, queues: pl.DataFrame | None = None
+) -> TrafficFigures:
+    """Figures of one run.
+
+    Parameters
+    ----------
+    lanes
+        Per lane and interval, from :func:`odscen.sumo.folder.recorded.read_lanes`.
+    end
+        When the run ended, s.
+    queues
+        From :func:`odscen.results.measures.queues.queue_lengths`; of trajectories, if there are any.
+    """
+    clock = intervals(lanes, end)
+    lanes = summable(lanes)
+    return TrafficFigures(
+        network=_with_rates(network_sums(lanes, clock, places)),
+        segments=_with_rates(segment_sums(lanes, clock, places)),
+        junctions=_with_rates(_with_queues(junction_sums(lanes, clock, places), queues)),
+        movements=_with_rates(movement_sums(lanes, clock, places)),
+    )
+
+
+def over_run(table: pl.DataFrame) -> pl.DataFrame:
+    """One of the four tables with one row for each place, over all intervals."""
+    import polars as pl
+
+    keys = [key for key in _KEYS if key in table.columns]
+    sums = [name for name in (*SUMS, "departed", "arrived") if name in table.columns]
+    added = [
+        pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
+    ]
+    whole = [pl.col("begin").min(), pl.col("end").max(), pl.col("length").first(), *added]
+    whole += [pl.col(name).max() for name in _QUEUES if name in table.columns]
+    found = (
+        table.group_by(keys, maintain_order=True).agg(whole)
+        if keys
+        else table.select(whole).with_columns(vehicles="departed")
+    )
+    return _with_rates(found)
+
+
+def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
+    """Everything that is a quotient of sums, and the columns in their order."""
+    import polars as pl
+
+    col = pl.col
+    seconds = col("end") - col("begin")
+    per_vehicle = pl.when(col("vehicles") > 0)
+    hours_km = seconds / 3600.0 * col("length")
+    driving = pl.when(col("distance") > 0)
+    rates = sums.with_columns(
+        flow=col("distance") / 1000.0 / hours_km,
+        density=col("seconds") / 3600.0 / hours_km,
+        speed=pl.when(col("seconds") > 0).then(col("distance") / col("seconds")),
+        delay=per_vehicle.then(col("time_loss") / col("vehicles")),
+        waiting=per_vehicle.then(col("standing_seconds") / col("vehicles")),
+        standing=col("standing_seconds") / seconds,
+    )
+    if "junction" in sums.columns:
+        stuck = (col("vehicles") == 0) & (col("standing") >= 1.0)
+        level = junction_level(col("delay"), col("control"))
+        rates = rates.with_columns(level=pl.when(stuck).then(pl.lit("F")).otherwise(level))
+        if "movement" not in sums.columns:
+            rates = rates.with_columns(throughput="vehicles")
+    elif "segment" in sums.columns:
+        metres = col("length") * 1000.0
+        free_seconds = col("seconds") - col("time_loss")
+        rates = rates.with_columns(
+            travel_time=driving.then(metres * col("seconds") / col("distance")),
+            free_flow_time=driving.then(metres * free_seconds / col("distance")),
+            level=street_level(pl.when(col("seconds") > 0).then(free_seconds / col("seconds"))),
+        )
+    else:
+        rates = rates.with_columns(running=col("seconds") / seconds)
+    first = [*(key for key in _KEYS if key in sums.columns), *INTERVAL]
+    return rates.select(*first, pl.exclude(first))
+
+
+def _with_queues(junctions: pl.DataFrame, queues: pl.DataFrame | None) -> pl.DataFrame:
+    import polars as pl
+
+    if queues is None:
+        return junctions.with_columns(pl.lit(None, pl.Float64).alias(name) for name in _QUEUES)
+    return junctions.join(
+        queues, on=("junction", *INTERVAL), how="left", maintain_order="left"
+    ).with_columns(pl.col(name).fill_null(0.0) for name in _QUEUES)

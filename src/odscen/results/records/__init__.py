@@ -1,0 +1,1 @@
+"""What a run was planned to do and what it recorded, as values."""

@@ -1,0 +1,303 @@
+"""What a run is planned to do and what happened: the values that pass between rooms.
+
+A :class:`Plan` is written beside the SUMO files, so that a run can be judged, and repeated, from
+its folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians, seconds, m/s.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import orjson
+
+from odscen.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+PLAN_FORMAT = "odscen-plan"
+EVENTS_FORMAT = "odscen-events"
+ACTORS_FORMAT = "odscen-actors"
+VERSION = 1
+
+_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+"""What ``json.dumps`` makes anew at each call; a long run has a row for every event."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedActor:
+    """One road user that the run is to insert; those of flows are listed one by one.
+
+    Attributes
+    ----------
+    id
+        Id in SUMO: the actor's id, or ``<flow>.<k>``.
+    x, y, z, hdg
+        Body centre at departure, lateral offset included, OpenDRIVE frame.
+    speed
+        Desired speed, ``None`` for the limit.
+    speed_factor
+        Drawn for this actor; multiplies the speed limit (vehicles) or the walking speed.
+    route_length
+        Metres from the spawn node to the goal along the lane graph.
+    free_flow_time
+        Seconds that the way takes at the desired speed without anybody else; ``None`` if unknown.
+    flow
+        Id of the flow it belongs to, if any.
+    problem
+        Why it is not in the SUMO files, if it is not.
+    """
+
+    id: str
+    category: str
+    spawn: str
+    goal: str | None
+    depart: float
+    length: float
+    width: float
+    x: float
+    y: float
+    z: float
+    hdg: float
+    speed: float | None = None
+    speed_factor: float = 1.0
+    route_length: float | None = None
+    free_flow_time: float | None = None
+    model: str | None = None
+    flow: str | None = None
+    ego: bool = False
+    problem: str | None = None
+
+    @property
+    def person(self) -> bool:
+        """Whether SUMO runs it as a person."""
+        return self.category == "pedestrian"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a run is to do.
+
+    Attributes
+    ----------
+    until, step_length
+        Seconds.
+    net_offset
+        What is added to OpenDRIVE x and y to give SUMO's.
+    elevation
+        Whether the network has heights.
+    slice_length
+        Seconds after which the state is saved and the run goes on from what was saved; ``None``
+        for a run in one piece.
+    trajectories
+        Whether they are recorded.
+    """
+
+    scenario: str
+    seed: int
+    until: float
+    step_length: float
+    net_offset: tuple[float, float]
+    actors: tuple[PlannedActor, ...]
+    elevation: bool = False
+    slice_length: float | None = None
+    trajectories: bool = True
+
+    def to_json(self) -> str:
+        """One actor per line; the same plan gives the same text."""
+        head = {
+            "format": PLAN_FORMAT,
+            "version": VERSION,
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "until": self.until,
+            "step_length": self.step_length,
+            "net_offset": list(self.net_offset),
+            "elevation": self.elevation,
+            "slice_length": self.slice_length,
+            "trajectories": self.trajectories,
+        }
+        return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
+
+    @classmethod
+    def from_json(cls, text: str) -> Plan:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        InputError
+            If it is not a plan of this version.
+        """
+        try:
+            data = orjson.loads(text)
+            if (data["format"], data["version"]) != (PLAN_FORMAT, VERSION):
+                msg = f"format {data['format']!r} version {data['version']!r} is not a plan"
+                raise InputError(msg)
+            x, y = data["net_offset"]
+            return cls(
+                scenario=data["scenario"],
+                seed=data["seed"],
+                until=data["until"],
+                step_length=data["step_length"],
+                net_offset=(x, y),
+                actors=tuple(PlannedActor(**actor) for actor in data["actors"]),
+                elevation=data["elevation"],
+                slice_length=data.get("slice_length"),
+                trajectories=data.get("trajectories", True),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            msg = f"not a plan of a run: {error!r}"
+            raise InputError(msg) from error
+
+
+class EventKind(StrEnum):
+    """What can happen to an actor.
+
+    A jam is told of whoever is first in it. ``lost``: it did not come back with a saved state.
+    """
+
+    DEPARTED = "departed"
+    ARRIVED = "arrived"
+    TELEPORT_START = "teleport_start"
+    TELEPORT_END = "teleport_end"
+    COLLISION = "collision"
+    EMERGENCY_STOP = "emergency_stop"
+    JAM_BEGIN = "jam_begin"
+    JAM_END = "jam_end"
+    LOST = "lost"
+
+
+class Event(NamedTuple):
+    """Something that happened to ``actor``; a tuple, as a long run makes very many.
+
+    Attributes
+    ----------
+    x, y
+        Body centre (departures), front (everything else), OpenDRIVE frame; ``None`` if unknown.
+    lane
+        SUMO lane, where SUMO names one.
+    partner
+        The other one in a collision.
+    error
+        Departures: metres between the body's centre and its planned place.
+    travel_time
+        Arrivals: seconds since departure.
+    detail
+        SUMO's word for the kind of collision; why somebody was stuck (teleports, jams).
+    waited
+        Seconds that whoever is first in a jam, or was moved on, has stood there.
+    queue
+        How many stand in a jam.
+    """
+
+    time: float
+    kind: EventKind
+    actor: str
+    x: float | None = None
+    y: float | None = None
+    lane: str | None = None
+    partner: str | None = None
+    error: float | None = None
+    travel_time: float | None = None
+    detail: str | None = None
+    waited: float | None = None
+    queue: int | None = None
+
+
+def event_row(event: Event) -> dict[str, Any]:
+    """One event as it stands in ``events.json``: without what has its default value."""
+    return rounded(_without_defaults(event))
+
+
+def event_line(event: Event) -> str:
+    """One event as it stands in ``events.json``, without indentation and comma."""
+    return row_text(_without_defaults(event))
+
+
+def event_from_line(line: str) -> Event:
+    """Inverse of :func:`event_line`."""
+    data = orjson.loads(line)
+    data["kind"] = EventKind(data["kind"])
+    return Event(**data)
+
+
+def events_to_json(events: Iterable[Event]) -> str:
+    """``events.json``: one event per line, in order of time."""
+    return "".join(events_text(event_line(event) for event in events))
+
+
+def events_text(lines: Iterable[str]) -> Iterator[str]:
+    """``events.json`` piece by piece, from what :func:`event_line` gives."""
+    return text_with_rows({"format": EVENTS_FORMAT, "version": VERSION}, "events", lines)
+
+
+def events_from_json(text: str) -> tuple[Event, ...]:
+    """Inverse of :func:`events_to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is not a list of events of this version.
+    """
+    try:
+        data = orjson.loads(text)
+        if (data["format"], data["version"]) != (EVENTS_FORMAT, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a list of events"
+            raise InputError(msg)
+        return tuple(
+            Event(**{**event, "kind": EventKind(event["kind"])}) for event in data["events"]
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not a list of events: {error!r}"
+        raise InputError(msg) from error
+
+
+def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str, Any]]) -> str:
+    """JSON text of ``{**head, key: rows}`` with one row per line, which people can read and diff.
+
+    Numbers are rounded to 1e-6: far below what is physical, and free of rounding noise.
+    """
+    return "".join(text_with_rows(head, key, map(row_text, rows)))
+
+
+def text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:
+    """Text of :func:`json_with_rows` piece by piece, from what :func:`row_text` gives."""
+    yield "{\n"
+    for name, value in head.items():
+        yield f"  {json.dumps(name)}: {json.dumps(value)},\n"
+    yield f"  {json.dumps(key)}: ["
+    before = "\n    "
+    for row in rows:
+        yield before + row
+        before = ",\n    "
+    yield "]\n}\n" if before == "\n    " else "\n  ]\n}\n"
+
+
+def row_text(row: Mapping[str, Any]) -> str:
+    """One row as it stands in such a text."""
+    return _encode(rounded(row))
+
+
+def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Round the floats of a row to 1e-6."""
+    return {
+        name: round(value, 6) if isinstance(value, float) else value for name, value in row.items()
+    }
+
+
+def _without_defaults(value: PlannedActor | Event) -> dict[str, Any]:
+    return {
+        name: item
+        for name, default in _DEFAULTS[type(value)]
+        if (item := getattr(value, name)) != default
+    }
+
+
+_DEFAULTS: dict[type, tuple[tuple[str, Any], ...]] = {
+    PlannedActor: tuple((field.name, field.default) for field in fields(PlannedActor)),
+    Event: tuple((name, Event._field_defaults.get(name, ...)) for name in Event._fields),
+}
+"""Names and defaults of the fields; asked for every row of a long run."""

@@ -1,0 +1,116 @@
+"""How close road users came to a crash: the report's figures, and the worst conflicts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.markup import Markup, element, number
+from odscen.results.measures.conflicts import (
+    SEEN_DRAC,
+    SEEN_PET,
+    SEEN_TTC,
+    SERIOUS_DRAC,
+    SERIOUS_PET,
+    SERIOUS_TTC,
+    conflict_figures,
+    is_serious,
+)
+from odscen.results.report.report_figures import Card, card_grid
+from odscen.results.report.report_tables import html_table, report_section
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SHOWN = 15
+"""Rows of the table at most."""
+
+KINDS = {
+    "following": "in a line",
+    "merging": "merging",
+    "crossing": "crossing",
+    "walking": "on foot",
+}
+
+
+def conflict_section(conflicts: pl.DataFrame) -> Markup:
+    """Cards, the number of each kind, and the worst conflicts.
+
+    Parameters
+    ----------
+    conflicts
+        As :func:`~odscen.results.measures.conflicts.conflict_table` gives them.
+    """
+    figures = conflict_figures(conflicts)
+    serious = round(figures["serious_conflicts"])
+    on_foot = (conflicts["kind"] == "walking").any()
+    cards = [
+        Card("serious conflicts", f"{serious:,}", f"of {conflicts.height:,} seen", bad=serious > 0),
+        Card("shortest time to collision", _least(figures["min_ttc"], SEEN_TTC), "of vehicles"),
+        Card("shortest time between", _least(figures["min_pet"], SEEN_PET), "two at one spot"),
+        Card("hardest braking needed", _drac(figures["max_drac"]), "to avoid a crash"),
+    ]
+    if on_foot:
+        closest = _least(figures["pedestrian_min_pet"], SEEN_PET)
+        cards.append(Card("shortest time to somebody on foot", closest, "at one spot"))
+    explained = (
+        "the time to collision is what is left until two crash if both go on as they do; the time "
+        "between two is from when the first leaves a spot until the other is there. A conflict is "
+        f"serious if these are below {SERIOUS_TTC:g} s and {SERIOUS_PET:g} s, or if more than "
+        f"{SERIOUS_DRAC:g} m/s\u00b2 of braking is needed. Where they gather, look "
+        "at sight, speed and right of way. A simulator's drivers see everything and hardly "
+        "err, so compare two variants rather than take these numbers for accidents."
+    )
+    table = _worst(conflicts) if conflicts.height else element("p", "Nobody came close.")
+    return report_section(
+        "How close they came", card_grid(cards), table, explained=explained, ident="conflicts"
+    )
+
+
+def _worst(conflicts: pl.DataFrame) -> Markup:
+    import polars as pl
+
+    share = pl.max_horizontal(
+        SERIOUS_TTC / pl.col("ttc").clip(0.01),
+        SERIOUS_PET / pl.col("pet").clip(0.01),
+        pl.col("drac") / SERIOUS_DRAC,
+    )
+    worst = conflicts.sort(share, descending=True, maintain_order=True).head(SHOWN)
+    heads = (
+        "Since, s", "Who", "With", "How", "To collision, s", "Between, s",
+        "Braking, m/s\u00b2", "At x, y, m",
+    )  # fmt: skip
+    grave = worst.select(is_serious()).to_series()
+    rows = [
+        _row(row, bad)
+        for row, bad in zip(worst.iter_rows(named=True), grave.to_list(), strict=True)
+    ]
+    return html_table(heads, rows, label="The worst conflicts")
+
+
+def _row(row: dict[str, Any], bad: bool) -> Markup:
+    place = ""
+    if row["x"] is not None:
+        place = f"{row['x']:.0f}, {row['y']:.0f}"
+    kind = KINDS.get(row["kind"], row["kind"])
+    return element(
+        "tr",
+        element("th", number(row["begin"], 1), scope="row"),
+        element("td", row["one"]),
+        element("td", row["other"]),
+        element("td", kind, class_="bad" if bad else None),
+        *(
+            element("td", "" if row[name] is None else f"{row[name]:.2f}", class_="n")
+            for name in ("ttc", "pet", "drac")
+        ),
+        element("td", place),
+    )
+
+
+def _least(value: float, seen: float) -> str:
+    return f"{number(value, 2)} s" if value < seen else f"over {seen:g} s"
+
+
+def _drac(value: float) -> str:
+    return (
+        f"{number(value, 1)} m/s\u00b2" if value > SEEN_DRAC else f"under {SEEN_DRAC:g} m/s\u00b2"
+    )

@@ -1,0 +1,206 @@
+"""Tables of the report: expectations, events in plain words, actors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.markup import Markup, element, number
+from odscen.results.records.run_records import EventKind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.results.measures.summary import ActorOutcome
+    from odscen.results.records.run_records import Event
+    from odscen.results.records.traces import ActorTravel
+
+ACTOR_LIMIT = 3000
+"""Rows of the actor table at most; a browser sorts that many at once. The file has all."""
+
+PRINTED_ACTORS = 100
+"""Rows of it on paper; the style sheet hides the others there."""
+
+EVENT_LIMIT = 300
+
+_STUCK = "Usually a blocked lane, or a turn that the traffic never left room for."
+
+EVENT_WORDS = {
+    EventKind.TELEPORT_START: ("was stuck too long and was lifted off the road", _STUCK),
+    EventKind.TELEPORT_END: ("was put back on the road further on", ""),
+    EventKind.COLLISION: (
+        "collided",
+        "Two bodies overlapped; often at a junction without signals, or after a teleport.",
+    ),
+    EventKind.EMERGENCY_STOP: (
+        "stopped harder than its brakes can",
+        "Usually the way ahead was closed to it at short notice.",
+    ),
+    EventKind.LOST: (
+        "did not come back when the simulation was reloaded",
+        "A limit of the simulator; its trip is not counted as finished.",
+    ),
+}
+"""What happened and why that may be, for the events worth telling."""
+
+_NEVER = ("never entered the road", "Its start was never free, or the run ended before its turn.")
+
+STATUS_WORDS = {
+    "arrived": "arrived",
+    "running": "still on its way",
+    "waiting": "never entered",
+}
+
+
+def report_section(heading: str, *children: Markup | None, explained: str, ident: str) -> Markup:
+    """Section with heading, content, and a sentence on how to read it."""
+    note = element("p", element("b", "How to read this: "), explained, class_="how")
+    return element("section", element("h2", heading), *children, note, id=ident)
+
+
+def html_table(
+    heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
+) -> Markup:
+    """Table that scrolls where there is no room; ``rows`` are ``tr``, ``label`` names it."""
+    head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
+    content = element("table", head, element("tbody", *rows), **attributes)
+    return element(
+        "div", content, class_="scroll", tabindex="0", role="region", aria_label=label or heads[0]
+    )
+
+
+def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | None:
+    """Table of what was expected and what came out."""
+    if not expectations:
+        return None
+    rows = []
+    for row in expectations:
+        met = bool(row.get("passed"))
+        verdict = element("td", "met" if met else "not met", class_="good" if met else "bad")
+        text = row.get("expectation", "")
+        cells = (
+            element("td", element("code", text)),
+            element("td", _value(row.get("value"), 3) or "none"),
+        )
+        rows.append(element("tr", *cells, verdict))
+    explained = (
+        "each line was asked for when the run was started; the value is what the run gave. Names "
+        "like arrived compare the share of all planned actors."
+    )
+    table = html_table(("Expectation", "Value", "Verdict"), rows)
+    return report_section("Expectations", table, explained=explained, ident="expectations")
+
+
+def event_list(
+    events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
+) -> Markup:
+    """Everything unusual, in order of time, in words; ``problems`` are known before the start."""
+    told = [(event.time, _event(event)) for event in events if event.kind in EVENT_WORDS]
+    told += [
+        (actor.depart, _item(actor.depart, actor.id, *_NEVER))
+        for actor in actors
+        if actor.inserted is None
+    ]
+    told.sort(key=lambda pair: pair[0])
+    before = [element("li", element("time", "before"), text) for text in problems]
+    explained = (
+        "teleports, collisions and actors that could not start are listed here, because each is a "
+        "place where the scenario, the map or the traffic is worth a second look."
+    )
+    if not told and not before:
+        nothing = element("p", "Nothing unusual happened.", class_="good")
+        return report_section("Events", nothing, explained=explained, ident="events")
+    items = [*before[:EVENT_LIMIT], *(item for _, item in told[:EVENT_LIMIT])]
+    listed = element("ol", *items, class_="events")
+    more = None
+    if len(told) > EVENT_LIMIT:
+        text = f"{len(told) - EVENT_LIMIT:,} more are in events.json and actors.json."
+        more = element("p", text)
+    return report_section("Events", listed, more, explained=explained, ident="events")
+
+
+def _event(event: Event) -> Markup:
+    words, reason = EVENT_WORDS[event.kind]
+    if event.partner:
+        words += f" with {event.partner}"
+    if event.x is not None and event.y is not None:
+        words += f" at x {number(event.x, 1)} m, y {number(event.y, 1)} m"
+    if event.detail:
+        words += f" ({event.detail})"
+    return _item(event.time, event.actor, words, reason)
+
+
+def _item(time: float, actor: str, words: str, reason: str) -> Markup:
+    return element(
+        "li",
+        element("time", f"{number(time, 1)} s"),
+        element("b", actor),
+        f" {words}. ",
+        element("small", reason) if reason else None,
+    )
+
+
+_COLUMNS = (
+    "Actor",
+    "Category",
+    "Model",
+    "Start, s",
+    "Entered, s",
+    "Arrived, s",
+    "Travel time, s",
+    "Delay, s",
+    "Way, m",
+    "Mean speed, km/h",
+    "Teleports",
+    "Collisions",
+    "Outcome",
+)
+
+
+def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
+    """One row per actor; the page's script sorts and filters it."""
+    rows = [_actor_row(row, travel) for row in actors[:ACTOR_LIMIT]]
+    field = element("input", type="search", id="filter", placeholder="car, never entered, ...")
+    control = element("label", "Show only rows with ", field, class_="filter")
+    more = None
+    if len(actors) > ACTOR_LIMIT:
+        text = f"The first {ACTOR_LIMIT:,} of {len(actors):,} actors; all are in actors.json."
+        more = element("p", text)
+    explained = (
+        "press a heading to sort by it, once more to turn the order round. Times count from the "
+        "start of the simulation; an empty field means that it never came to that."
+    )
+    table = html_table(_COLUMNS, rows, id="actors-table")
+    printed = None
+    if len(rows) > PRINTED_ACTORS:
+        words = f"The first {PRINTED_ACTORS} are printed."
+        printed = element("p", words, class_="print-only")
+    return report_section(
+        "Actors", control, more, printed, table, explained=explained, ident="actors"
+    )
+
+
+def _actor_row(actor: ActorOutcome, travel: ActorTravel) -> Markup:
+    speed = travel.speed.get(actor.id)
+    numbers = (
+        _value(actor.depart),
+        _value(actor.inserted),
+        _value(actor.arrived),
+        _value(actor.travel_time),
+        _value(actor.delay),
+        _value(travel.distance.get(actor.id), 0),
+        "" if speed is None else number(speed * 3.6, 1),
+        _value(actor.teleports),
+        _value(actor.collisions),
+    )
+    cells = [
+        element("th", actor.id + (" (ego)" if actor.ego else ""), scope="row"),
+        element("td", element("i", class_=f"swatch c-{actor.category}"), actor.category),
+        element("td", actor.model or ""),
+        *(element("td", text, class_="n") for text in numbers),
+        element("td", STATUS_WORDS.get(actor.status, actor.status)),
+    ]
+    return element("tr", *cells)
+
+
+def _value(value: float | None, digits: int = 1) -> str:
+    return "" if value is None else number(float(value), digits)

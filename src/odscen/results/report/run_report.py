@@ -1,0 +1,319 @@
+"""The report of a run: one HTML file that needs nothing else, for people who do not program.
+
+Everything that comes from files is escaped by construction (:mod:`odscen.base.markup`); besides,
+the page forbids itself every request and every script but its own, whose hash it names.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odscen.base.markup import Markup, element, join, number
+from odscen.results.measures.curves import presence
+from odscen.results.measures.gridlock import find_trouble
+from odscen.results.measures.summary import actor_counts, key_figures
+from odscen.results.records.traces import bin_width, speed_over_time, tidy, travel
+from odscen.results.report.plots import Series, line_chart
+from odscen.results.report.report_conflicts import conflict_section
+from odscen.results.report.report_corridor import corridor_section
+from odscen.results.report.report_emissions import emission_section
+from odscen.results.report.report_figures import key_figure_section
+from odscen.results.report.report_flow import diagram_section, flow_section
+from odscen.results.report.report_map import CATEGORIES, run_map
+from odscen.results.report.report_service import service_section
+from odscen.results.report.report_tables import (
+    actor_table,
+    event_list,
+    expectation_table,
+    report_section,
+)
+from odscen.results.report.report_trouble import trouble_section
+from odscen.results.report.report_walking import walking_section
+from odscen.results.report.report_words import duration
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import polars as pl
+
+    from odscen.drawing.map_drawing import MapDrawing
+    from odscen.results.measures.gridlock import Trouble
+    from odscen.results.measures.summary import ActorOutcome
+    from odscen.results.measures.traffic import TrafficFigures
+    from odscen.results.records.run_records import Event, Plan
+    from odscen.results.report.place_shapes import PlaceShapes
+    from odscen.results.report.report_corridor import CorridorTraces
+
+FloatArray = NDArray[np.float64]
+
+
+def render_report(
+    summary: Mapping[str, Any],
+    plan: Plan,
+    actors: Sequence[ActorOutcome],
+    events: Sequence[Event],
+    trajectories: pl.DataFrame,
+    *,
+    drawing: MapDrawing | None = None,
+    every: int = 1,
+    figures: TrafficFigures | None = None,
+    shapes: PlaceShapes | None = None,
+    corridor: CorridorTraces | str | None = None,
+    conflicts: pl.DataFrame | None = None,
+) -> str:
+    """Write the report of one run.
+
+    Parameters
+    ----------
+    summary
+        As in ``summary.json``: ``status``, ``map``, ``sim_seconds``, ``wall_seconds``, ``figures``,
+        ``expectations``, ``versions``, ``error``; whatever is missing is left out.
+    plan
+        What the run was to do; names the scenario and gives the frame of the trajectories.
+    actors
+        What became of each actor, as in ``actors.json``.
+    events
+        What happened, as in ``events.json``.
+    trajectories
+        As read from ``trajectories.parquet``, in SUMO's frame.
+    drawing
+        Of the map, if it is to be shown below the ways.
+    every
+        Of so many records the trajectories have one only; the page says so.
+    figures
+        By place and time, if they were recorded.
+    shapes
+        Of the map's places, if it is to be coloured by level of service.
+    corridor
+        Vehicles along a corridor, or words why there is no diagram of them.
+    conflicts
+        Who came close to whom, if that was measured.
+
+    Returns
+    -------
+    str
+        The whole page; the same input gives the same text.
+    """
+    categories = {actor.id: actor.category for actor in actors}
+    traces = tidy(trajectories, categories, net_offset=plan.net_offset)
+    end = _end(summary, traces)
+    trouble = find_trouble(plan, actors, events, end=end)
+    title = plan.scenario or "Run"
+    given = summary.get("figures") or key_figures(actors)
+    body = [
+        _head(title, plan, summary, _in_a_sentence(actors)),
+        key_figure_section(given, actors, traces),
+        service_section(figures, shapes) if figures else None,
+        _map_section(traces, plan, actors, events, drawing, trouble, every),
+        trouble_section(trouble),
+        *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
+        corridor_section(corridor) if corridor is not None else None,
+        _speed_section(traces, end),
+        _progress_section(actors, end),
+        conflict_section(conflicts) if conflicts is not None else None,
+        walking_section(given, actors, traces, end=end),
+        emission_section(figures) if figures else None,
+        expectation_table(summary.get("expectations") or ()),
+        event_list(events, actors, problems=[str(text) for text in summary.get("problems") or ()]),
+        actor_table(actors, travel(traces)),
+        _foot(summary),
+    ]
+    return html_page(f"{title} - run report", join([part for part in body if part]))
+
+
+def html_page(title: str, body: Markup) -> str:
+    """Whole page with our style and script around ``body``; it forbids itself everything else."""
+    style, script = _asset("report.css"), _asset("report.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    head = [
+        element("meta", charset="utf-8"),
+        Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", name="color-scheme", content="light dark"),
+        element("title", title),
+        element("style", Markup(style)),
+    ]
+    script_element = element("script", Markup(script))
+    page = element(
+        "html", element("head", *head), element("body", element("main", body), script_element),
+        lang="en",
+    )  # fmt: skip
+    return f"<!DOCTYPE html>\n{page}\n"
+
+
+def _asset(name: str) -> str:
+    return (files("odscen.results.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
+    last = traces["time"].max()
+    recorded = float(last) if isinstance(last, int | float) else 0.0
+    return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
+
+
+def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
+    """Class and words."""
+    status = str(summary.get("status", "completed"))
+    expectations = summary.get("expectations") or ()
+    missed = sum(not row.get("passed") for row in expectations)
+    if status == "failed":
+        return "bad", "The run failed"
+    words = {"completed": "Completed", "stopped": "Stopped early"}.get(status, status)
+    if missed:
+        return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
+    if expectations:
+        met = "expectation met" if len(expectations) == 1 else "all expectations met"
+        return "good", f"{words}, {met}"
+    return ("good" if status == "completed" else "fair"), words
+
+
+def _in_a_sentence(actors: Sequence[ActorOutcome]) -> str:
+    """What became of the actors, in one sentence for people."""
+    counts = actor_counts(actors)
+    if not counts["planned"]:
+        return ""
+    parts = [f"{counts['arrived']:,} of {counts['planned']:,} actors reached their goal"]
+    if counts["running"]:
+        verb = "was" if counts["running"] == 1 else "were"
+        parts.append(f"{counts['running']:,} {verb} still on the way at the end")
+    if counts["waiting"]:
+        parts.append(f"{counts['waiting']:,} never entered the road")
+    trouble = [
+        f"{counts[key]:,} {word}"
+        for key, word in (("teleported", "had to be teleported"), ("collided", "collided"))
+        if counts[key]
+    ]
+    parts += trouble or ["nobody was teleported or collided"]
+    return "; ".join(parts) + "."
+
+
+def _head(title: str, plan: Plan, summary: Mapping[str, Any], sentence: str) -> Markup:
+    style, words = _verdict(summary)
+    facts = [
+        ("Map", summary.get("map")),
+        ("Weather", summary.get("environment")),
+        ("Seed", plan.seed),
+        ("Simulated", duration(summary.get("sim_seconds"))),
+        ("Computed in", duration(summary.get("wall_seconds"))),
+    ]
+    shown = [
+        element("span", element("b", f"{name} "), _plain(value))
+        for name, value in facts
+        if value not in (None, "")
+    ]
+    reason = summary.get("error") or summary.get("reason")
+    return element(
+        "header",
+        element("p", "Run report", class_="kind"),
+        element("h1", title),
+        element("p", words, class_=f"verdict {style}"),
+        element("p", sentence) if sentence else None,
+        element("pre", str(reason), class_="reason") if reason else None,
+        element("p", *shown, class_="facts"),
+    )
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, dict):
+        return str(value.get("name") or value.get("preset") or "")
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def _map_section(
+    traces: pl.DataFrame,
+    plan: Plan,
+    actors: Sequence[ActorOutcome],
+    events: Sequence[Event],
+    drawing: MapDrawing | None,
+    trouble: Sequence[Trouble],
+    every: int,
+) -> Markup | None:
+    figure = run_map(traces, plan, actors, events, drawing, trouble=trouble)
+    if figure is None:
+        return None
+    explained = (
+        "every line is the way of one actor; point at it to see whose. Switch to mean speed to see "
+        "where traffic was slow: red places stood, blue places flowed."
+    )
+    if trouble:
+        explained += (
+            " Numbered rings are places where traffic got stuck; the table below has them. Where "
+            "rings crowd, one has its number; point at the others for theirs."
+        )
+    if every > 1:
+        explained += (
+            f" The run is long: this page is made from one in {every} records of where everybody "
+            "was, so that ways are a little straighter and shorter than they were."
+        )
+    return report_section("Where they went", figure, explained=explained, ident="map")
+
+
+def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
+    if traces.is_empty():
+        return None
+    width = bin_width(end)
+    vehicles = traces.filter(traces["category"] != "pedestrian")
+    parts: list[Markup | None] = []
+    if not vehicles.is_empty():
+        curve = speed_over_time(vehicles, end=end, width=width)
+        line = Series(
+            "mean of all vehicles", "c-all", curve.mean * 3.6, curve.low * 3.6, curve.high * 3.6
+        )
+        text = "Mean speed of all vehicles over time"
+        parts.append(line_chart(curve.time, [line], y_label="speed, km/h", description=text))
+    present = [key for key in CATEGORIES if (traces["category"] == key).any()]
+    if len(present) > 1:
+        # Fewer and longer bins: a handful of lines over each other must stay apart by eye.
+        width_each = bin_width(end, bins=40)
+        lines = []
+        for key in present:
+            curve = speed_over_time(
+                traces.filter(traces["category"] == key), end=end, width=width_each
+            )
+            lines.append(Series(CATEGORIES[key], f"c-{key}", curve.mean * 3.6))
+        text = f"Mean speed of each category over time, every {duration(width_each)}"
+        parts.append(element("h3", f"By category, mean over {duration(width_each)}"))
+        parts.append(line_chart(curve.time, lines, y_label="speed, km/h", description=text))
+    explained = (
+        f"each point of the upper chart is the mean over {duration(width)} of all vehicles on the "
+        "road then, those that stand included. A wide band means that some drive freely while "
+        "others wait. A line ends where nobody is left."
+    )
+    return report_section("Speed over time", *parts, explained=explained, ident="speed")
+
+
+def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | None:
+    if not actors:
+        return None
+    counts = presence(actors, end=end)
+    series = [
+        Series("on the road", "c-running", counts.running),
+        Series("reached their goal", "c-arrived", counts.arrived),
+    ]
+    if counts.waiting.any():
+        series.append(Series("waiting to enter", "c-waiting", counts.waiting))
+    chart = line_chart(
+        counts.time,
+        series,
+        y_label="actors",
+        description="Actors on the road and arrived over time",
+    )
+    explained = (
+        "when the line of those who arrived climbs steadily, traffic flows. A growing number that "
+        "waits to enter means that there is no room at their start."
+    )
+    return report_section("Entering and arriving", chart, explained=explained, ident="progress")
+
+
+def _foot(summary: Mapping[str, Any]) -> Markup:
+    versions = dict(summary.get("versions") or {})
+    own = str(versions.pop("odscen", ""))
+    made = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
+    return element("footer", f"Made by odscen {own}".strip() + (f" with {made}." if made else "."))

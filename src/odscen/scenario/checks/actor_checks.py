@@ -1,0 +1,285 @@
+"""The rules for one actor or flow on its own: where it starts, where it goes, what it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from odscen.base.categories import DEFAULT_BODY, Body, Category
+from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.placing.region import NodePlace, Region, on_foot
+from odscen.scenario.placing.spawn_room import SAGITTA
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
+
+SPEED_MAX = {
+    # Highest speed of SUMO's vehicle classes (m/s), bicycles and walkers as people move:
+    # https://sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html
+    Category.CAR: 55.6,
+    Category.VAN: 55.6,
+    Category.TRUCK: 36.1,
+    Category.BUS: 27.8,
+    Category.MOTORCYCLE: 55.6,
+    Category.BICYCLE: 13.9,
+    Category.PEDESTRIAN: 4.0,
+}
+SPEED_MIN = {
+    category: 0.3 if category in (Category.PEDESTRIAN, Category.BICYCLE) else 1.0
+    for category in Category
+}
+"""Below this (m/s) an actor hardly moves."""
+
+
+class AssetLookup(Protocol):
+    """What checks ask of an asset catalogue."""
+
+    def weather(self, preset: str) -> Mapping[str, float] | None:
+        """Parameters of a weather preset, ``None`` if there is no such preset."""
+
+    def category_of(self, model: str) -> Category | None:
+        """Category of a model, ``None`` if there is no such model."""
+
+    def dimensions(self, model: str) -> Body | None:
+        """Size of a model, ``None`` if there is no such model."""
+
+
+def body_of(actor: Actor, assets: AssetLookup | None = None) -> Body:
+    """Size of an actor: that of its model if the catalogue knows it, else its category's usual."""
+    if assets is not None and actor.model is not None:
+        body = assets.dimensions(actor.model)
+        if body is not None:
+            return body
+    return DEFAULT_BODY[actor.category]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An actor or flow under examination, with all that its rules look at."""
+
+    scenario: Scenario
+    region: Region
+    where: str
+    one: Actor | Flow
+    categories: tuple[Category, ...]
+
+    @classmethod
+    def actor(cls, scenario: Scenario, region: Region, index: int) -> Subject:
+        """Take the actor at this place of the document."""
+        actor = scenario.actors[index]
+        return cls(scenario, region, f"actors[{index}]", actor, (actor.category,))
+
+    @classmethod
+    def flow(cls, scenario: Scenario, region: Region, index: int) -> Subject:
+        """Take the flow at this place of the document."""
+        flow = scenario.flows[index]
+        return cls(scenario, region, f"flows[{index}]", flow, tuple(flow.mix))
+
+    @property
+    def name(self) -> str:
+        """Return the id as messages quote it."""
+        return repr(self.one.id)
+
+
+def actor_problems(
+    scenario: Scenario, region: Region, index: int, assets: AssetLookup | None = None
+) -> Iterator[Problem]:
+    """Yield everything wrong with one actor on its own."""
+    subject = Subject.actor(scenario, region, index)
+    actor = scenario.actors[index]
+    yield from _model_problems(actor, subject, assets)
+    yield from _speed_problems(subject, actor.category)
+    if actor.ego and on_foot(actor.category):
+        yield error(
+            "ego_not_vehicle",
+            f"{subject.where}.ego",
+            f"{subject.name} is a pedestrian; only a vehicle can be the ego",
+        )
+    if actor.depart >= scenario.simulation.duration:
+        yield warning(
+            "departs_too_late",
+            f"{subject.where}.depart",
+            f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
+            f"{scenario.simulation.duration:g} s; depart earlier or run longer",
+        )
+    if actor.crosses_anywhere:  # R45; no run acts on it so far
+        yield warning(
+            "not_acted_on",
+            f"{subject.where}.crosses_anywhere",
+            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks",
+        )
+    spawn, problems = spawn_problems(subject)
+    yield from problems
+    if spawn is not None:
+        yield from goal_problems(subject, spawn)
+        yield from _body_problems(subject, actor, spawn, body_of(actor, assets))
+
+
+def flow_problems(scenario: Scenario, region: Region, index: int) -> Iterator[Problem]:
+    """Yield everything wrong with one flow on its own."""
+    subject = Subject.flow(scenario, region, index)
+    flow = scenario.flows[index]
+    if flow.end <= flow.begin:
+        yield error(
+            "flow_window_empty",
+            f"{subject.where}.end",
+            f"flow {subject.name} ends at {flow.end:g} s, not after it begins ({flow.begin:g} s)",
+        )
+    elif flow.begin >= scenario.simulation.duration:
+        yield warning(
+            "departs_too_late",
+            f"{subject.where}.begin",
+            f"flow {subject.name} begins at {flow.begin:g} s, but the run ends at "
+            f"{scenario.simulation.duration:g} s; begin earlier or run longer",
+        )
+    for category in flow.mix:
+        yield from _speed_problems(subject, category)
+    spawn, problems = spawn_problems(subject)
+    yield from problems
+    if spawn is not None:
+        yield from goal_problems(subject, spawn)
+
+
+def spawn_problems(subject: Subject) -> tuple[NodePlace | None, tuple[Problem, ...]]:
+    """Check the spawn; gives its place if the further rules can be asked, and the problems."""
+    one, where = subject.one, f"{subject.where}.spawn"
+    place = subject.region.place(one.spawn)
+    if place is None:
+        message = (
+            f"{subject.name} starts on {one.spawn!r}, which the map does not have; pick a node"
+        )
+        return None, (error("unknown_spawn", where, message, nodes=[one.spawn]),)
+    found: list[Problem] = []
+    wrong = [category for category in subject.categories if on_foot(category) != place.walk]
+    if wrong:
+        kind, other = (
+            ("a pedestrian node", "a node of a lane")
+            if place.walk
+            else ("a node of a lane", "a pedestrian node")
+        )
+        message = (
+            f"{subject.name} ({', '.join(wrong)}) starts on {one.spawn!r}, {kind}; use {other}"
+        )
+        found.append(error("wrong_graph", where, message, nodes=[one.spawn]))
+    if not subject.region.holds(place):
+        segment = subject.region.segment_of(place)
+        message = (
+            f"{subject.name} starts on {one.spawn!r} in segment {segment!r}, outside the region of "
+            "interest; move it or add the segment"
+        )
+        found.append(
+            error("spawn_outside_roi", where, message, nodes=[one.spawn], segments=[segment])
+        )
+    return (None if found else place), tuple(found)
+
+
+def goal_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
+    """Check the goal of an actor or flow whose spawn is right (R38)."""
+    one, region, where = subject.one, subject.region, f"{subject.where}.goal"
+    if not region.router_of(spawn).has_goals(spawn.node):
+        yield error(
+            "no_goal",
+            f"{subject.where}.spawn",
+            f"{subject.name} starts on {one.spawn!r}, from where no way leads on inside the region "
+            "of interest; start further back or add the next segment",
+            nodes=[one.spawn],
+        )
+        return
+    if one.goal is None:
+        return
+    goal = region.place(one.goal)
+    nodes = [one.spawn, one.goal]
+    if goal is None:
+        message = f"{subject.name} goes to {one.goal!r}, which the map does not have; pick a goal"
+        yield error("unknown_goal", where, message, nodes=nodes)
+    elif not region.holds(goal):
+        segment = region.segment_of(goal)
+        message = (
+            f"{subject.name} goes to {one.goal!r} in segment {segment!r}, outside the region of "
+            "interest; pick another goal or add the segment"
+        )
+        yield error("goal_outside_roi", where, message, nodes=nodes, segments=[segment])
+    elif not region.leads(spawn, goal):
+        message = (
+            f"{subject.name} cannot get from {one.spawn!r} to {one.goal!r} inside the region of "
+            f"interest; pick one of its {len(region.candidates(spawn))} goals"
+        )
+        yield error("goal_unreachable", where, message, nodes=nodes)
+    elif not region.is_candidate(spawn, goal):
+        message = (
+            f"{subject.name} goes to {one.goal!r}, which is not where a way through the region "
+            f"ends, and vanishes there; pick one of its {len(region.candidates(spawn))} goals"
+        )
+        yield warning("goal_not_candidate", where, message, nodes=nodes)
+
+
+def _model_problems(
+    actor: Actor, subject: Subject, assets: AssetLookup | None
+) -> Iterator[Problem]:
+    if actor.model is None or assets is None:
+        return
+    category = assets.category_of(actor.model)
+    if category is None:
+        yield error(
+            "unknown_model",
+            f"{subject.where}.model",
+            f"{subject.name} is a {actor.model!r}, which is not in the asset catalogue; pick "
+            "another model or none",
+        )
+    elif category is not actor.category:
+        yield error(
+            "model_of_other_category",
+            f"{subject.where}.model",
+            f"{subject.name} is a {actor.category}, but its model {actor.model!r} is a {category}; "
+            "change one of the two",
+        )
+
+
+def _speed_problems(subject: Subject, category: Category) -> Iterator[Problem]:
+    speed = subject.one.speed
+    if speed is None or SPEED_MIN[category] <= speed <= SPEED_MAX[category]:
+        return
+    yield warning(
+        "speed_implausible",
+        f"{subject.where}.speed",
+        f"{subject.name} wants to go {speed:g} m/s ({speed * 3.6:.0f} km/h); plausible for a "
+        f"{category} are {SPEED_MIN[category]:g} to {SPEED_MAX[category]:g} m/s",
+    )
+
+
+def _body_problems(
+    subject: Subject, actor: Actor, spawn: NodePlace, body: Body
+) -> Iterator[Problem]:
+    graph = subject.region.nodes_of(spawn)
+    offset, width = actor.lateral_offset, float(graph.width[spawn.node])
+    beyond = abs(offset) + body.width / 2 - width / 2
+    kind = "walk" if spawn.walk else "lane"
+    if abs(offset) > width / 2:
+        yield error(
+            "off_lane",
+            f"{subject.where}.lateral_offset",
+            f"{subject.name} is {abs(offset):g} m off the middle of a {kind} {width:.2f} m wide, "
+            f"outside it; at most {width / 2:.2f} m",
+            nodes=[actor.spawn],
+        )
+    elif beyond > 0.01 and not spawn.walk:
+        yield warning(
+            "body_over_border",
+            f"{subject.where}.lateral_offset",
+            f"{subject.name} ({body.width:.2f} m wide, {offset:g} m beside the middle) reaches "
+            f"{beyond:.2f} m over the border of its lane ({width:.2f} m)",
+            nodes=[actor.spawn],
+        )
+    if spawn.walk:
+        return
+    bend = abs(float(subject.region.graph.lanes.curvature[spawn.node]))
+    if body.length**2 * bend / 8 > SAGITTA:
+        yield warning(
+            "tight_curve",
+            f"{subject.where}.spawn",
+            f"{subject.name} is {body.length:.1f} m long and starts in a curve of {1 / bend:.0f} m "
+            f"radius; its middle is {body.length**2 * bend / 8:.2f} m off the lane centre",
+            nodes=[actor.spawn],
+        )

@@ -1,0 +1,110 @@
+"""The goals of a scenario: those given, and those left open, drawn by its seed (R39)."""
+
+from __future__ import annotations
+
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.base.errors import ScenarioError
+from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.document.problems import Problem, refuse_errors
+from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.graphs import IntArray, MapGraph
+    from odscen.scenario.document.scenario_document import Scenario
+
+
+def stream(seed: int, *names: str) -> np.random.Generator:
+    """Random numbers of one thing by name, independent of what else is drawn, and of the order."""
+    words = [zlib.crc32(name.encode()) for name in names]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
+
+
+def resolve_goals(
+    scenario: Scenario, graph: MapGraph, *, region: Region | None = None
+) -> dict[str, int]:
+    """Goal of every actor as a node index: of the pedestrian graph for pedestrians, else of lanes.
+
+    An open goal is drawn from the candidates of the spawn by the scenario's seed and the actor's
+    id, so that adding, removing or reordering other actors changes nothing.
+
+    Parameters
+    ----------
+    region
+        The scenario's region on ``graph``, if the caller has made it already.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor whose spawn or goal is not usable.
+    """
+    region = Region.of(graph, scenario.roi) if region is None else region
+    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
+    goals: dict[str, int] = {}
+    problems: list[Problem] = []
+    for index, actor in enumerate(scenario.actors):
+        subject = Subject.actor(scenario, region, index)
+        place, found = spawn_problems(subject)
+        problems += found
+        if place is None:
+            continue
+        given = None if actor.goal is None else region.place(actor.goal)
+        if given is not None and region.leads(place, given):
+            goals[actor.id] = given.node
+            continue
+        found = tuple(goal_problems(subject, place))
+        problems += found
+        if not found:
+            candidates = region.candidates(place)
+            goals[actor.id] = int(stream(scenario.seed, "goal", actor.id).choice(candidates))
+    refuse_errors(problems)
+    return goals
+
+
+def flow_goals(
+    scenario: Scenario, graph: MapGraph, *, region: Region | None = None
+) -> dict[str, IntArray]:
+    """Goals that the actors of each flow draw from: the one given, or all candidates.
+
+    Node indices, of the pedestrian graph for flows of pedestrians, ascending.
+
+    Raises
+    ------
+    ScenarioError
+        With every flow whose spawn or goal is not usable.
+    """
+    region = Region.of(graph, scenario.roi) if region is None else region
+    goals: dict[str, IntArray] = {}
+    problems: list[Problem] = []
+    for index, flow in enumerate(scenario.flows):
+        subject = Subject.flow(scenario, region, index)
+        place, found = spawn_problems(subject)
+        if place is not None:
+            found = tuple(goal_problems(subject, place))
+            given = None if flow.goal is None else region.place(flow.goal)
+            goals[flow.id] = (
+                region.candidates(place)
+                if given is None
+                else np.array([given.node], dtype=np.int32)
+            )
+        problems += found
+    refuse_errors(problems)
+    return goals
+
+
+def with_goals(scenario: Scenario, graph: MapGraph) -> Scenario:
+    """Write the goal that :func:`resolve_goals` draws into every actor that has none."""
+    goals = resolve_goals(scenario, graph)
+    if len(goals) != len(scenario.actors):
+        msg = "two actors have the same id"
+        raise ScenarioError(msg)
+    actors = tuple(
+        actor.model_copy(
+            update={"goal": name_of(graph, NodePlace(on_foot(actor.category), goals[actor.id]))}
+        )
+        for actor in scenario.actors
+    )
+    return scenario.model_copy(update={"actors": actors})

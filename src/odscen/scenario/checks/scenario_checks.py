@@ -1,0 +1,202 @@
+"""All rules of a scenario on its map, checked at once; docs/scenario-format.md lists the codes."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING
+
+from odscen.lanegraph.query import is_connected
+from odscen.scenario.checks.actor_checks import (
+    AssetLookup,
+    actor_problems,
+    body_of,
+    flow_problems,
+)
+from odscen.scenario.checks.demand_checks import demand_problems
+from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.placing.bodies import Crowd, box_at
+from odscen.scenario.placing.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.checks.signal_timing import Light
+    from odscen.scenario.document.scenario_document import Scenario
+
+SAME_TIME = 1.0
+"""Actors that depart within this many seconds of each other stand on the road together."""
+
+
+def check(
+    scenario: Scenario,
+    graph: MapGraph,
+    assets: AssetLookup | None = None,
+    lights: Sequence[Light] | None = None,
+    *,
+    region: Region | None = None,
+) -> tuple[Problem, ...]:
+    """Find everything that is wrong with a scenario on its map.
+
+    Parameters
+    ----------
+    graph
+        The map that the scenario names. If it is another one, or has another node spacing, that is
+        the first problem and rules that need the graph are left out.
+    assets
+        Catalogue for the rules on models and for their sizes; without one those are left out.
+    lights
+        Traffic lights of the map for the rules on their timing; without them those are left out.
+    region
+        The scenario's region on ``graph``, if the caller has it: ways found once are remembered.
+
+    Returns
+    -------
+    Problems in the order of the document, map and region first, errors and warnings mixed.
+    """
+    found = list(map_problems(scenario, graph))
+    if found:
+        return (*found, *_document_problems(scenario))
+    region = Region.of(graph, scenario.roi) if region is None else region
+    found += roi_problems(scenario, graph)
+    found += _document_problems(scenario)
+    found += _environment_problems(scenario, assets)
+    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
+    for index in range(len(scenario.actors)):
+        found += actor_problems(scenario, region, index, assets)
+    for index in range(len(scenario.flows)):
+        found += flow_problems(scenario, region, index)
+    found += demand_problems(scenario, region)
+    if lights is not None:
+        found += signal_problems(scenario.signals, lights)
+    found += shared_nodes(scenario)
+    found += _overlaps(scenario, region, assets)
+    return tuple(found)
+
+
+def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
+    """Yield what is wrong with the region of interest (R29)."""
+    if not scenario.roi:
+        yield error("roi_empty", "roi", "the region of interest is empty; pick a segment")
+        return
+    known = set(graph.segments.ids)
+    for index, name in enumerate(scenario.roi):
+        if name not in known:
+            message = f"the map has no segment {name!r}; remove it"
+            yield error("unknown_segment", f"roi[{index}]", message, segments=[name])
+    for name, count in Counter(scenario.roi).items():
+        if count > 1:
+            message = f"segment {name!r} is listed {count} times; once is enough"
+            yield warning("segment_twice", "roi", message, segments=[name])
+    inside = Region.of(graph, scenario.roi).segments
+    if len(inside) > 1 and not is_connected(graph.segments, inside):
+        yield error(
+            "roi_not_connected",
+            "roi",
+            "the region of interest is in several pieces; add the segments between them or remove "
+            "some",
+            segments=inside,
+        )
+
+
+def shared_nodes(scenario: Scenario) -> Iterator[Problem]:
+    """Yield nodes that more than one actor or flow starts on (R37, R44)."""
+    users: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    for kind in ("actors", "flows"):
+        for index, one in enumerate(getattr(scenario, kind)):
+            users[one.spawn].append((f"{kind}[{index}].spawn", one.id))
+    for node, sharing in users.items():
+        if len(sharing) > 1:
+            names = " and ".join(repr(name) for _, name in sharing)
+            message = f"{names} start on the same node {node!r}; move all but one"
+            yield error("node_taken", sharing[-1][0], message, nodes=[node])
+
+
+def duplicate_ids(scenario: Scenario) -> Iterator[Problem]:
+    """Yield ids that more than one actor, flow or part of the demand has."""
+    seen: dict[str, str] = {}
+    placed = [
+        (f"{kind}[{index}]", one)
+        for kind in ("actors", "flows")
+        for index, one in enumerate(getattr(scenario, kind))
+    ]
+    for place, one in (*placed, *scenario.demand.parts):
+        where = f"{place}.id"
+        if one.id in seen:
+            message = f"id {one.id!r} is taken by {seen[one.id]}; give one of them another"
+            yield error("duplicate_id", where, message)
+        else:
+            seen[one.id] = where
+
+
+def _document_problems(scenario: Scenario) -> Iterator[Problem]:
+    yield from duplicate_ids(scenario)
+    egos = [actor.id for actor in scenario.actors if actor.ego]
+    if len(egos) > 1:
+        message = f"{', '.join(map(repr, egos))} are all the ego; keep one"
+        yield error("several_egos", "actors", message)
+    if not scenario.actors and not scenario.flows and not scenario.demand.parts:
+        yield warning(
+            "no_actors", "actors", "there are neither actors nor flows; nothing will move"
+        )
+
+
+def _environment_problems(scenario: Scenario, assets: AssetLookup | None) -> Iterator[Problem]:
+    if assets is None:
+        return
+    environment = scenario.environment
+    parameters = assets.weather(environment.preset)
+    if parameters is None:
+        message = f"there is no weather preset {environment.preset!r}; pick one of the catalogue"
+        yield error("unknown_preset", "environment.preset", message)
+        return
+    for name in environment.parameters:
+        if name not in parameters:
+            message = f"weather has no parameter {name!r}; there are {', '.join(parameters)}"
+            yield error("unknown_parameter", f"environment.parameters.{name}", message)
+
+
+def map_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
+    """Yield why a scenario was not made on this graph, if it was not."""
+    made_on = scenario.map
+    if made_on.sha256 != graph.map_sha256:
+        yield error(
+            "map_mismatch",
+            "map.sha256",
+            f"the scenario was made on map {made_on.name!r} with sha256 {made_on.sha256[:12]}..., "
+            f"but this is {graph.map_name!r} with {graph.map_sha256[:12]}...; add that .xodr file",
+        )
+    elif made_on.spacing != graph.lanes.spacing:
+        yield error(
+            "spacing_mismatch",
+            "map.spacing",
+            f"the scenario's nodes are {made_on.spacing:g} m apart, those of this map "
+            f"{graph.lanes.spacing:g} m; add the map with --spacing {made_on.spacing:g}",
+        )
+
+
+def _overlaps(scenario: Scenario, region: Region, assets: AssetLookup | None) -> Iterator[Problem]:
+    """Bodies that share ground while both have just departed (R37); oriented boxes in plan view."""
+    bodies = [body_of(actor, assets) for actor in scenario.actors]
+    if not bodies:
+        return
+    crowd = Crowd(2 * max(body.length + body.width for body in bodies))
+    for index, (actor, body) in enumerate(zip(scenario.actors, bodies, strict=True)):
+        place = region.place(actor.spawn)
+        if place is None:
+            continue
+        graph = region.nodes_of(place)
+        box = box_at(graph, place.node, body, lateral_offset=actor.lateral_offset)
+        for other_index in sorted(crowd.touching(box)):
+            other = scenario.actors[other_index]
+            together = abs(actor.depart - other.depart) < SAME_TIME
+            if other.spawn != actor.spawn and together:
+                yield error(
+                    "bodies_overlap",
+                    f"actors[{index}].spawn",
+                    f"{actor.id!r} and {other.id!r} overlap where they start; move one of them or "
+                    "let it depart later",
+                    nodes=[actor.spawn, other.spawn],
+                )
+        crowd.add(index, box)

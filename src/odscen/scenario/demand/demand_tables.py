@@ -1,0 +1,205 @@
+"""Demand from CSV files: zones, matrices, counts and day profiles, read once, at import.
+
+The first line names the columns; further columns are an error, so that a misspelt one does not pass
+unnoticed. Times are seconds after the start of the run, or times of day such as ``7:15``.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+
+from odscen.base.errors import InputError
+from odscen.scenario.demand.day_profiles import DAY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+"""As identifiers of the document."""
+_TIME_OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
+
+MatrixTrip = tuple[str, str, float]
+"""Origin, destination, number."""
+TimeSlice = tuple[float, float]
+"""Begin and end, seconds."""
+CountRow = tuple[str, float, float, float]
+"""Place, begin, end, number."""
+
+COLUMNS = {
+    "od": ("from", "to", "trips"),
+    "counts": ("place", "begin", "end", "count"),
+    "profile": ("share",),
+    "zones": ("segment",),
+}
+"""Columns that the values of a row come from, by the kind of table."""
+
+_Row = TypeVar("_Row")
+
+
+class Rows(NamedTuple, Generic[_Row]):
+    """Rows of a table, and the line of the file that each stands in, so that errors can tell it."""
+
+    values: tuple[_Row, ...]
+    lines: tuple[int, ...]
+
+
+def read_matrix(text: str, *, clock: float = 0.0) -> dict[TimeSlice | None, Rows[MatrixTrip]]:
+    """Read an origin-destination matrix: columns ``from``, ``to``, ``trips``.
+
+    Columns ``begin`` and ``end`` may say when; the trips are then those of each slice.
+
+    Returns
+    -------
+    Rows by their slice; ``None`` where the table has no times.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    found: dict[TimeSlice | None, list[tuple[MatrixTrip, int]]] = {}
+    for line in _lines(text, COLUMNS["od"], ("begin", "end")):
+        slice_ = line.slice(clock) if line.has("begin") else None
+        trip = line["from"], line["to"], line.number("trips")
+        found.setdefault(slice_, []).append((trip, line.line))
+    return {slice_: _rows(pairs) for slice_, pairs in found.items()}
+
+
+def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
+    """Read counts: columns ``place``, ``begin``, ``end``, ``count``.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    return _rows(
+        ((line["place"].replace(" ", ""), *line.slice(clock), line.number("count")), line.line)
+        for line in _lines(text, COLUMNS["counts"])
+    )
+
+
+def read_profile(text: str) -> tuple[float, ...]:
+    """Read a day profile: column ``share``, one line for each of equal slices of the day.
+
+    A column ``time`` may name the slices; it must then begin at midnight and be evenly spaced.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    lines = list(_lines(text, COLUMNS["profile"], ("time",)))
+    for index, line in enumerate(lines):
+        due = index * DAY / len(lines)
+        if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
+            msg = (
+                f"time {line['time']!r} is not that of slice {index + 1} of {len(lines)} equal "
+                "slices of a day"
+            )
+            raise InputError(msg, element=line.where)
+    return tuple(line.number("share") for line in lines)
+
+
+def read_zones(text: str) -> dict[str, Rows[str]]:
+    """Read zones: columns ``zone`` and ``segment``, one line for each segment of a zone.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    found: dict[str, list[tuple[str, int]]] = {}
+    for line in _lines(text, ("zone", *COLUMNS["zones"])):
+        found.setdefault(line.name("zone"), []).append((line["segment"], line.line))
+    return {zone: _rows(pairs) for zone, pairs in found.items()}
+
+
+def _rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
+    values, lines = zip(*pairs, strict=True)
+    return Rows(values, lines)
+
+
+class _TableLine:
+    def __init__(self, number: int, cells: dict[str, str]) -> None:
+        self.line = number
+        self.where = f"line {number}"
+        self._cells = cells
+
+    def has(self, column: str) -> bool:
+        return column in self._cells
+
+    def __getitem__(self, column: str) -> str:
+        value = self._cells[column]
+        if not value:
+            msg = f"column {column!r} is empty"
+            raise InputError(msg, element=self.where)
+        return value
+
+    def name(self, column: str) -> str:
+        if not _NAME.fullmatch(self[column]):
+            msg = (
+                f"{column} must be at most 64 letters from a to z, digits, '-', '_' and '.', not "
+                f"{self[column]!r}"
+            )
+            raise InputError(msg, element=self.where)
+        return self[column]
+
+    def number(self, column: str) -> float:
+        try:
+            value = float(self[column])
+        except ValueError:
+            value = -1.0
+        if not 0.0 <= value <= 1e7:
+            msg = f"{column} must be a number from 0 on, not {self[column]!r}"
+            raise InputError(msg, element=self.where)
+        return value
+
+    def time(self, column: str, clock: float) -> float:
+        match = _TIME_OF_DAY.fullmatch(self[column])
+        if not match:
+            return self.number(column)
+        hours, minutes, seconds = (int(part or 0) for part in match.groups())
+        return hours * 3600.0 + minutes * 60.0 + seconds - clock
+
+    def slice(self, clock: float) -> TimeSlice:
+        begin, end = self.time("begin", clock), self.time("end", clock)
+        if begin < 0 or end <= begin:
+            msg = (
+                f"the slice from {self['begin']} to {self['end']} is not after the start of the "
+                "run, or ends before it begins"
+            )
+            raise InputError(msg, element=self.where)
+        return begin, end
+
+
+def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
+    """Yield the lines of a CSV file; comma, semicolon or tab, which its first line tells."""
+    text = text.removeprefix("\ufeff")
+    head = text.split("\n", 1)[0]
+    delimiter = max(",;\t", key=head.count)
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    columns = [name.strip().lower() for name in next(reader, [])]
+    missing = [name for name in needed if name not in columns]
+    unknown = [name for name in columns if name not in (*needed, *optional)]
+    given = [name for name in optional if name in columns]
+    if missing or unknown or (given and len(given) != len(optional)):
+        listed = ", ".join(needed) + "".join(f" [, {name}]" for name in optional)
+        msg = f"the columns are {', '.join(columns) or 'missing'}; needed are {listed}"
+        raise InputError(msg, element="line 1")
+    found = False
+    for cells in reader:
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(columns):
+            msg = f"{len(cells)} values for {len(columns)} columns"
+            raise InputError(msg, element=f"line {reader.line_num}")
+        found = True
+        values = (cell.strip() for cell in cells)
+        yield _TableLine(reader.line_num, dict(zip(columns, values, strict=True)))
+    if not found:
+        msg = "there are no lines below the first"
+        raise InputError(msg)

@@ -1,0 +1,1 @@
+"""What people write: the scenario document, the sampling configuration, and problems with them."""

@@ -1,0 +1,131 @@
+"""Distributions that a sampling configuration is written in.
+
+Each draws one number from a numpy generator passed in; a table ``{kind = "normal", ...}`` or a bare
+number stands for one. ``weights`` and ``shares`` are relative everywhere: they need not sum to one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from odscen.scenario.document.scenario_document import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_Key = TypeVar("_Key")
+
+_RETRIES = 64
+"""Draws outside ``low``..``high`` before a normal distribution is clipped instead."""
+
+
+class Constant(Part):
+    """Always ``value``."""
+
+    kind: Literal["constant"] = "constant"
+    value: float
+
+    def draw(self, rng: np.random.Generator) -> float:  # noqa: ARG002 - same call as the others
+        """Return the value."""
+        return self.value
+
+
+class Uniform(Part):
+    """Any number from ``low`` to ``high``."""
+
+    kind: Literal["uniform"] = "uniform"
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Uniform:
+        _check_order(self.low, self.high)
+        return self
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Draw a number."""
+        return float(rng.uniform(self.low, self.high))
+
+
+class Normal(Part):
+    """Normal distribution, drawn again while outside ``low`` to ``high``."""
+
+    kind: Literal["normal"] = "normal"
+    mean: float
+    std: Annotated[float, Field(ge=0)]
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Normal:
+        _check_order(self.low, self.high)
+        return self
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Draw a number."""
+        for _ in range(_RETRIES):
+            value = float(rng.normal(self.mean, self.std))
+            if self.low <= value <= self.high:
+                return value
+        return min(max(self.mean, self.low), self.high)
+
+
+class Choice(Part):
+    """One of ``values``, each with its weight (equal if there are none)."""
+
+    kind: Literal["choice"] = "choice"
+    values: Annotated[tuple[float, ...], Field(min_length=1)]
+    weights: tuple[Annotated[float, Field(ge=0)], ...] | None = None
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Choice:
+        if self.weights is not None:
+            if len(self.weights) != len(self.values):
+                msg = f"{len(self.values)} values but {len(self.weights)} weights"
+                raise ValueError(msg)
+            _check_total(self.weights)
+        return self
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Draw a number."""
+        weights = self.weights or (1.0,) * len(self.values)
+        return self.values[draw_place(weights, rng)]
+
+
+def _from_number(value: Any) -> Any:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return {"kind": "constant", "value": value}
+    return value
+
+
+Distribution = Annotated[
+    Annotated[Constant | Uniform | Normal | Choice, Field(discriminator="kind")],
+    BeforeValidator(_from_number),
+]
+"""A number, or a table with ``kind`` constant, uniform, normal or choice."""
+
+
+def draw_place(weights: Sequence[float], rng: np.random.Generator) -> int:
+    """Draw an index by weight; at least one weight must be above 0."""
+    total = np.cumsum(weights)
+    return int(np.searchsorted(total, rng.uniform(0.0, total[-1]), side="right"))
+
+
+def draw_key(shares: Mapping[_Key, float], rng: np.random.Generator) -> _Key:
+    """Draw a key by its share; keys count in the mapping's order."""
+    return tuple(shares)[draw_place(tuple(shares.values()), rng)]
+
+
+def _check_order(low: float, high: float) -> None:
+    if low > high:
+        msg = f"low {low:g} is above high {high:g}"
+        raise ValueError(msg)
+
+
+def _check_total(weights: tuple[float, ...]) -> None:
+    if sum(weights) <= 0:
+        msg = "at least one weight must be above 0"
+        raise ValueError(msg)

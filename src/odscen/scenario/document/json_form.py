@@ -1,0 +1,178 @@
+"""Scenario documents as text: JSON in and out, its schema, and telling JSON from GraphML."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails, from_json
+
+from odscen.base.errors import ScenarioError
+from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+OPTIONAL = ("demand", "signals")
+"""Fields of a scenario that are left out where they have their default value."""
+
+_SHOWN = 60
+"""Longest piece of a wrong value that is quoted in a message."""
+
+
+def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
+    """Read a scenario document from JSON.
+
+    Parameters
+    ----------
+    text
+        The JSON; bytes are UTF-8.
+    file
+        Name of the file, for messages.
+
+    Raises
+    ------
+    ScenarioError
+        With one line per problem, each with its place, for example ``actors[3].speed: ...``.
+    """
+    try:
+        return Scenario.model_validate_json(text, strict=True)
+    except ValidationError as error:
+        if foreign := _foreign(text):
+            raise ScenarioError(foreign, file=file) from error
+        problems = validation_problems(error)
+        count = "a problem" if len(problems) == 1 else f"{len(problems)} problems"
+        msg = f"the scenario document has {count}"
+        raise ScenarioError(msg, problems=problems, file=file) from error
+
+
+def dumps(scenario: Scenario) -> str:
+    """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
+
+    Fields of actors, flows and demand that have their default value are left out, and so are
+    signals that are all the map's. The same scenario gives the same text, and :func:`loads` gives
+    the same scenario back.
+    """
+    data = scenario.model_dump(mode="json", exclude={"actors", "flows", "demand"})
+    for key in type(scenario).model_fields:
+        if key in ("actors", "flows"):
+            parts = getattr(scenario, key)
+            data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
+        elif key in OPTIONAL:
+            data[key] = getattr(scenario, key).model_dump(mode="json", exclude_defaults=True)
+    fields = [
+        f"  {json.dumps(key)}: {_layout(key, data[key])}"
+        for key in type(scenario).model_fields
+        if key not in OPTIONAL or data[key]
+    ]
+    return "{\n" + ",\n".join(fields) + "\n}\n"
+
+
+def read_any(text: str | bytes, *, file: str | None = None) -> Scenario:
+    """Read a scenario from its JSON document or from its GraphML graph form, whichever it is.
+
+    Raises
+    ------
+    ScenarioError
+        If it is neither, or has problems.
+    """
+    try:
+        decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        msg = f"not a scenario: byte {error.start} is not UTF-8"
+        raise ScenarioError(msg, file=file) from error
+    start = decoded.removeprefix("\ufeff").lstrip()
+    if start.startswith("<"):
+        from odscen.scenario.forms.graph_form import from_graphml
+
+        return from_graphml(start, file=file)
+    return loads(start, file=file)
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of the document, as published in docs/scenario.schema.json."""
+    described = Scenario.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+
+
+def validation_problems(error: ValidationError) -> tuple[str, ...]:
+    """One line per problem of a pydantic error: the place, what is wrong, and the value."""
+    return tuple(_problem(details) for details in error.errors(include_url=False))
+
+
+def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
+    """Make a pydantic model, with :class:`ScenarioError` for pydantic's own error."""
+    try:
+        return model.model_validate(fields)
+    except ValidationError as error:
+        problems = validation_problems(error)
+        msg = f"{model.__name__.lower()}: {problems[0]}"
+        raise ScenarioError(msg, problems=problems[1:]) from error
+
+
+def _layout(key: str, value: object) -> str:
+    if key == "demand" and isinstance(value, dict):
+        fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
+        return "{\n" + ",\n".join(fields) + "\n  }"
+    if isinstance(value, list) and value:
+        lines = [json.dumps(part, ensure_ascii=False) for part in value]
+        if key == "roi":
+            return "[" + ", ".join(lines) + "]"
+        return "[\n    " + ",\n    ".join(lines) + "\n  ]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _parts(value: object) -> str:
+    """Lay out parts of the demand: each on a line, and each row of a table on one of its own."""
+    if not isinstance(value, list) or not value:
+        return json.dumps(value, ensure_ascii=False)
+    lines = []
+    for part in value:
+        line = json.dumps(part, ensure_ascii=False)
+        rows = part.get("rows") or part.get("trips")
+        if isinstance(rows, list):
+            whole = json.dumps(rows, ensure_ascii=False)
+            split = ",\n        ".join(json.dumps(row, ensure_ascii=False) for row in rows)
+            line = line.replace(whole, f"[\n        {split}\n      ]")
+        lines.append(line)
+    return "[\n      " + ",\n      ".join(lines) + "\n    ]"
+
+
+def _problem(details: ErrorDetails) -> str:
+    place = _place(details["loc"])
+    message = details["msg"]
+    value = details["input"]
+    if details["type"] == "missing" or isinstance(value, (dict, list, bytes)):
+        shown = ""
+    else:
+        quoted = repr(value)
+        shown = f", not {quoted[:_SHOWN]}{'...' if len(quoted) > _SHOWN else ''}"
+    if details["type"] == "json_invalid":
+        return message
+    return f"{place}: {message}{shown}" if place else f"{message}{shown}"
+
+
+def _place(location: Iterable[str | int]) -> str:
+    place = ""
+    for step in location:
+        place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step
+    return place
+
+
+def _foreign(text: str | bytes) -> str | None:
+    """Say why JSON is not a scenario of this version at all, or ``None``."""
+    try:
+        data = from_json(text)
+    except ValueError:
+        return None
+    if not isinstance(data, dict):
+        return "not a scenario: the document must be a JSON object"
+    if data.get("format", FORMAT) != FORMAT:
+        return f"not a scenario: format is {data['format']!r}, expected {FORMAT!r}"
+    version = data.get("version", VERSION)
+    if isinstance(version, int) and version > VERSION:
+        return f"version {version} was written by a newer odscen; this one reads up to {VERSION}"
+    return None

@@ -1,0 +1,244 @@
+"""The scenario document: one small JSON file, versioned, with a published schema.
+
+Units are SI: metres, seconds, m/s; flows count per hour, as traffic engineers do, and say so in the
+name. Times are seconds after the start of the run. Node, segment and map names refer to the lane
+graph of one map, named with its content hash.
+Rules that need the graph live in :mod:`odscen.scenario.checks.scenario_checks`, not here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from odscen.base.categories import Category
+
+FORMAT: Final = "odscen-scenario"
+VERSION: Final = 1
+
+_PRINTABLE = r"^[^\x00-\x1f\x7f\u0085\u2028\u2029\ufffe\uffff]*$"
+_PROSE = r"^[^\x00-\x08\x0b-\x1f\x7f\ufffe\uffff]*$"
+_IDENTIFIER = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+
+DrivingStyle = Literal["cautious", "normal", "sporty"]
+Label = Annotated[str, Field(min_length=1, max_length=200, pattern=_PRINTABLE)]
+"""One line of text that JSON and XML can both carry."""
+Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
+Identifier = Annotated[str, Field(pattern=_IDENTIFIER, max_length=64)]
+Seconds = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
+Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+Control = Literal["fixed", "actuated"]
+Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
+"""How many road users; a part of one is a chance."""
+Mix = dict[Category, Annotated[float, Field(gt=0)]]
+"""Share of each category; shares are relative, they need not sum to one."""
+
+
+class Part(BaseModel):
+    """Base of all parts of the document: frozen, unknown fields refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class MapReference(Part):
+    """The map, by name *and* content, and the spacing of the graph that node names refer to."""
+
+    name: Label
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    spacing: Annotated[float, Field(gt=0, le=100)] = 2.0
+
+
+class Environment(Part):
+    """Weather and time of day: a preset of the asset catalogue and single values that differ."""
+
+    preset: Label = "ClearNoon"
+    parameters: dict[Label, float] = Field(default_factory=dict)
+    affects_driving: bool = True
+
+
+class Actor(Part):
+    """One road user, placed by hand or sampled.
+
+    ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
+    draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
+    the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
+    positive to the left of the driving direction.
+    """
+
+    id: Identifier
+    category: Category
+    model: Label | None = None
+    spawn: Label
+    goal: Label | None = None
+    speed: Speed | None = None
+    lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    depart: Seconds = 0.0
+    style: DrivingStyle = "normal"
+    ego: bool = False
+    crosses_anywhere: bool = False
+    ignores_red: bool = False
+
+
+class Flow(Part):
+    """A stream of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
+
+    Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
+    actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
+    the mean of a day, and the profile says when there are more and when fewer.
+    """
+
+    id: Identifier
+    spawn: Label
+    goal: Label | None = None
+    per_hour: Annotated[float, Field(gt=0, le=20_000)]
+    begin: Seconds = 0.0
+    end: Seconds = 3600.0
+    mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
+    speed: Speed | None = None
+    profile: Identifier | None = None
+
+
+class Zone(Part):
+    """Segments that demand calls by one name."""
+
+    id: Identifier
+    segments: Annotated[tuple[Label, ...], Field(min_length=1)]
+
+
+class Profile(Part):
+    """How demand is spread over a day: relative shares of equal slices, from midnight on."""
+
+    id: Identifier
+    shares: Annotated[tuple[Number, ...], Field(min_length=1, max_length=1440)]
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Self:
+        if sum(self.shares) <= 0:
+            msg = "at least one share must be above 0"
+            raise ValueError(msg)
+        return self
+
+
+class Window(Part):
+    """Demand between two times; ``end`` ``None`` is the end of the run.
+
+    ``profile`` says when of that time it comes; without one it comes evenly.
+    """
+
+    id: Identifier
+    begin: Seconds = 0.0
+    end: Seconds | None = None
+    profile: Identifier | None = None
+    mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
+
+
+class Matrix(Window):
+    """Trips from where to where: rows of origin, destination and number.
+
+    Origins and destinations are zones or segments. The numbers are those of the whole window.
+    """
+
+    trips: Annotated[tuple[tuple[Label, Label, Number], ...], Field(min_length=1)]
+
+
+class Counts(Part):
+    """Vehicles that were counted: rows of place, begin and end of the slice, and number.
+
+    A place is one segment, or segments that are passed one after another, written
+    ``r12>j54>r8``: two count those who go from one into the next, three or more a turn. Traffic is
+    made that reproduces the counts, of vehicles in the shares of ``mix``.
+    """
+
+    id: Identifier
+    mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
+    rows: Annotated[tuple[tuple[Label, Seconds, Seconds, Number], ...], Field(min_length=1)]
+
+
+class Background(Window):
+    """Vehicles that come and go anywhere in the region; one of the three says how many.
+
+    ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
+    many are to be on the road at a time; with a profile, on average over a day. ``trips`` is how
+    many set out in the window.
+    """
+
+    fill: Annotated[float, Field(gt=0, le=1)] | None = None
+    per_km: Annotated[float, Field(gt=0, le=200)] | None = None
+    trips: Annotated[float, Field(gt=0, le=1e7)] | None = None
+
+    @model_validator(mode="after")
+    def _one_amount(self) -> Self:
+        given = [name for name in ("fill", "per_km", "trips") if getattr(self, name) is not None]
+        if len(given) != 1:
+            msg = f"give one of fill, per_km and trips, not {' and '.join(given) or 'none'}"
+            raise ValueError(msg)
+        return self
+
+
+class Demand(Part):
+    """Traffic around the placed actors; ``clock`` is the time of day at the start, seconds."""
+
+    clock: Annotated[float, Field(ge=0, lt=86_400)] = 0.0
+    zones: tuple[Zone, ...] = ()
+    profiles: tuple[Profile, ...] = ()
+    matrices: tuple[Matrix, ...] = ()
+    counts: tuple[Counts, ...] = ()
+    background: tuple[Background, ...] = ()
+
+    @property
+    def parts(self) -> tuple[tuple[str, Matrix | Counts | Background], ...]:
+        """All that puts somebody on the road, with its place in the document."""
+        return tuple(
+            (f"demand.{kind}[{index}]", part)
+            for kind in ("matrices", "counts", "background")
+            for index, part in enumerate(getattr(self, kind))
+        )
+
+
+class JunctionTiming(Part):
+    """Timing of the traffic light of one junction, where it differs from the map's program.
+
+    ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that stands in none.
+    ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
+    order; empty keeps the program's. Yellow and clearing times cannot be changed. The program
+    begins ``offset`` seconds into the scenario, as if it had run before.
+    """
+
+    junction: Label
+    control: Control | None = None
+    offset: SignalSeconds = 0.0
+    green: tuple[SignalSeconds, ...] = ()
+
+
+class Signals(Part):
+    """How traffic lights are run: by the clock, or with greens that waiting vehicles prolong."""
+
+    control: Control = "fixed"
+    junctions: tuple[JunctionTiming, ...] = ()
+
+
+class Simulation(Part):
+    """How the scenario is run unless the command says otherwise; seconds."""
+
+    duration: Annotated[float, Field(gt=0, le=1e9)] = 600.0
+    step_length: Annotated[float, Field(gt=0, le=1)] = 0.5
+
+
+class Scenario(Part):
+    """The whole document."""
+
+    format: Literal["odscen-scenario"] = FORMAT
+    version: Literal[1] = VERSION
+    name: Annotated[str, Field(min_length=1, max_length=120, pattern=_PRINTABLE)]
+    description: Prose = ""
+    map: MapReference
+    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
+    roi: tuple[Label, ...]
+    environment: Environment = Environment()
+    actors: tuple[Actor, ...] = ()
+    flows: tuple[Flow, ...] = ()
+    demand: Demand = Demand()
+    signals: Signals = Signals()
+    simulation: Simulation = Simulation()

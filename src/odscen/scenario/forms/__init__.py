@@ -1,0 +1,1 @@
+"""The forms of a scenario: graph form, and telling it from the document."""

@@ -1,0 +1,223 @@
+"""The graph form of a scenario: the induced subgraph with the actors written on it (R31, R43).
+
+A directed multigraph of networkx whose nodes are those of the region of interest, on lanes and on
+walks (``kind`` vehicle or pedestrian). A spawn node carries its actor or flow: fields of the
+document with the prefix ``actor_`` or ``flow_``, and with ``order`` their place in the document. An
+edge with ``relation`` ``goal`` leads from the spawn to the goal. What remains of the document is in
+the attributes of the graph. Ways on foot are undirected in the map and stored as two edges.
+
+Graph form and document convert into each other without loss. A graph that a program has filled in
+may leave out ids and orders: they are then given in the order of the nodes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import count
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from odscen.base.errors import ScenarioError
+from odscen.lanegraph.graph_files import to_networkx
+from odscen.scenario.checks.scenario_checks import (
+    duplicate_ids,
+    map_problems,
+    roi_problems,
+    shared_nodes,
+)
+from odscen.scenario.document.json_form import OPTIONAL, validated
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.scenario_document import (
+    FORMAT,
+    VERSION,
+    Actor,
+    Flow,
+    MapReference,
+    Scenario,
+)
+from odscen.scenario.forms.graphml_text import read_graphml, write_graphml
+from odscen.scenario.placing.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import networkx as nx
+
+    from odscen.lanegraph.graphs import MapGraph
+
+_One = TypeVar("_One", bound=Actor | Flow)
+
+GOAL = "goal"
+"""Relation, and key, of the edge from a spawn to its goal."""
+
+_JSON = ("roi", "environment", "demand", "signals", "simulation")
+"""Graph attributes that hold JSON."""
+
+
+def to_graph(scenario: Scenario, graph: MapGraph) -> nx.MultiDiGraph:
+    """Write a scenario on the induced subgraph of its region.
+
+    Raises
+    ------
+    ScenarioError
+        If the graph cannot carry it: two actors on a node, an actor or goal outside the region, an
+        id used twice, or another map.
+    """
+    problems = [*map_problems(scenario, graph), *shared_nodes(scenario), *duplicate_ids(scenario)]
+    refuse_errors([*problems, *(roi_problems(scenario, graph) if scenario.roi else ())])
+    region = Region.of(graph, scenario.roi)
+    result = _induced(graph, region)
+    result.graph.update(_about(scenario))
+    for order, actor in enumerate(scenario.actors):
+        _write(result, "actor", order, actor)
+    for order, flow in enumerate(scenario.flows):
+        _write(result, "flow", order, flow)
+    return result
+
+
+def from_graph(graph: nx.MultiDiGraph) -> Scenario:
+    """Read a scenario from its graph form.
+
+    Raises
+    ------
+    ScenarioError
+        If attributes are missing or their values not possible; names the node.
+    """
+    about = dict(graph.graph)
+    if about.get("format") != FORMAT:
+        msg = f"not a scenario graph: format is {about.get('format')!r}, expected {FORMAT!r}"
+        raise ScenarioError(msg)
+    fields: dict[str, Any] = {
+        name: about[name] for name in ("version", "name", "description", "seed") if name in about
+    }
+    fields["map"] = {
+        name: about[f"map_{name}"] for name in MapReference.model_fields if f"map_{name}" in about
+    }
+    for name in _JSON:
+        if name in about:
+            fields[name] = _from_json(name, about[name])
+    fields["actors"] = tuple(_read(graph, "actor", Actor))
+    fields["flows"] = tuple(_read(graph, "flow", Flow))
+    return validated(Scenario, fields)
+
+
+def to_graphml(scenario: Scenario, graph: MapGraph) -> str:
+    """Write the graph form as GraphML; the same scenario gives the same text."""
+    return write_graphml(to_graph(scenario, graph))
+
+
+def from_graphml(text: str, *, file: str | None = None) -> Scenario:
+    """Read a scenario from the GraphML of its graph form.
+
+    Raises
+    ------
+    ScenarioError
+        If the text is not GraphML, not of a scenario, or has values that are not possible.
+    """
+    try:
+        return from_graph(read_graphml(text))
+    except ScenarioError as error:
+        error.file = error.file or file
+        raise
+
+
+def _about(scenario: Scenario) -> dict[str, Any]:
+    data = scenario.model_dump(mode="json")
+    for name in OPTIONAL:
+        data[name] = getattr(scenario, name).model_dump(mode="json", exclude_defaults=True)
+    held = [name for name in _JSON if name not in OPTIONAL or data[name]]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": scenario.name,
+        "description": scenario.description,
+        "seed": scenario.seed,
+        "map_name": scenario.map.name,
+        "map_sha256": scenario.map.sha256,
+        "map_spacing": scenario.map.spacing,
+        **{name: json.dumps(data[name], ensure_ascii=False) for name in held},
+    }
+
+
+def _induced(graph: MapGraph, region: Region) -> nx.MultiDiGraph:
+    """Lane nodes and walk nodes of the region in one directed graph, walks in both directions."""
+    import networkx as nx
+
+    lanes, walks = to_networkx(graph)
+    inside = set(region.segments)
+    result = nx.MultiDiGraph()
+    for part in (lanes, walks):
+        result.add_nodes_from(
+            (node, data) for node, data in part.nodes(data=True) if data["segment"] in inside
+        )
+    for source, target, relation, data in lanes.edges(keys=True, data=True):
+        if source in result and target in result:
+            result.add_edge(source, target, key=relation, **data)
+    for source, target, data in walks.edges(data=True):
+        if source in result and target in result:
+            about = {"relation": data["kind"], "length": data["length"]}
+            about["crosswalk"] = data["crosswalk"]
+            result.add_edge(source, target, key="walk", **about)
+            result.add_edge(target, source, key="walk", **about)
+    return result
+
+
+def _write(graph: nx.MultiDiGraph, prefix: str, order: int, one: Actor | Flow) -> None:
+    for what, node in (("spawn", one.spawn), ("goal", one.goal)):
+        if node is not None and node not in graph:
+            msg = f"{one.id!r} has its {what} on {node!r}, which is not inside the region"
+            raise ScenarioError(msg, element=f"{prefix}s[{order}].{what}")
+    data = one.model_dump(mode="json", exclude={"spawn", "goal"}, exclude_none=True)
+    attributes = {
+        f"{prefix}_{name}": json.dumps(value) if isinstance(value, dict) else value
+        for name, value in data.items()
+    }
+    graph.nodes[one.spawn].update({f"{prefix}_order": order, **attributes})
+    if one.goal is not None:
+        graph.add_edge(one.spawn, one.goal, key=GOAL, relation=GOAL)
+
+
+def _read(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> Iterator[_One]:
+    """Actors or flows in their order; those without one follow in the order of the nodes."""
+    found: list[tuple[float, str, dict[str, Any]]] = []
+    for node, data in graph.nodes(data=True):
+        names = [name for name in model.model_fields if data.get(f"{prefix}_{name}") is not None]
+        if names:
+            fields = {name: data[f"{prefix}_{name}"] for name in names}
+            order = data.get(f"{prefix}_order")
+            found.append((math.inf if order is None else float(order), node, fields))
+    found.sort(key=lambda entry: entry[0])
+    taken = {fields.get("id") for _, _, fields in found}
+    free = (name for k in count(1) if (name := f"{prefix}-{k}") not in taken)
+    for _, node, fields in found:
+        fields["spawn"], fields["goal"] = str(node), _goal(graph, node)
+        if "id" not in fields:
+            fields["id"] = next(free)
+        if "mix" in fields:
+            fields["mix"] = _from_json("mix", fields["mix"])
+        yield _checked(model, fields)
+
+
+def _goal(graph: nx.MultiDiGraph, node: str) -> str | None:
+    edges = graph.out_edges(node, data="relation")
+    goals = [str(target) for _, target, relation in edges if relation == GOAL]
+    if len(goals) > 1:
+        msg = f"edges lead to {len(goals)} goals; there can be one"
+        raise ScenarioError(msg, element=f"node {node}")
+    return goals[0] if goals else None
+
+
+def _checked(model: type[_One], fields: dict[str, Any]) -> _One:
+    try:
+        return validated(model, fields)
+    except ScenarioError as error:
+        error.element = f"node {fields['spawn']}"
+        raise
+
+
+def _from_json(name: str, text: object) -> Any:
+    try:
+        return json.loads(str(text))
+    except (ValueError, RecursionError) as error:
+        msg = f"attribute {name} is not JSON: {error}"
+        raise ScenarioError(msg) from error

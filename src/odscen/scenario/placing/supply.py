@@ -1,0 +1,135 @@
+"""Where sampled actors may stand in a region, category by category, and how many fit (R47)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.scenario.placing.spawn_room import MaximalCrowd, distance_to_end, max_fit, standing_room
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.base.categories import Body
+    from odscen.lanegraph.graphs import BoolArray, LaneGraph, PedestrianGraph
+    from odscen.scenario.document.sampling_config import PlacingRules
+    from odscen.scenario.placing.region import Region
+
+
+@dataclass(frozen=True, slots=True)
+class Usable:
+    """What a simulator can use of a map; ``None`` stands for everything.
+
+    Attributes
+    ----------
+    spawnable
+        Shape ``(N,)``: lane-graph nodes on which a vehicle can be placed exactly.
+    drivable
+        Shape ``(N,)``: lane-graph nodes that a way can lead over.
+    walkable
+        Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
+    bodies
+        Size of each category.
+    """
+
+    spawnable: BoolArray | None = None
+    drivable: BoolArray | None = None
+    walkable: BoolArray | None = None
+    bodies: Mapping[Category, Body] = field(default_factory=lambda: DEFAULT_BODY)
+
+
+@dataclass(frozen=True, slots=True)
+class Supply:
+    """Places for sampled actors on one of the two graphs of a region.
+
+    Attributes
+    ----------
+    allowed
+        For each category with a share, the nodes it may start on, shape ``(N,)`` or ``(P,)``.
+    shares
+        Relative share of each category.
+    fit
+        A maximal crowd, whose size is what a fill share counts by.
+    """
+
+    graph: LaneGraph | PedestrianGraph
+    bodies: Mapping[Category, Body]
+    allowed: Mapping[Category, BoolArray]
+    shares: Mapping[Category, float]
+    minimum_gap: float
+    fit: MaximalCrowd
+
+
+def vehicle_supply(
+    region: Region, places: PlacingRules, shares: Mapping[Category, float], usable: Usable
+) -> Supply:
+    """Places for vehicles: on road lanes with room for the body and with a goal to reach."""
+    lanes = region.graph.lanes
+    spawnable = _or_all(usable.spawnable, len(lanes.x))
+    centre = region.lanes & spawnable & _on_roads(lanes, places)
+    centre &= _with_goal(region, places, usable)
+    excluded = set(places.exclude_segments)
+    kept = np.array([name not in excluded for name in region.graph.segments.ids], dtype=np.bool_)
+    centre &= kept[lanes.segment]
+    allowed = {}
+    for category, share in shares.items():
+        if share > 0:
+            limit = places.speed_limit_max.get(category, np.inf)
+            body = usable.bodies[category]
+            room = standing_room(lanes, body, allowed=spawnable)
+            allowed[category] = centre & room & ~(lanes.speed_limit > limit)
+    wanted = {category: shares[category] for category in allowed}
+    gap = places.minimum_gap
+    fit = max_fit(lanes, usable.bodies, allowed, shares=wanted, minimum_gap=gap)
+    return Supply(lanes, usable.bodies, allowed, wanted, gap, fit)
+
+
+def walker_supply(region: Region, usable: Usable) -> Supply:
+    """Places for pedestrians: on walks from which another place can be reached."""
+    walks = region.graph.walks
+    allowed = region.walks & _or_all(usable.walkable, len(walks.x))
+    inside = region.walks[walks.source] & region.walks[walks.target]
+    connected = np.zeros(len(walks.x), dtype=np.bool_)
+    connected[walks.source[inside]] = True
+    connected[walks.target[inside]] = True
+    masks = {Category.PEDESTRIAN: allowed & connected}
+    shares = {Category.PEDESTRIAN: 1.0}
+    fit = max_fit(walks, usable.bodies, masks, shares=shares, minimum_gap=WALKER_GAP)
+    return Supply(walks, usable.bodies, masks, shares, WALKER_GAP, fit)
+
+
+WALKER_GAP = 0.5
+"""Free length between two sampled pedestrians, metres."""
+
+
+def _on_roads(lanes: LaneGraph, places: PlacingRules) -> BoolArray:
+    """Nodes of lanes outside junctions, of the types that are asked for."""
+    types = set(places.lane_types)
+    good = [
+        junction is None and (not types or type_ in types)
+        for junction, type_ in zip(lanes.lanes.junctions, lanes.lanes.types, strict=True)
+    ]
+    return np.array(good, dtype=np.bool_)[lanes.lane]
+
+
+def _with_goal(region: Region, places: PlacingRules, usable: Usable) -> BoolArray:
+    """Nodes with a goal candidate that can be driven to, none nearer than ``minimum_trip``."""
+    lanes = region.graph.lanes
+    inside = region.lanes
+    leaves = np.zeros(len(lanes.x), dtype=np.bool_)
+    leaves[lanes.source[inside[lanes.source] & inside[lanes.target]]] = True
+    ends = np.flatnonzero(inside & ~leaves)
+    way = distance_to_end(ends, lanes, inside)
+    if usable.drivable is None:
+        return inside & leaves & (way >= places.minimum_trip)
+    driven = distance_to_end(ends[usable.drivable[ends]], lanes, inside & usable.drivable)
+    # Where no end can be reached at all (a ring) the goals are the farthest nodes.
+    reached = np.isfinite(driven) | (np.isinf(way) & usable.drivable)
+    return inside & leaves & (way >= places.minimum_trip) & reached
+
+
+def _or_all(mask: BoolArray | None, count: int) -> BoolArray:
+    return np.ones(count, dtype=np.bool_) if mask is None else mask

@@ -1,0 +1,344 @@
+"""Automated generation: a scenario drawn from a configuration, with no user input (R46 to R48).
+
+The same map graph, configuration and seed give the same document, byte for byte. Sampled vehicles
+start on road lanes, never on junction lanes, where the lane bends so little that a rigid body keeps
+to it, with a gap to every other body, and with a goal that can be reached.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import Category
+from odscen.base.errors import ScenarioError
+from odscen.scenario.checks.goals import stream
+from odscen.scenario.document.distributions import draw_key, draw_place
+from odscen.scenario.document.json_form import validated
+from odscen.scenario.document.scenario_document import (
+    Actor,
+    Environment,
+    MapReference,
+    Scenario,
+    Simulation,
+)
+from odscen.scenario.placing.bodies import Box, Crowd, box_at
+from odscen.scenario.placing.random_places import place_at_random
+from odscen.scenario.placing.region import NodePlace, Region, name_of
+from odscen.scenario.placing.spawn_room import Reach
+from odscen.scenario.placing.supply import Usable, vehicle_supply, walker_supply
+from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from odscen.base.ids import SegmentId
+    from odscen.lanegraph.graphs import IntArray, MapGraph
+    from odscen.scenario.document.sampling_config import (
+        EnvironmentShares,
+        MapFilter,
+        SamplingConfig,
+    )
+    from odscen.scenario.placing.random_places import Spot
+    from odscen.scenario.placing.supply import Supply
+
+ATTEMPTS = 20
+"""Regions that are tried before a map counts as having no place for an actor."""
+
+
+def choose_map(maps: MapFilter, statistics: Mapping[str, Mapping[str, Any]], *, seed: int) -> str:
+    """Draw a map by its statistics (R19).
+
+    Parameters
+    ----------
+    statistics
+        For each map of the catalogue, its statistics by name; those that are numbers count.
+
+    Raises
+    ------
+    ScenarioError
+        If a statistic is unknown or no map passes the filter.
+    """
+    used = {*maps.where, *([maps.weight_by] if maps.weight_by else [])}
+    numbers = {name: _numbers(of_map) for name, of_map in statistics.items()}
+    known = {name for of_map in numbers.values() for name in of_map}
+    if statistics and (unknown := sorted(used - known)):
+        msg = f"no statistic {unknown[0]!r}; there are {', '.join(sorted(known))}"
+        raise ScenarioError(msg, element="maps")
+    weights = {
+        name: weight
+        for name in sorted(numbers)
+        if (weight := _map_weight(maps, name, numbers[name])) > 0
+    }
+    if not weights:
+        msg = f"none of the {len(statistics)} maps passes the filter; widen it or add maps"
+        raise ScenarioError(msg, element="maps")
+    return draw_key(weights, stream(seed, "map"))
+
+
+def sample_roi(
+    graph: MapGraph,
+    size: int,
+    rng: np.random.Generator,
+    *,
+    exclude: Iterable[str] = (),
+) -> tuple[SegmentId, ...]:
+    """Grow a connected region from a random segment by random neighbours, up to ``size`` segments.
+
+    Fewer if the base segment is not connected to so many.
+
+    Raises
+    ------
+    ScenarioError
+        If no segment with lanes is left.
+    """
+    barred = set(exclude)
+    with_lanes = np.unique(graph.lanes.segment)
+    bases = [graph.segments.ids[row] for row in with_lanes if graph.segments.ids[row] not in barred]
+    if not bases:
+        msg = f"map {graph.map_name!r} has no segment to start from"
+        raise ScenarioError(msg)
+    region = [bases[int(rng.integers(len(bases)))]]
+    beside = _neighbour_table(graph)
+    eligible: dict[SegmentId, None] = {}
+    while len(region) < size:
+        eligible.update(dict.fromkeys(n for n in beside[region[-1]] if n not in barred))
+        choices = [name for name in eligible if name not in region]
+        if not choices:
+            break
+        region.append(choices[int(rng.integers(len(choices)))])
+    return tuple(region)
+
+
+def sample_scenario(
+    graph: MapGraph,
+    config: SamplingConfig,
+    *,
+    seed: int,
+    name: str,
+    usable: Usable | None = None,
+    roi: Iterable[str] | None = None,
+) -> Scenario:
+    """Sample a scenario.
+
+    Parameters
+    ----------
+    usable
+        What the simulator that will run it can use of the map; everything if not given.
+    roi
+        Segments of the region of interest; drawn by the configuration if not given.
+
+    Raises
+    ------
+    ScenarioError
+        If no actor fits anywhere: the region or the configuration leaves no place.
+    """
+    usable = Usable() if usable is None else usable
+    fill = config.fill.draw(stream(seed, "fill"))
+    attempts = ATTEMPTS if roi is None else 1
+    for attempt in range(attempts):
+        segments = tuple(roi) if roi is not None else _draw_roi(graph, config, seed, attempt)
+        region = Region.of(graph, segments)
+        actors = _sample_actors(region, config, usable, fill=fill, seed=seed)
+        if actors or fill == 0:
+            break
+    else:
+        msg = (
+            f"no actor fits on map {graph.map_name!r} in {attempts} regions; allow more segments, "
+            "other categories, a shorter minimum_trip or a smaller minimum_gap"
+        )
+        raise ScenarioError(msg)
+    fields = {
+        "name": name,
+        "map": MapReference(
+            name=graph.map_name, sha256=graph.map_sha256, spacing=graph.lanes.spacing
+        ),
+        "seed": seed,
+        "roi": segments,
+        "environment": _draw_environment(config.environment, stream(seed, "environment")),
+        "actors": actors,
+        "simulation": Simulation(duration=config.duration, step_length=config.step_length),
+    }
+    return validated(Scenario, fields)
+
+
+def numbers_to_place(
+    fill: float, vehicles: int, walkers: int, *, pedestrian_share: float, most: int | None = None
+) -> tuple[int, int]:
+    """Vehicles and pedestrians that a fill share stands for (R47).
+
+    The largest number of actors that fit is the ``vehicles`` that fit and as many of the
+    ``walkers`` that fit as their share allows; ``fill`` of each are placed, at least one vehicle if
+    any fits.
+    """
+    walkers = min(walkers, int(vehicles * pedestrian_share / (1 - pedestrian_share)))
+    cars, people = math.floor(fill * vehicles + 0.5), math.floor(fill * walkers + 0.5)
+    if most is not None and cars + people > most:
+        people = math.floor(people * most / (cars + people))
+        cars = most - people
+    if fill > 0 and vehicles > 0 and cars + people == 0 and most != 0:
+        cars = 1
+    return cars, people
+
+
+def _numbers(statistics: Mapping[str, Any]) -> dict[str, float]:
+    return {
+        name: float(value)
+        for name, value in statistics.items()
+        if isinstance(value, (int, float)) and not isinstance(value, bool)
+    }
+
+
+def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float]) -> float:
+    """Chance of a map, 0 if it does not pass the filter; a missing number passes no bounds."""
+    if not any(fnmatchcase(name, pattern) for pattern in maps.names):
+        return 0.0
+    if any(fnmatchcase(name, pattern) for pattern in maps.exclude):
+        return 0.0
+    for statistic, bounds in maps.where.items():
+        value = statistics.get(statistic)
+        if value is None or not bounds.holds(value):
+            return 0.0
+    return 1.0 if maps.weight_by is None else max(statistics.get(maps.weight_by, 0.0), 0.0)
+
+
+def _neighbour_table(graph: MapGraph) -> dict[SegmentId, tuple[SegmentId, ...]]:
+    ids = graph.segments.ids
+    table: dict[SegmentId, list[SegmentId]] = {name: [] for name in ids}
+    for one, other in graph.segments.adjacency.tolist():
+        table[ids[one]].append(ids[other])
+        table[ids[other]].append(ids[one])
+    return {name: tuple(beside) for name, beside in table.items()}
+
+
+def _draw_roi(
+    graph: MapGraph, config: SamplingConfig, seed: int, attempt: int
+) -> tuple[SegmentId, ...]:
+    rng = stream(seed, "roi", str(attempt))
+    size = max(1, round(config.roi.segments.draw(rng)))
+    return sample_roi(graph, size, rng, exclude=config.places.exclude_segments)
+
+
+def _draw_environment(shares: EnvironmentShares, rng: np.random.Generator) -> Environment:
+    preset = draw_key(shares.presets, rng)
+    parameters = {name: round(of.draw(rng), 4) for name, of in shares.parameters.items()}
+    return Environment(preset=preset, parameters=parameters)
+
+
+class _ScenarioDraft(NamedTuple):
+    """An actor to be: where it stands, what it is, where it goes, how it moves."""
+
+    spot: Spot
+    walk: bool
+    goal: int
+    fields: dict[str, object]
+
+
+def _sample_actors(
+    region: Region, config: SamplingConfig, usable: Usable, *, fill: float, seed: int
+) -> tuple[Actor, ...]:
+    supply = vehicle_supply(region, config.places, config.vehicles, usable)
+    walkers = walker_supply(region, usable)
+    cars, people = numbers_to_place(
+        fill,
+        len(supply.fit),
+        len(walkers.fit),
+        pedestrian_share=config.pedestrian_share,
+        most=config.actors_max,
+    )
+    rng = stream(seed, "places")
+    drafts = [
+        *_drafts(region, config, usable, place_at_random(supply, cars, rng), supply, seed=seed),
+        *_drafts(region, config, usable, place_at_random(walkers, people, rng), walkers, seed=seed),
+    ]
+    drafts, offsets = _settled(region, drafts, usable)
+    ego = _draw_ego(drafts, stream(seed, "ego")) if config.ego else None
+    counter: Counter[Category] = Counter()
+    actors = []
+    for index, (draft, offset) in enumerate(zip(drafts, offsets, strict=True)):
+        category = draft.spot.category
+        counter[category] += 1
+        actors.append(
+            Actor.model_validate(
+                draft.fields
+                | {
+                    "id": f"{category}-{counter[category]}",
+                    "category": category,
+                    "spawn": name_of(region.graph, NodePlace(draft.walk, draft.spot.node)),
+                    "goal": name_of(region.graph, NodePlace(draft.walk, draft.goal)),
+                    "lateral_offset": offset,
+                    "ego": index == ego,
+                }
+            )
+        )
+    return tuple(actors)
+
+
+def _drafts(
+    region: Region,
+    config: SamplingConfig,
+    usable: Usable,
+    spots: Sequence[Spot],
+    supply: Supply,
+    *,
+    seed: int,
+) -> list[_ScenarioDraft]:
+    """Give each spot a goal and a behaviour; a spot without a goal that can be used is dropped."""
+    walk = bool(spots) and spots[0].category is Category.PEDESTRIAN
+    rng = stream(seed, "walkers" if walk else "vehicles")
+    reach = None
+    if usable.drivable is not None and not walk:
+        reach = Reach(region.graph.lanes, region.lanes & usable.drivable)
+    drafts = []
+    for spot in spots:
+        goals: IntArray = region.candidates(NodePlace(walk, spot.node))
+        if reach is not None:
+            goals = goals[reach.of(spot.node)[goals]]
+        elif walk and usable.walkable is not None:
+            goals = goals[usable.walkable[goals]]
+        if len(goals):
+            goal = int(goals[int(rng.integers(len(goals)))])
+            body = supply.bodies[spot.category]
+            fields = draw_behaviour(config.behaviour, supply.graph, spot, body, rng)
+            drafts.append(_ScenarioDraft(spot, walk, goal, fields))
+    return drafts
+
+
+def _settled(
+    region: Region, drafts: Sequence[_ScenarioDraft], usable: Usable
+) -> tuple[list[_ScenarioDraft], list[float]]:
+    """Lateral offsets with which no bodies touch, and the drafts that can stay.
+
+    Bodies that would touch go back to the middle of their lanes, where vehicles keep a gap; a
+    pedestrian beside a lane who touches a vehicle even then is left out.
+    """
+    offsets = [float(str(draft.fields["lateral_offset"])) for draft in drafts]
+    bodies = [usable.bodies[draft.spot.category] for draft in drafts]
+    reach = max((2 * (body.length + body.width) for body in bodies), default=1.0)
+    while True:
+        crowd = Crowd(reach)
+        clashing: set[int] = set()
+        for index, draft in enumerate(drafts):
+            graph = region.graph.walks if draft.walk else region.graph.lanes
+            box: Box = box_at(graph, draft.spot.node, bodies[index], lateral_offset=offsets[index])
+            for other in crowd.touching(box):
+                clashing |= {index, other}
+            crowd.add(index, box)
+        moved = [index for index in sorted(clashing) if offsets[index] != 0.0]
+        if not moved:
+            kept = [i for i, draft in enumerate(drafts) if i not in clashing or not draft.walk]
+            return [drafts[i] for i in kept], [offsets[i] for i in kept]
+        for index in moved:
+            offsets[index] = 0.0
+
+
+def _draw_ego(drafts: Sequence[_ScenarioDraft], rng: np.random.Generator) -> int | None:
+    """Index of a car, or of any vehicle if there is no car."""
+    vehicles = [index for index, draft in enumerate(drafts) if not draft.walk]
+    cars = [index for index in vehicles if drafts[index].spot.category is Category.CAR]
+    choices = cars or vehicles
+    return choices[draw_place([1.0] * len(choices), rng)] if choices else None

@@ -1,0 +1,175 @@
+"""How well traffic meets counts: as planned, or as a run had it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.scenario.demand.count_stations import GOOD, Passing, contradictions, geh, observations
+from odscen.scenario.demand.zones import TripEnds
+from odscen.scenario.placing.region import Region
+from odscen.sumo.realize.counted_traffic import ways_past
+from odscen.sumo.realize.passages import planned_passages, seen_passages
+from odscen.sumo.realize.realization import everybody
+from odscen.sumo.realize.usable import usable_places
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import polars as pl
+
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+
+class CountFit(NamedTuple):
+    """One count and what traffic makes of it; ``why`` says why it is not met, where it is not."""
+
+    counts: str
+    place: str
+    begin: float
+    end: float
+    counted: float
+    modelled: int
+    geh: float
+    why: str
+
+    @property
+    def met(self) -> bool:
+        """Whether GEH is good."""
+        return self.geh <= GOOD
+
+
+@dataclass(frozen=True, slots=True)
+class CountFits:
+    """All counts of a scenario against traffic.
+
+    Attributes
+    ----------
+    source
+        ``planned`` (ways at free flow) or ``run``.
+    vehicles
+        How many vehicles there are in all.
+    contradictions
+        Counts that cannot be right together, in words.
+    """
+
+    source: str
+    rows: tuple[CountFit, ...]
+    vehicles: int
+    contradictions: tuple[str, ...]
+
+    @property
+    def share_met(self) -> float | None:
+        """Share of the counts with a good GEH; ``None`` without counts."""
+        return sum(row.met for row in self.rows) / len(self.rows) if self.rows else None
+
+    @property
+    def rmse(self) -> float | None:
+        """Root of the mean squared difference, vehicles per slice."""
+        if not self.rows:
+            return None
+        squares = [(row.modelled - row.counted) ** 2 for row in self.rows]
+        return math.sqrt(sum(squares) / len(squares))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as data."""
+        return {
+            "source": self.source,
+            "counts": len(self.rows),
+            "met": sum(row.met for row in self.rows),
+            "share_met": self.share_met,
+            "rmse": self.rmse,
+            "vehicles": self.vehicles,
+            "observations": sum(row.counted for row in self.rows),
+            "passages": sum(row.modelled for row in self.rows),
+            "contradictions": list(self.contradictions),
+            "rows": [{**row._asdict(), "met": row.met} for row in self.rows],
+        }
+
+
+def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
+    """Hold the traffic that a scenario plans, with nobody in its way, against its counts.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    region = Region.of(sumo_map.graph, scenario.roi)
+    users, _ = everybody(scenario, sumo_map, region, until=scenario.simulation.duration)
+    ground = TripEnds(region, usable_places(sumo_map))
+    seen = observations(scenario.demand)
+    passages = planned_passages(users, region, ground.router, seen)
+    vehicles = sum(not user.person for user in users)
+    return _fit(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
+
+
+def run_fit(scenario: Scenario, sumo_map: SumoMap, trajectories: pl.LazyFrame) -> CountFits:
+    """Hold the traffic of a run against the counts of its scenario."""
+    seen = observations(scenario.demand)
+    passages, vehicles = seen_passages(trajectories, sumo_map, seen)
+    return _fit(scenario, sumo_map, passages, source="run", vehicles=vehicles)
+
+
+def _fit(
+    scenario: Scenario,
+    sumo_map: SumoMap,
+    passages: Mapping[tuple[str, float, float], int],
+    *,
+    source: str,
+    vehicles: int,
+) -> CountFits:
+    opposed: dict[tuple[str, str, float, float], str] = {}
+    told: list[str] = []
+    for part in scenario.demand.counts:
+        for one in contradictions(part, sumo_map.graph):
+            told.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
+            for place in one.places:
+                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+    passable = _Passable(scenario, sumo_map)
+    rows = []
+    for name, place, begin, end, counted in observations(scenario.demand):
+        modelled = passages.get((place, begin, end), 0)
+        value = geh(modelled, counted, end - begin)
+        why = ""
+        if value > GOOD:
+            why = opposed.get((name, place, begin, end), "")
+            if not why and place not in passable:
+                why = "no way inside the region passes here"
+            if not why:
+                why = _otherwise(modelled, counted, source)
+        rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
+    return CountFits(source, tuple(rows), vehicles, tuple(told))
+
+
+def _otherwise(modelled: float, counted: float, source: str) -> str:
+    if source == "run":
+        return "vehicles were late" if modelled < counted else "vehicles of another slice came late"
+    if modelled > counted:
+        return "other counts, or other traffic of the scenario, bring more"
+    return "other counts on the ways past this place allow no more"
+
+
+class _Passable:
+    """Places that some way inside the region passes; found out when first asked."""
+
+    def __init__(self, scenario: Scenario, sumo_map: SumoMap) -> None:
+        self._scenario = scenario
+        self._map = sumo_map
+
+    def __contains__(self, place: str) -> bool:
+        return place in self._places
+
+    @cached_property
+    def _places(self) -> set[str]:
+        region = Region.of(self._map.graph, self._scenario.roi)
+        ground = TripEnds(region, usable_places(self._map))
+        found: set[str] = set()
+        for part in self._scenario.demand.counts:
+            passing = Passing(region.graph, [row[0] for row in part.rows])
+            kinds = ways_past(ground, part, passing)
+            found.update(passing.places[place] for kind in kinds for place in kind)
+        return found

@@ -1,0 +1,1 @@
+"""Run folders: names of files, states, and what is kept for resuming."""

@@ -1,0 +1,273 @@
+"""What a long run keeps at each boundary, so that it can go on from there whatever happens.
+
+A slice is complete when its folder ``slices/NNNN`` is there: everything in it was written, checked
+and brought to the disk under another name before, and renaming is one step. What is recorded lies
+under checksums in ``checkpoint.json``, as disks and people damage files.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import shutil
+import zlib
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import SimulationError
+from odscen.sumo.folder.layout import RECORDED, SLICES_FOLDER
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CHECKPOINT_FILE = "checkpoint.json"
+STATE_FILE = "state.xml.gz"
+EVENTS_LINES = "events.jsonl"
+FORMAT = "odscen-slice"
+VERSION = 1
+
+_BLOCK = 1 << 20
+_PART = ".part-"
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """A complete slice.
+
+    Attributes
+    ----------
+    number
+        From 1.
+    time
+        Simulated seconds at its end.
+    last
+        Whether the run ended with it.
+    stopped
+        Whether somebody who watched the run ended it.
+    routes
+        Where in the routes file the next slice begins, bytes.
+    steps, wall_seconds
+        Of the run so far; wall seconds of simulating, in all processes that took part.
+    memory
+        Bytes that the process held at the end of the slice.
+    running
+        How many vehicles and persons were on the road.
+    present
+        Ids of all vehicles and persons that the state holds, as far as SUMO tells.
+    lanes
+        How many vehicles the state holds on each lane.
+    recorder
+        What it remembers, see :meth:`odscen.sumo.worker.recorder.Recorder.state`.
+    files
+        Size and CRC-32 by name.
+    """
+
+    number: int
+    time: float
+    last: bool
+    stopped: bool
+    routes: int
+    steps: int
+    wall_seconds: float
+    memory: int
+    running: int
+    present: list[str]
+    recorder: dict[str, Any]
+    files: dict[str, list[int]]
+    lanes: dict[str, int] = field(default_factory=dict)
+
+
+def slice_folder(run: Path, number: int) -> Path:
+    """Folder of a complete slice."""
+    return run / SLICES_FOLDER / f"{number:04d}"
+
+
+def part_folder(run: Path, number: int) -> Path:
+    """Folder that a slice is written in; empty, whatever an earlier process left there."""
+    folder = run / SLICES_FOLDER / f"{_PART}{number:04d}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
+
+
+def written_folder(run: Path, number: int) -> Path:
+    """Folder of a slice that is complete, or that is being completed."""
+    part = run / SLICES_FOLDER / f"{_PART}{number:04d}"
+    return part if part.is_dir() else slice_folder(run, number)
+
+
+def slice_size(run: Path, number: int) -> int:
+    """Bytes that a slice takes, what it has recorded included."""
+    files = [*written_folder(run, number).iterdir()]
+    files += [recorded_part(run, file, number) for file in RECORDED]
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
+def clear_parts(run: Path) -> None:
+    """Remove what is left of slices that were not completed."""
+    for folder in (run / SLICES_FOLDER).glob(f"{_PART}*"):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def recorded_part(run: Path, file: str, number: int) -> Path:
+    """Where the part of a complete slice is, of one of :data:`odscen.sumo.folder.layout.RECORDED`."""
+    return run / RECORDED[file] / f"part-{number:04d}.parquet"
+
+
+def complete(run: Path, part: Path, checkpoint: Checkpoint) -> None:
+    """Make a slice complete: all of it is on the disk, then it appears.
+
+    Raises
+    ------
+    OSError
+        If the disk is full, for example.
+    """
+    path = part / CHECKPOINT_FILE
+    head = {"format": FORMAT, "version": VERSION}
+    path.write_text(json.dumps({**head, **asdict(checkpoint)}), encoding="utf-8")
+    for name in (*checkpoint.files, CHECKPOINT_FILE):
+        _to_disk(part / name)
+    _to_disk(part)
+    final = slice_folder(run, checkpoint.number)
+    shutil.rmtree(final, ignore_errors=True)
+    part.rename(final)
+    _to_disk(final.parent)
+    settle(run, checkpoint.number)
+
+
+def settle(run: Path, number: int) -> None:
+    """Show what a complete slice has recorded, if that has not been done."""
+    for file in RECORDED:
+        inside = slice_folder(run, number) / file
+        if inside.is_file():
+            target = recorded_part(run, file, number)
+            target.parent.mkdir(exist_ok=True)
+            inside.replace(target)
+            _to_disk(target.parent)
+
+
+def read_checkpoint(run: Path, number: int) -> Checkpoint:
+    """Read what a slice has left.
+
+    Raises
+    ------
+    SimulationError
+        If it is damaged; says what.
+    """
+    path = slice_folder(run, number) / CHECKPOINT_FILE
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if (data.pop("format"), data.pop("version")) != (FORMAT, VERSION):
+            msg = f"{path.name} is of another version"
+            raise SimulationError(msg)
+        return Checkpoint(**data)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        msg = f"{path.name} cannot be read ({error})"
+        raise SimulationError(msg) from error
+
+
+def last_number(run: Path) -> int:
+    """Number of the last of the complete slices that begin with the first; 0 for none."""
+    number = 0
+    while slice_folder(run, number + 1).is_dir():
+        number += 1
+    return number
+
+
+def survey(run: Path) -> tuple[int, list[str]]:
+    """Find the last slice up to which nothing is damaged, and put away what comes after it.
+
+    Returns
+    -------
+    Its number (0: the run has to begin anew), and what was found wrong, in words.
+    """
+    whole, problems = 0, []
+    last = last_number(run)
+    for number in range(1, last + 1):
+        settle(run, number)
+        try:
+            check(run, read_checkpoint(run, number))
+        except SimulationError as error:
+            problems.append(f"slice {number} is damaged: {error}")
+            break
+        whole = number
+    for number in range(whole + 1, last + 1):
+        shutil.rmtree(slice_folder(run, number))
+        for file in RECORDED:
+            recorded_part(run, file, number).unlink(missing_ok=True)
+    return whole, problems
+
+
+def check(run: Path, checkpoint: Checkpoint) -> None:
+    """Compare the files of a slice with their checksums.
+
+    Raises
+    ------
+    SimulationError
+        If one is not as it was written.
+    """
+    for name, (size, crc) in checkpoint.files.items():
+        number = checkpoint.number
+        inside = slice_folder(run, number) / name
+        path = recorded_part(run, name, number) if name in RECORDED else inside
+        if not path.is_file():
+            msg = f"{path.name} is missing"
+            raise SimulationError(msg)
+        if path.stat().st_size != size or _crc(path) != crc:
+            msg = f"{path.name} is not as it was written"
+            raise SimulationError(msg)
+
+
+def fingerprints(part: Path, names: tuple[str, ...]) -> dict[str, list[int]]:
+    """Size and CRC-32 of files in a folder, of those that are there."""
+    return {
+        name: [(part / name).stat().st_size, _crc(part / name)]
+        for name in names
+        if (part / name).is_file()
+    }
+
+
+def check_state(path: Path) -> None:
+    """Make sure that SUMO has written a state to its end; it says nothing when a disk is full.
+
+    Raises
+    ------
+    SimulationError
+        If not.
+    """
+    tail = b""
+    try:
+        with gzip.open(path) as state:
+            while block := state.read(_BLOCK):
+                tail = (tail + block)[-64:]
+    except (OSError, EOFError, zlib.error) as error:
+        msg = f"SUMO could not save its state: {error}"
+        raise SimulationError(msg) from error
+    if b"</snapshot>" not in tail:
+        msg = "SUMO has not saved its state to the end; the disk may be full"
+        raise SimulationError(msg)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Replace a small file in one step, brought to the disk."""
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    _to_disk(part)
+    part.replace(path)
+
+
+def _crc(path: Path) -> int:
+    crc = 0
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            crc = zlib.crc32(block, crc)
+    return crc
+
+
+def _to_disk(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,120 @@
+"""What is recorded in a run folder: one file of a run in one piece, parts of a run in slices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.results.measures.conflicts import conflicts_of_slices
+from odscen.sumo.folder.layout import (
+    CONFLICTS_FILE,
+    LANES_FILE,
+    RECORDED,
+    TRAJECTORIES_FILE,
+    TRIPS_FILE,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import polars as pl
+
+_TIME = "timestep_time"
+
+
+class Recorded(NamedTuple):
+    """Trajectories as SUMO wrote them; of ``every`` records of a road user the first."""
+
+    rows: pl.DataFrame
+    every: int = 1
+
+
+def recorded_files(run: Path, file: str) -> list[Path]:
+    """Parquet files of one thing that a run records, in order of time; empty if there are none.
+
+    Those of a run in slices are alike and read as one table: ``polars.scan_parquet(files)``, DuckDB
+    ``'RUN/trajectories/*.parquet'``.
+
+    Parameters
+    ----------
+    file
+        Of :data:`odscen.sumo.folder.layout.RECORDED`: its name in the folder of a run in one piece.
+    """
+    one = run / file
+    return [one] if one.is_file() else sorted((run / RECORDED[file]).glob("part-*.parquet"))
+
+
+def trajectory_files(run: Path) -> list[Path]:
+    """Parquet files of the trajectories; empty if none were recorded, or nobody was there."""
+    return recorded_files(run, TRAJECTORIES_FILE)
+
+
+def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
+    """Read what was recorded.
+
+    Parameters
+    ----------
+    most
+        Rows; of a run that has more every second, third, ... record is left out.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded.
+    """
+    import polars as pl
+
+    files = trajectory_files(run)
+    if not files:
+        return None
+    table = pl.scan_parquet(files)
+    count = table.select(pl.len()).collect().item()
+    if most is None or count <= most or _TIME not in table.collect_schema():
+        return Recorded(table.collect())
+    every = -(-count // most)
+    times = table.select(pl.col(_TIME).unique().sort()).collect(engine="streaming")[_TIME]
+    kept = times.gather_every(every)
+    rows = table.join(kept.to_frame().lazy(), on=_TIME, how="semi", maintain_order="left")
+    return Recorded(rows.collect(engine="streaming"), every)
+
+
+def read_lanes(run: Path) -> pl.DataFrame | None:
+    """Read what was measured on each lane and interval, sorted by ``begin`` and ``lane``.
+
+    Columns as in :mod:`odscen.sumo.outputs.lane_measures`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded, or no vehicle was there.
+    """
+    return _read(run, LANES_FILE)
+
+
+def read_trips(run: Path) -> pl.DataFrame | None:
+    """Read the trips of vehicles and persons in order of arrival, the unfinished last.
+
+    Columns as in :mod:`odscen.sumo.outputs.trip_table`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded, or nobody was there.
+    """
+    return _read(run, TRIPS_FILE)
+
+
+def read_conflicts(run: Path) -> pl.DataFrame | None:
+    """Read who came close to whom, see :func:`odscen.results.measures.conflicts.conflict_table`.
+
+    Returns
+    -------
+    ``None`` if nothing was recorded.
+    """
+    import polars as pl
+
+    files = recorded_files(run, CONFLICTS_FILE)
+    return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
+
+
+def _read(run: Path, file: str) -> pl.DataFrame | None:
+    import polars as pl
+
+    files = recorded_files(run, file)
+    return pl.read_parquet(files) if files else None

@@ -1,0 +1,1 @@
+"""What SUMO writes, as tables."""

@@ -1,0 +1,85 @@
+"""SUMO's SSM device: what it is told, and what it writes.
+
+Every vehicle has one, by a parameter of its vType: devices given by probability are gone from
+vehicles that come in with a saved state.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lxml import etree
+
+from odscen.base.errors import SimulationError
+from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
+from odscen.sumo.outputs.xml_rows import elements
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+VEHICLE_PARAMETER = ("has.ssm.device", "true")
+
+OPTIONS = {
+    "device.ssm.measures": "TTC DRAC PET",
+    "device.ssm.thresholds": f"{SEEN_TTC:g} {SEEN_DRAC:g} {SEEN_PET:g}",
+    "device.ssm.range": "50",
+    "device.ssm.extratime": f"{WATCHED_ON:g}",
+}
+"""Of the sumocfg; range in metres."""
+
+_KINDS = {
+    **dict.fromkeys((1, 2, 3, 18), "following"),
+    **dict.fromkeys((4, 5, 6, 7, 8, 19), "merging"),
+}
+"""By SUMO's number of the encounter; the others are of ways that cross."""
+
+_MEASURES = {"minTTC": "ttc", "maxDRAC": "drac", "PET": "pet"}
+
+
+def logged_conflicts(
+    file: Path, *, net_offset: tuple[float, float] = (0.0, 0.0)
+) -> Iterator[dict[str, object]]:
+    """Rows for :func:`odscen.results.measures.conflicts.conflict_table` from the device's log.
+
+    Parameters
+    ----------
+    net_offset
+        What SUMO's network adds to OpenDRIVE coordinates, metres.
+
+    Raises
+    ------
+    SimulationError
+        If the log is not whole.
+    """
+    try:
+        for conflict in elements(file, "conflict"):
+            yield _row(conflict, net_offset)
+    except etree.XMLSyntaxError as error:
+        msg = f"{file.name} is not whole: {error}"
+        raise SimulationError(msg) from error
+
+
+def _row(conflict: etree._Element, net_offset: tuple[float, float]) -> dict[str, object]:
+    row: dict[str, object] = {
+        "begin": float(conflict.get("begin", "nan")),
+        "end": float(conflict.get("end", "nan")),
+        "one": conflict.get("ego"),
+        "other": conflict.get("foe"),
+        "kind": "crossing",
+        "x": None,
+        "y": None,
+    }
+    placed = False
+    for measure in conflict:
+        name = _MEASURES.get(str(measure.tag))
+        value = measure.get("value", "NA")
+        if name is None:
+            continue
+        row[name] = None if value == "NA" else float(value)
+        if value != "NA" and not placed:
+            x, y = measure.get("position", "").split(",")[:2]
+            row["x"], row["y"] = float(x) - net_offset[0], float(y) - net_offset[1]
+            row["kind"] = _KINDS.get(int(measure.get("type", "9")), "crossing")
+            placed = True
+    return row

@@ -1,0 +1,1 @@
+"""From a scenario on its map to the files that SUMO runs."""

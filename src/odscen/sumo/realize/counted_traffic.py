@@ -1,0 +1,241 @@
+"""Traffic that reproduces counts: ways through the region, and how often each is used.
+
+Which ways there are comes from the lane graph; how often each is driven is chosen by SUMO's
+routeSampler, a linear program for each slice of time. It is given the places of counting as edges
+and, as routes, the places that a way passes, so that it needs no network. Turns and streams are
+then counted alike.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from lxml import etree
+
+from odscen.scenario.checks.goals import stream
+from odscen.scenario.demand.count_stations import Passing
+from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
+from odscen.sumo.realize.sumo_tools import run_tool
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.lanegraph.graphs import IntArray
+    from odscen.scenario.demand.zones import TripEnds
+    from odscen.scenario.document.scenario_document import Counts, Scenario
+
+WAYS = 200_000
+"""Ways that are looked at; where there are more, those between near places and some of the rest."""
+OF_A_KIND = 8
+"""Ways that are kept of those which pass the same places."""
+KINDS_OF_A_PLACE = 40
+"""Kinds of ways that are kept for each place: the most frequent, and the shortest."""
+FEWER_VEHICLES = "0.05"
+"""How much a vehicle weighs against one that is missing in a count: long ways win over short ones
+where both meet the counts."""
+USUAL_SPEED = 8.0
+"""m/s at which vehicles are taken to get from their start to the places of counting."""
+
+PassedStations = tuple[int, ...]
+"""Places that a way passes, in order, by their number."""
+
+
+class StationRoute(NamedTuple):
+    """A way that passes places of counting.
+
+    Attributes
+    ----------
+    start, goal
+        Nodes of the lane graph; vehicles start anywhere on the same stretch of lane as ``start``.
+    segments
+        Rows of the segments that are passed.
+    lead
+        Metres from the start to the middle of the counted places.
+    """
+
+    start: int
+    goal: int
+    segments: tuple[int, ...]
+    lead: float
+
+
+def counted_trips(
+    scenario: Scenario,
+    ground: TripEnds,
+    counts: Counts,
+    others: Mapping[tuple[str, float, float], float],
+) -> Iterator[Trips]:
+    """Yield the trips that make up for what other traffic leaves of the counts.
+
+    Parameters
+    ----------
+    others
+        Vehicles of the rest of the scenario by place, begin and end of the slice.
+    """
+    passing = Passing(ground.region.graph, [row[0] for row in counts.rows])
+    kinds = ways_past(ground, counts, passing)
+    wanted = [
+        (place, begin, end, max(0.0, number - others.get((place, begin, end), 0.0)))
+        for place, begin, end, number in counts.rows
+    ]
+    chosen = _choose(list(kinds), passing, wanted, seed=scenario.seed) if kinds else []
+    rng = stream(scenario.seed, "counts", counts.id)
+    uniform = rng.random((len(chosen), 3))
+    categories = drawn_categories(counts.mix, uniform[:, 0])
+    ways = [
+        kinds[kind][int(number * len(kinds[kind]))]
+        for (kind, _), number in zip(chosen, uniform[:, 1].tolist(), strict=True)
+    ]
+    times = np.array([time for _, time in chosen]) - np.array([one.lead for one in ways]) / (
+        USUAL_SPEED
+    )
+    yield Trips(
+        name=counts.id,
+        part=counts.id,
+        categories=categories,
+        starts=_starts(ground, counts, ways, uniform[:, 2]),
+        goals=np.array([one.goal for one in ways], dtype=np.int32),
+        departs=np.maximum(np.round(times, 2), FIRST),
+    )
+
+
+def ways_past(
+    ground: TripEnds, counts: Counts, passing: Passing
+) -> dict[PassedStations, list[StationRoute]]:
+    """Ways through the region that pass a place of counting, by the places that they pass."""
+    segment = ground.region.graph.lanes.segment
+    usual = max(counts.mix, key=lambda one: counts.mix[one])
+    ends, first = ground.ends(usual), _stretch_starts(ground, ground.starts(usual))
+    kinds: dict[PassedStations, list[StationRoute]] = {}
+    often: dict[PassedStations, int] = defaultdict(int)
+    if not len(ends) or not len(first):
+        return {}
+    per_goal = max(10, WAYS // len(ends))
+    for goal in ends.tolist():
+        ways = ground.router.ways_to(goal)
+        metres = ways.distance(first)
+        near = np.flatnonzero(np.isfinite(metres) & (metres > 0))
+        near = near[np.argsort(metres[near], kind="stable")]
+        rest = near[per_goal // 2 :]
+        thin = max(1, -(-len(rest) // (per_goal - per_goal // 2)))
+        sources = first[np.concatenate([near[: per_goal // 2], rest[::thin]])]
+        marks, nodes = ways.stretches(sources, segment)
+        for start, row, entered in zip(sources.tolist(), marks.tolist(), nodes, strict=True):
+            segments = tuple(row[: row.index(-1)] if -1 in row else row)
+            found = passing.of(segments)
+            kind = tuple(dict.fromkeys(place for place, _ in found))
+            if kind:
+                often[kind] += 1
+                kept = kinds.setdefault(kind, [])
+                if len(kept) < OF_A_KIND:
+                    middle = entered[found[len(found) // 2][1]]
+                    lead = ways.distance(np.array([start, middle]))
+                    kept.append(StationRoute(start, goal, segments, float(lead[0] - lead[1])))
+    return {kind: kinds[kind] for kind in _selected(often, len(passing.places))}
+
+
+def _selected(often: Mapping[PassedStations, int], places: int) -> list[PassedStations]:
+    """Kinds of ways to choose from, sorted: for each place the most frequent and the shortest."""
+    of_place: list[list[PassedStations]] = [[] for _ in range(places)]
+    for kind in sorted(often):
+        for place in kind:
+            of_place[place].append(kind)
+    half = KINDS_OF_A_PLACE // 2
+    kept: set[PassedStations] = set()
+    for mine in of_place:
+        kept.update(sorted(mine, key=lambda kind: (-often[kind], kind))[:half])
+        kept.update(sorted(mine, key=lambda kind: (len(kind), -often[kind], kind))[:half])
+    return sorted(kept)
+
+
+def _choose(
+    kinds: Sequence[PassedStations],
+    passing: Passing,
+    wanted: Sequence[tuple[str, float, float, float]],
+    *,
+    seed: int,
+) -> list[tuple[PassedStations, float]]:
+    """Let routeSampler choose ways: the kind of each vehicle's way, and when it passes, seconds."""
+    with tempfile.TemporaryDirectory(prefix="odscen-counts-") as name:
+        folder = Path(name)
+        (folder / "ways.rou.xml").write_text(_routes_xml(kinds), encoding="utf-8")
+        (folder / "counts.xml").write_text(_counts_xml(passing, wanted), encoding="utf-8")
+        run_tool(
+            "routeSampler.py",
+            [
+                *("--route-files", "ways.rou.xml", "--edgedata-files", "counts.xml"),
+                *("--output-file", "chosen.rou.xml", "--seed", str(seed), "--optimize", "full"),
+                *("--minimize-vehicles", FEWER_VEHICLES),
+            ],
+            folder=folder,
+        )
+        chosen = []
+        for _, vehicle in etree.iterparse(str(folder / "chosen.rou.xml"), tag="vehicle"):
+            edges = vehicle[0].get("edges", "").split()
+            kind = tuple(int(edge[1:]) for edge in edges)
+            chosen.append((kind, float(vehicle.get("depart", "0"))))
+            vehicle.clear()
+    return chosen
+
+
+def _routes_xml(kinds: Sequence[PassedStations]) -> str:
+    rows = (
+        f'    <route id="{index}" edges="{" ".join(f"p{place}" for place in kind)}"/>'
+        for index, kind in enumerate(kinds)
+    )
+    return "\n".join(["<routes>", *rows, "</routes>", ""])
+
+
+def _counts_xml(passing: Passing, wanted: Sequence[tuple[str, float, float, float]]) -> str:
+    number = {place: index for index, place in enumerate(passing.places)}
+    slices: dict[tuple[float, float], list[str]] = defaultdict(list)
+    for place, begin, end, vehicles in wanted:
+        edge = f'        <edge id="p{number[place]}" entered="{vehicles:g}"/>'
+        slices[begin, end].append(edge)
+    lines = ["<data>"]
+    for (begin, end), edges in sorted(slices.items()):
+        lines += [f'    <interval id="counts" begin="{begin:g}" end="{end:g}">', *edges]
+        lines.append("    </interval>")
+    return "\n".join([*lines, "</data>", ""])
+
+
+def _stretch_starts(ground: TripEnds, starts: IntArray) -> IntArray:
+    """First start of each lane in each segment."""
+    lanes = ground.region.graph.lanes
+    pairs = np.stack([lanes.lane[starts], lanes.segment[starts]], axis=1)
+    _, first = np.unique(pairs, axis=0, return_index=True)
+    return starts[np.sort(first)]
+
+
+def _starts(
+    ground: TripEnds, counts: Counts, ways: Sequence[StationRoute], uniform: np.ndarray
+) -> IntArray:
+    """Draw a start for each way: on its stretch of lane, where the way through segments is same."""
+    lanes = ground.region.graph.lanes
+    usual = max(counts.mix, key=lambda one: counts.mix[one])
+    starts = ground.starts(usual)
+    of_goal: dict[int, set[StationRoute]] = defaultdict(set)
+    for way in ways:
+        of_goal[way.goal].add(way)
+    possible: dict[StationRoute, IntArray] = {}
+    for goal, mine in sorted(of_goal.items()):
+        to_goal = ground.router.ways_to(goal)
+        for way in sorted(mine):
+            beside = lanes.lane[starts] == lanes.lane[way.start]
+            beside &= lanes.segment[starts] == lanes.segment[way.start]
+            marks, _ = to_goal.stretches(starts[beside], lanes.segment)
+            due = np.full(marks.shape[1], -1)
+            due[: len(way.segments)] = way.segments[: len(due)]
+            same = np.all(marks == due, axis=1)
+            possible[way] = starts[beside][same]
+    return np.array(
+        [
+            possible[way][int(number * len(possible[way]))]
+            for way, number in zip(ways, uniform.tolist(), strict=True)
+        ],
+        dtype=np.int32,
+    )

@@ -1,0 +1,214 @@
+"""How somebody drives or walks: the attributes of a vType, from category, style and weather.
+
+Nothing is left to SUMO's random numbers but dawdling (``sigma``): each actor's speed factor is
+drawn here, from the scenario's seed and the actor's id, and written down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.base.categories import Category
+from odscen.scenario.checks.goals import stream
+
+if TYPE_CHECKING:
+    from odscen.base.categories import Body
+    from odscen.scenario.document.scenario_document import DrivingStyle
+    from odscen.sumo.realize.weather_effects import WeatherEffect
+
+
+@dataclass(frozen=True, slots=True)
+class CategoryTraits:
+    """What SUMO needs to know of a category; m/s and m/s^2; emission class of SUMO's models."""
+
+    vclass: str
+    max_speed: float
+    accel: float
+    decel: float
+    emergency_decel: float
+    shape: str
+    emissions: str
+
+
+KINDS: dict[Category, CategoryTraits] = {
+    # https://sumo.dlr.de/docs/Vehicle_Type_Parameter_Defaults.html, SUMO 1.28
+    Category.CAR: CategoryTraits(
+        "passenger", 55.56, 2.6, 4.5, 9.0, "passenger", "HBEFA4/PC_petrol_Euro-4"
+    ),
+    Category.VAN: CategoryTraits(
+        "delivery", 55.56, 2.6, 4.5, 9.0, "delivery", "HBEFA4/LCV_diesel_N1-III_Euro-6ab"
+    ),
+    Category.TRUCK: CategoryTraits(
+        "truck", 36.11, 1.3, 4.0, 7.0, "truck", "HBEFA4/RT_le7.5t_Euro-VI_A-C"
+    ),
+    Category.BUS: CategoryTraits(
+        "bus", 27.78, 1.2, 4.0, 7.0, "bus", "HBEFA4/UBus_Std_gt15-18t_Euro-VI_A-C"
+    ),
+    Category.MOTORCYCLE: CategoryTraits(
+        "motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle", "HBEFA4/MC_4S_gt250cc_Euro-3"
+    ),
+    Category.BICYCLE: CategoryTraits("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle", "Zero"),
+    Category.PEDESTRIAN: CategoryTraits("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian", "Zero"),
+}
+"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h.
+
+Emissions: https://sumo.dlr.de/docs/Models/Emissions/HBEFA4-based.html; the classes that SUMO 1.28
+itself takes, but for motorcycles, of which it takes those from before 1999.
+"""
+ELECTRIC: dict[Category, str] = {
+    Category.CAR: "HBEFA4/PC_BEV",
+    Category.VAN: "HBEFA4/LCV_BEV_N1-IIII",
+    Category.TRUCK: "HBEFA4/RigidTruck_BEV_le7.5t",
+    Category.BUS: "HBEFA4/Coach_BEV_Std_le18t",
+    Category.MOTORCYCLE: "HBEFA4/MC_BEV",
+}
+"""Emission classes of models that are electric."""
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """A driving style; the speed factor is normally distributed and cut at 3 deviations."""
+
+    factor_mean: float
+    factor_deviation: float
+    accel: float
+    headway: float
+    sigma: float
+    min_gap: float
+
+
+STYLES: dict[DrivingStyle, Style] = {
+    # "normal" is SUMO's default driver; the others are set about it, see docs/runs.md.
+    "cautious": Style(0.90, 0.05, 0.8, 1.5, 0.3, 3.0),
+    "normal": Style(1.00, 0.08, 1.0, 1.0, 0.5, 2.5),
+    "sporty": Style(1.10, 0.06, 1.2, 0.8, 0.5, 2.0),
+}
+WALKING_DEVIATION = 0.1
+"""Of the speed factor of pedestrians for whom no speed is given."""
+ALWAYS = 1_000_000
+"""Seconds after the beginning of red in which it is not heeded; more than any red lasts."""
+TWO_WHEELER_MIN_GAP = 0.5
+"""Share of a driver's gap that motorcycles and bicycles keep."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """A vType's attributes and what belongs to the single vehicle.
+
+    Attributes
+    ----------
+    attributes
+        Of the ``<vType>``, in order, without its id.
+    max_speed
+        Highest speed the actor ever goes, m/s.
+    speed_factor
+        Times the speed limit; 1 for pedestrians, whose own speed is in ``max_speed``.
+    """
+
+    attributes: tuple[tuple[str, str], ...]
+    max_speed: float
+    speed_factor: float
+    accel: float
+
+
+def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) -> float:
+    """Speed factor of one actor, the same whatever else is in the scenario."""
+    z = float(stream(seed, "speed factor", actor).normal())
+    z = min(3.0, max(-3.0, z))
+    if category is Category.PEDESTRIAN:
+        return round(1.0 + WALKING_DEVIATION * z, 4)
+    drawn = STYLES[style]
+    return round(drawn.factor_mean + drawn.factor_deviation * z, 4)
+
+
+def driver(
+    category: Category,
+    body: Body,
+    *,
+    style: DrivingStyle,
+    factor: float,
+    speed: float | None,
+    limit: float | None,
+    weather: WeatherEffect,
+    ignores_red: bool = False,
+    electric: bool = False,
+) -> Driver:
+    """Attributes of somebody who drives, or walks, like this.
+
+    Parameters
+    ----------
+    factor
+        Drawn speed factor, see :func:`draw_factor`.
+    speed
+        Desired speed, m/s. A vehicle never goes faster. Where it is above ``limit * factor``, the
+        factor is raised so that the desired speed is reached at the spawn, and other limits are
+        exceeded in the same proportion.
+    limit
+        Speed limit at the spawn, m/s; ``None`` if unknown.
+    ignores_red
+        Of a pedestrian: crosses at red as at green (R45).
+    electric
+        Whether the model has no exhaust.
+    """
+    if category is Category.PEDESTRIAN:
+        speed = KINDS[category].max_speed * factor if speed is None else speed
+        return _walker(body, speed=speed, ignores_red=ignores_red)
+    kind, manner = KINDS[category], STYLES[style]
+    max_speed = kind.max_speed
+    if speed is not None:
+        max_speed = speed
+        if limit:
+            factor = max(factor, speed / limit)
+    max_speed = min(max_speed * weather.speed, weather.sight_speed)
+    factor *= weather.speed
+    accel = kind.accel * manner.accel * weather.grip
+    two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
+    min_gap = manner.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0)
+    attributes = (
+        ("vClass", kind.vclass),
+        ("guiShape", kind.shape),
+        *_body(body),
+        ("maxSpeed", number(max_speed)),
+        ("speedDev", "0"),
+        ("accel", number(accel)),
+        ("decel", number(kind.decel * weather.grip)),
+        ("emergencyDecel", number(kind.emergency_decel * weather.grip)),
+        ("tau", number(manner.headway * weather.headway)),
+        ("sigma", number(manner.sigma)),
+        ("minGap", number(min_gap)),
+        ("emissionClass", ELECTRIC.get(category, kind.emissions) if electric else kind.emissions),
+    )
+    return Driver(attributes, max_speed, round(factor, 4), accel)
+
+
+def _walker(body: Body, *, speed: float, ignores_red: bool) -> Driver:
+    attributes = (
+        ("vClass", "pedestrian"),
+        ("guiShape", "pedestrian"),
+        *_body(body),
+        ("maxSpeed", number(speed)),
+        ("desiredMaxSpeed", number(speed)),
+        ("speedFactor", "1"),
+        ("speedDev", "0"),
+        ("emissionClass", KINDS[Category.PEDESTRIAN].emissions),
+    )
+    if ignores_red:
+        attributes += (("jmDriveAfterRedTime", number(ALWAYS, digits=0)),)
+    return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
+
+
+def _body(body: Body) -> tuple[tuple[str, str], ...]:
+    return (
+        ("length", number(body.length)),
+        ("width", number(body.width)),
+        ("height", number(body.height)),
+    )
+
+
+def number(value: float, *, digits: int = 3) -> str:
+    """Write fixed notation with ``digits`` decimals, without trailing zeros and without ``-0``."""
+    text = f"{value:.{digits}f}"
+    if digits > 0:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

@@ -1,0 +1,42 @@
+"""SUMO's additional file that makes it measure traffic on lanes, and emissions if wanted."""
+
+from __future__ import annotations
+
+from odscen.sumo.folder.layout import EMISSIONS_FILE, LANES_FILE
+
+INTERVALS = (10.0, 30.0, 60.0, 300.0, 900.0)
+"""Seconds, from fine to coarse: one of them is what is measured over."""
+MOST_INTERVALS = 96
+"""Of a run, unless it is longer than a day."""
+LANE_ATTRIBUTES = (
+    "sampledSeconds", "traveltime", "density", "waitingTime", "timeLoss", "speed", "departed",
+    "arrived", "entered", "left", "distance",
+)  # fmt: skip
+EMISSIONS = ("CO2", "CO", "HC", "NOx", "PMx", "fuel", "electricity")
+"""SUMO's names: mg, electricity in Wh."""
+
+
+def interval_of(until: float, slice_length: float | None = None) -> float:
+    """Seconds that a run of ``until`` seconds is measured over; no longer than a slice."""
+    fine = (one for one in INTERVALS if until / one <= MOST_INTERVALS)
+    return min(next(fine, INTERVALS[-1]), slice_length or until)
+
+
+def measures_xml(interval: float, *, emissions: bool) -> str:
+    """Text of ``measures.add.xml``; files are relative to it."""
+    wanted = [_lane_data("lanes", LANES_FILE, interval, LANE_ATTRIBUTES)]
+    if emissions:
+        attributes = tuple(f"{name}_abs" for name in EMISSIONS)
+        wanted.append(
+            _lane_data("emissions", EMISSIONS_FILE, interval, attributes, 'type="emissions" ')
+        )
+    return "\n".join(["<additional>", *wanted, "</additional>", ""])
+
+
+def _lane_data(
+    name: str, file: str, interval: float, attributes: tuple[str, ...], kind: str = ""
+) -> str:
+    return (
+        f'    <laneData id="{name}" {kind}file="{file}" period="{interval:g}"'
+        f' excludeEmpty="true" withInternal="true" writeAttributes="{" ".join(attributes)}"/>'
+    )

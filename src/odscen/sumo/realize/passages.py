@@ -1,0 +1,175 @@
+"""Who passes places of counting, and when: planned, from ways, or seen, from a run."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.scenario.demand.count_stations import Passing, transitions
+from odscen.sumo.realize.route_paths import each_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import polars as pl
+
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph
+    from odscen.lanegraph.shortest_paths import Router
+    from odscen.scenario.demand.count_stations import Observation
+    from odscen.scenario.placing.region import Region
+    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+Passages = Counter[tuple[str, float, float]]
+"""Vehicles by place, begin and end of the slice."""
+
+UNKNOWN_LIMIT = 13.89
+"""m/s assumed where the map gives no limit: 50 km/h."""
+
+
+def planned_passages(
+    users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
+) -> Passages:
+    """Count vehicles at the places of observations, as they would pass with nobody in their way."""
+    passing = Passing(region.graph, [one.place for one in seen])
+    clock = _Slices(seen)
+    found: Passages = Counter()
+    for _, passed in each_passing(users, region, drivable, passing):
+        for place, time in passed:
+            clock.count(found, passing.places[place], time)
+    return found
+
+
+def each_passing(
+    users: Sequence[RoadUser], region: Region, drivable: Router, passing: Passing
+) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
+    """Yield vehicles with the places that they pass, by number, and when, with a free road.
+
+    The order is not that of ``users``; pedestrians and those without a way are left out.
+    """
+    lanes = region.graph.lanes
+    vehicles = [user for user in users if not user.person]
+    for index, path in each_path(vehicles, region, drivable):
+        if len(path):
+            segment = lanes.segment[path]
+            first = np.flatnonzero(np.diff(segment, prepend=-1))
+            times = _times(lanes, path)[first] + vehicles[index].depart
+            passed = passing.of(segment[first].tolist())
+            yield vehicles[index], [(place, float(times[step])) for place, step in passed]
+
+
+def seen_passages(
+    trajectories: pl.LazyFrame, sumo_map: SumoMap, seen: Sequence[Observation]
+) -> tuple[Passages, int]:
+    """Count vehicles at the places of observations, as a run's trajectories have them.
+
+    Parameters
+    ----------
+    trajectories
+        As the run wrote them, see docs/runs.md.
+
+    Returns
+    -------
+    The vehicles by observation, and how many vehicles there are in all.
+    """
+    import polars as pl
+
+    passing = Passing(sumo_map.graph, [one.place for one in seen])
+    clock = _Slices(seen)
+    found: Passages = Counter()
+    segments = _segment_of_lane(sumo_map)
+    known = pl.DataFrame(
+        {"lane": list(segments), "segment": list(segments.values())},
+        schema={"lane": pl.String, "segment": pl.Int64},
+    )
+    changes = (
+        trajectories.select(
+            time=pl.col("timestep_time"),
+            id=pl.col("vehicle_id").cast(pl.String),
+            lane=pl.col("vehicle_lane").cast(pl.String),
+        )
+        .join(known.lazy(), on="lane", how="inner")
+        .sort("id", "time")
+        .filter((pl.col("segment") != pl.col("segment").shift(1).over("id")).fill_null(value=True))
+        .group_by("id", maintain_order=True)
+        .agg("time", "segment")
+        .collect()
+    )
+    between = _Between(sumo_map.graph)
+    for times, way in zip(changes["time"].to_list(), changes["segment"].to_list(), strict=True):
+        whole, moments = between.filled(way, times)
+        for place, step in passing.of(whole):
+            clock.count(found, passing.places[place], moments[step])
+    return found, len(changes)
+
+
+class _Slices:
+    """The slices of time of each place, to count passages in."""
+
+    def __init__(self, seen: Sequence[Observation]) -> None:
+        self._of_place: dict[str, list[tuple[float, float]]] = defaultdict(list)
+        for one in seen:
+            self._of_place[one.place].append((one.begin, one.end))
+        for slices in self._of_place.values():
+            slices[:] = sorted(set(slices))
+
+    def count(self, passages: Passages, place: str, time: float) -> None:
+        slices = self._of_place[place]
+        row = bisect.bisect_right(slices, (time, math.inf)) - 1
+        if row >= 0 and time < slices[row][1]:
+            passages[place, *slices[row]] += 1
+
+
+class _Between:
+    """Fills segments in that a vehicle crossed from one record to the next, such as a junction."""
+
+    def __init__(self, graph: MapGraph) -> None:
+        row = {str(name): index for index, name in enumerate(graph.segments.ids)}
+        self._onwards = {
+            row[one]: {row[other] for other in others} for one, others in transitions(graph).items()
+        }
+
+    def filled(self, way: Sequence[int], times: Sequence[float]) -> tuple[list[int], list[float]]:
+        """Segments and times of a way with what lies between two that do not touch, if one does."""
+        whole, moments = [way[0]], [times[0]]
+        for segment, time in zip(way[1:], times[1:], strict=True):
+            onwards = self._onwards.get(whole[-1], set())
+            if segment not in onwards:
+                steps = [one for one in sorted(onwards) if segment in self._onwards.get(one, ())]
+                if len(steps) == 1:
+                    whole.append(steps[0])
+                    moments.append(time)
+            whole.append(segment)
+            moments.append(time)
+        return whole, moments
+
+
+def _times(lanes: LaneGraph, path: np.ndarray) -> np.ndarray:
+    """Seconds after departure at each node of a path, at the limit."""
+    limit = lanes.speed_limit[path[:-1]]
+    limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
+    steps = np.hypot(np.diff(lanes.x[path]), np.diff(lanes.y[path]))
+    return np.concatenate([[0.0], np.cumsum(steps / limit)])
+
+
+def _segment_of_lane(sumo_map: SumoMap) -> dict[str, int]:
+    """Row of the segment in which each SUMO lane lies, by the lane's id.
+
+    The one with most of its nodes; the lanes inside SUMO's junctions begin a little before those
+    of OpenDRIVE and count as the junction.
+    """
+    places = sumo_map.lane_places
+    on_lane = places.lane >= 0
+    pairs = np.stack([places.lane[on_lane], sumo_map.graph.lanes.segment[on_lane]], axis=1)
+    unique, number = np.unique(pairs, axis=0, return_counts=True)
+    kinds = np.array(sumo_map.graph.segments.kinds)
+    internal = np.array([sumo_map.net.lanes[name].internal for name in places.lanes])
+    inside = internal[unique[:, 0]] & (kinds[unique[:, 1]] == "junction")
+    found: dict[str, int] = {}
+    for row in np.lexsort((number, inside)).tolist():
+        found[places.lanes[unique[row, 0]]] = int(unique[row, 1])
+    return found

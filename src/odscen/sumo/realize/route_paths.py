@@ -1,0 +1,169 @@
+"""The ways of many road users on the graphs, those with a common end found together.
+
+A search over the whole graph costs milliseconds; tens of thousands of trips have a few hundred
+goals between them.
+
+A vehicle does not change lanes before its front is where the lane change begins, and it needs room
+for it: its way leads straight on for so long, even if the shortest one changes lanes at once. SUMO
+would have it stand before the junction on the wrong lane.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import DEFAULT_BODY
+from odscen.lanegraph.graphs import Relation
+from odscen.scenario.placing.spawn_room import LANE_CHANGE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.base.categories import Body
+    from odscen.lanegraph.graphs import BoolArray, IntArray, LaneGraph
+    from odscen.lanegraph.shortest_paths import Router, WaysTo
+    from odscen.scenario.placing.region import Region
+    from odscen.sumo.realize.road_users import RoadUser
+
+TOGETHER = 500
+"""Ways to one goal that are in memory at a time."""
+
+_NOWHERE = np.empty(0, dtype=np.int32)
+
+
+def each_path(
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    bodies: Sequence[Body] | None = None,
+) -> Iterator[tuple[int, IntArray]]:
+    """Yield the position of each user and the nodes of its way inside the region.
+
+    It is the shortest one, of vehicles among those that do not change lanes at their very start, if
+    there is one. Ways of vehicles lead over lanes that SUMO has, if there is such a way. The order
+    is that of spawns (actors and flows) and of goals (trips of the demand).
+
+    Parameters
+    ----------
+    bodies
+        Of the users; those of their categories if not given.
+    """
+    if bodies is None:
+        bodies = [DEFAULT_BODY[user.category] for user in users]
+    by_spawn: dict[tuple[bool, int], list[int]] = defaultdict(list)
+    by_goal: dict[tuple[bool, int], list[int]] = defaultdict(list)
+    for index, user in enumerate(users):
+        if user.trip:
+            by_goal[user.person, user.goal].append(index)
+        else:
+            by_spawn[user.person, user.spawn].append(index)
+    leads = _Leads(region.graph.lanes)
+    for (person, spawn), group in by_spawn.items():
+        goals = {index: users[index].goal for index in group}
+        ways: dict[int, IntArray] = {}
+        if person:
+            ways = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
+        else:
+            for router in (drivable, region.router):
+                rest = {index: goal for index, goal in goals.items() if index not in ways}
+                ways |= _from_spawn(spawn, rest, bodies, router, leads)
+        for index in group:
+            yield index, ways.get(index, _NOWHERE)
+    for (person, goal), group in by_goal.items():
+        there = (region.walk_router if person else drivable).ways_to(goal)
+        for first in range(0, len(group), TOGETHER):
+            part = group[first : first + TOGETHER]
+            spawns = [users[index].spawn for index in part]
+            begun = [
+                [_Lead((spawn,), 0.0)] if person else leads.of(spawn, bodies[index], drivable.mask)
+                for index, spawn in zip(part, spawns, strict=True)
+            ]
+            yield from zip(part, _to_goal(goal, begun, there), strict=True)
+
+
+class _Lead(NamedTuple):
+    """A way straight on from a spawn: its nodes, from the spawn on, and its length, metres."""
+
+    nodes: tuple[int, ...]
+    metres: float
+
+
+class _Leads:
+    """Ways straight on from spawns, on which no vehicle changes lanes yet."""
+
+    def __init__(self, lanes: LaneGraph) -> None:
+        follows = lanes.relation == Relation.SUCCESSOR  # edges are in the order of their sources
+        self._target, self._length = lanes.target[follows], lanes.length[follows]
+        self._first = np.searchsorted(lanes.source[follows], np.arange(len(lanes.x) + 1))
+
+    def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_Lead]:
+        """Straight ways of somebody who sets off, inside the mask, and last the spawn alone."""
+        least = body.length / 2.0 + LANE_CHANGE
+        found: list[_Lead] = []
+        open_ = [_Lead((spawn,), 0.0)]
+        while open_:
+            lead = open_.pop()
+            if lead.metres >= least:
+                found.append(lead)
+                continue
+            first, end = self._first[lead.nodes[-1] : lead.nodes[-1] + 2].tolist()
+            open_ += [
+                _Lead((*lead.nodes, int(self._target[k])), lead.metres + float(self._length[k]))
+                for k in range(first, end)
+                if mask[self._target[k]]
+            ]
+        return [*found, _Lead((spawn,), 0.0)]
+
+
+def _from_spawn(
+    spawn: int,
+    goals: Mapping[int, int],
+    bodies: Sequence[Body],
+    router: Router,
+    leads: _Leads,
+) -> dict[int, IntArray]:
+    """Ways of the members of a flow, or of one actor, as far as there are any."""
+    if not goals or not router.mask[spawn]:
+        return {}
+    begun = {index: leads.of(spawn, bodies[index], router.mask) for index in goals}
+    ends = {lead.nodes[-1] for mine in begun.values() for lead in mine}
+    metres = {end: router.distances(end) for end in sorted(ends)}
+    chosen = {
+        index: _best(
+            goals[index],
+            [(lead, lead.metres + float(metres[lead.nodes[-1]][goals[index]])) for lead in mine],
+        )
+        for index, mine in begun.items()
+    }
+    ways = {
+        index: _joined(lead, router.path(lead.nodes[-1], goals[index]))
+        for index, lead in sorted(chosen.items(), key=lambda pair: pair[1].nodes[-1])
+    }
+    return {index: way for index, way in ways.items() if len(way)}
+
+
+def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: WaysTo) -> list[IntArray]:
+    """Ways of trips to one goal; empty where there is none."""
+    ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
+    metres = iter(there.distance(ends).tolist())
+    chosen = [
+        _best(goal, [(lead, lead.metres + next(metres)) for lead in leads]) for leads in begun
+    ]
+    paths = there.paths(np.array([lead.nodes[-1] for lead in chosen], dtype=np.int32))
+    return [_joined(lead, path) for lead, path in zip(chosen, paths, strict=True)]
+
+
+def _best(goal: int, leads: Sequence[tuple[_Lead, float]]) -> _Lead:
+    """Lead with the shortest way in all; the last, which is no lead, where no other leads there."""
+    *ahead, (none, _) = leads
+    fit = [pair for pair in ahead if math.isfinite(pair[1]) and goal not in pair[0].nodes]
+    return min(fit, key=lambda pair: pair[1])[0] if fit else none
+
+
+def _joined(lead: _Lead, path: IntArray) -> IntArray:
+    before = np.array(lead.nodes[:-1], dtype=np.int32)
+    return np.concatenate([before, path]) if len(path) else path

@@ -1,0 +1,111 @@
+"""The routes file: vTypes, then vehicles and persons by departure, as deterministic text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+from odscen.base.categories import Category
+from odscen.sumo.realize.driving import number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from odscen.sumo.realize.driving import Driver
+    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.route_planner import Route
+    from odscen.sumo.realize.walk_planner import Walk
+
+
+class RoutesFile:
+    """Collects vehicles and persons; equal vTypes are written once.
+
+    Everybody who departs at 0 is inserted unconditionally: the scenario has checked that bodies do
+    not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of a dense
+    standing crowd. Those who come later wait until SUMO finds room.
+
+    Parameters
+    ----------
+    vehicle_parameters
+        Of every vType of vehicles: key and value.
+    """
+
+    def __init__(self, vehicle_parameters: Sequence[tuple[str, str]] = ()) -> None:
+        self._parameters = vehicle_parameters
+        self._types: dict[tuple[tuple[str, str], ...], str] = {}
+        self._counts: dict[str, int] = {}
+        self._lines: list[tuple[float, str, list[str]]] = []
+
+    def add_vehicle(self, user: RoadUser, driver: Driver, route: Route) -> None:
+        """Add a vehicle that drives ``route``."""
+        attributes = [
+            ("id", user.id),
+            ("type", self._type(user.category.value, driver)),
+            ("depart", number(user.depart)),
+            ("departLane", str(route.depart_lane)),
+            ("departPos", number(route.depart_pos, digits=4)),
+            ("departSpeed", "0"),
+            ("departPosLat", number(route.depart_pos_lat, digits=4)),
+            ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
+            ("arrivalPos", number(route.arrival_pos, digits=4)),
+            ("speedFactor", number(driver.speed_factor, digits=4)),
+        ]
+        if user.depart == 0.0:
+            attributes.append(("insertionChecks", "none"))
+        lines = [
+            f"    <vehicle{_xml(attributes)}>",
+            f'        <route edges="{" ".join(route.edges)}"/>',
+            "    </vehicle>",
+        ]
+        self._lines.append((user.depart, user.id, lines))
+
+    def add_walk(self, user: RoadUser, driver: Driver, walk: Walk) -> None:
+        """Add a person that walks ``walk``."""
+        person = [
+            ("id", user.id),
+            ("type", self._type(user.category.value, driver)),
+            ("depart", number(user.depart)),
+            ("departPos", number(walk.depart_pos, digits=4)),
+        ]
+        stage = [
+            ("edges", " ".join(walk.edges)),
+            ("departPosLat", number(walk.depart_pos_lat, digits=4)),
+            ("arrivalPos", number(walk.arrival_pos, digits=4)),
+        ]
+        lines = [f"    <person{_xml(person)}>", f"        <walk{_xml(stage)}/>", "    </person>"]
+        self._lines.append((user.depart, user.id, lines))
+
+    def to_xml(self) -> str:
+        """Text of ``routes.rou.xml``."""
+        head = [
+            line
+            for attributes, name in self._types.items()
+            for line in self._type_lines(name, attributes)
+        ]
+        body = [line for _, _, lines in sorted(self._lines) for line in lines]
+        return "\n".join(
+            ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>", *head, *body, "</routes>", ""]
+        )
+
+    def _type_lines(self, name: str, attributes: tuple[tuple[str, str], ...]) -> list[str]:
+        start = f'    <vType id="{name}"{_xml(attributes)}'
+        if not self._parameters or name.startswith(f"{Category.PEDESTRIAN}."):
+            return [f"{start}/>"]
+        inside = [
+            f"        <param{_xml([('key', key), ('value', value)])}/>"
+            for key, value in self._parameters
+        ]
+        return [f"{start}>", *inside, "    </vType>"]
+
+    def _type(self, category: str, driver: Driver) -> str:
+        """Name of the vType with these attributes: category and a running number."""
+        name = self._types.get(driver.attributes)
+        if name is None:
+            count = self._counts.get(category, 0)
+            self._counts[category] = count + 1
+            name = self._types[driver.attributes] = f"{category}.{count}"
+        return name
+
+
+def _xml(attributes: Iterable[tuple[str, str]]) -> str:
+    return "".join(f" {name}={quoteattr(value)}" for name, value in attributes)

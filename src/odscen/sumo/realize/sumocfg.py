@@ -1,0 +1,143 @@
+"""The sumocfg: everything a run needs beyond network and routes, so that plain ``sumo -c`` does it.
+
+Paths are relative to the file. What each setting is for is said in ``docs/runs.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
+
+from odscen.sumo.folder.layout import (
+    MEASURES_FILE,
+    NET_FILE,
+    REGION_FILE,
+    ROUTES_FILE,
+    SIGNALS_FILE,
+    SSM_FILE,
+    TRAJECTORIES_FILE,
+    TRIPINFO_FILE,
+)
+from odscen.sumo.outputs.ssm import OPTIONS
+from odscen.sumo.realize.recording import REGION_ID, Recording
+
+SQUEEZE = 120.0
+"""Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
+
+Longer than a red light, at which they stand behind each other for a reason.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How SUMO runs a scenario.
+
+    Attributes
+    ----------
+    until
+        End of the simulation, seconds, if somebody is still under way then.
+    step_length
+        Seconds.
+    seed
+        Of SUMO's own random numbers (dawdling of drivers; speed factors are drawn by us).
+    time_to_teleport
+        Seconds that a vehicle may stand at the head of its lane before SUMO moves it on.
+    elevation
+        Whether the network has heights, so that z is recorded.
+    signals
+        Whether there are programs of traffic lights beside the network's own.
+    recording
+        What is recorded.
+    measures
+        Whether ``measures.add.xml`` is there, which makes SUMO measure lanes.
+    meso
+        Queues on road sections instead of single vehicles that follow each other: for scale.
+    """
+
+    until: float
+    step_length: float
+    seed: int
+    time_to_teleport: float = 300.0
+    elevation: bool = False
+    signals: bool = False
+    recording: Recording = field(default_factory=Recording)
+    measures: bool = False
+    meso: bool = False
+
+
+def sumo_config(settings: RunSettings) -> str:
+    """Text of ``scenario.sumocfg``."""
+    recording = settings.recording
+    inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
+    additional = [SIGNALS_FILE] if settings.signals else []
+    if recording.region is not None:
+        additional.append(REGION_FILE)
+    if settings.measures:
+        additional.append(MEASURES_FILE)
+    if additional:
+        inputs["additional-files"] = ",".join(additional)
+    sections: dict[str, dict[str, str]] = {
+        "input": inputs,
+        "output": _outputs(settings),
+        "time": {
+            "begin": "0",
+            "end": f"{settings.until:g}",
+            "step-length": f"{settings.step_length:g}",
+        },
+        "processing": {
+            "ignore-route-errors": "true",
+            "collision.action": "warn",
+            "collision.mingap-factor": "0",
+            "collision.check-junctions": "true",
+            "intermodal-collision.action": "warn",
+            "pedestrian.model": "striping",
+            "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
+            "time-to-teleport": f"{settings.time_to_teleport:g}",
+        },
+        "random_number": {"seed": str(settings.seed)},
+        "report": {
+            "aggregate-warnings": "20",
+            "duration-log.disable": "true",
+            "no-step-log": "true",
+            "xml-validation": "never",
+        },
+    }
+    if recording.criticality:
+        sections["ssm_device"] = {**OPTIONS, "device.ssm.file": SSM_FILE}
+    if settings.meso:
+        sections["mesoscopic"] = {
+            "mesosim": "true",
+            "meso-junction-control": "true",
+            "meso-interpolate-pos": "true",
+        }
+        # The striping model needs lanes with places on them, which meso does not keep.
+        sections["processing"]["pedestrian.model"] = "nonInteracting"
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
+    for section, options in sections.items():
+        lines.append(f"    <{section}>")
+        lines.extend(
+            f"        <{name} value={quoteattr(value)}/>" for name, value in options.items()
+        )
+        lines.append(f"    </{section}>")
+    return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"
+
+
+def _outputs(settings: RunSettings) -> dict[str, str]:
+    recording = settings.recording
+    trips = {
+        "tripinfo-output": TRIPINFO_FILE,
+        "tripinfo-output.write-unfinished": "true",
+        "precision": "4",
+    }
+    if not recording.trajectories:
+        return trips
+    outputs = {
+        "fcd-output": TRAJECTORIES_FILE,
+        "fcd-output.attributes": ",".join(recording.attributes(elevation=settings.elevation)),
+        "fcd-output.skip-empty": "true",
+    }
+    if recording.every is not None:
+        outputs["device.fcd.period"] = f"{recording.every:g}"
+    if recording.region is not None:
+        outputs["fcd-output.filter-shapes"] = REGION_ID
+    return {**outputs, **trips}

@@ -1,0 +1,89 @@
+"""What SUMO can use of a map, so that sampled actors can be run as they are placed."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.lanegraph.graphs import Relation
+from odscen.scenario.placing.supply import Usable
+from odscen.sumo.realize.road_net import PEDESTRIAN
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.graphs import BoolArray, LaneGraph
+    from odscen.sumo.realize.road_net import RoadNetLane
+    from odscen.sumo.realize.route_planner import NodePositions
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+DEVIATION = 0.05
+"""Metres between OpenDRIVE and SUMO lane centre, at most, where a body is placed."""
+
+REACH = 6.0
+"""Metres before and behind a spawn where that holds too: half a bus."""
+
+
+@lru_cache(maxsize=4)
+def usable_places(sumo_map: SumoMap) -> Usable:
+    """Nodes that sampling may use for a run in SUMO.
+
+    - *spawnable*: the SUMO lane exists, motor vehicles may use it, and its centre is within
+      :data:`DEVIATION` of the OpenDRIVE lane's, there and :data:`REACH` ahead and behind along
+      every way on or off (SUMO lays the rear of a body on a lane of its own choice);
+    - *drivable*: the lane exists in SUMO, somewhere along it at least;
+    - *walkable*: the place is on the lane of its edge that pedestrians use, outside junctions,
+      within :data:`DEVIATION`.
+    """
+    graph = sumo_map.graph
+    lanes, walks = graph.lanes, graph.walks
+    admitted = _admitted(sumo_map, sumo_map.lane_places, "passenger")
+    exact = admitted & _near(sumo_map.lane_places) & ~_at_dead_end(sumo_map, sumo_map.lane_places)
+    reach = int(np.ceil(REACH / lanes.spacing))
+    walked = np.array(
+        [
+            not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
+            for lane in _lanes(sumo_map, sumo_map.walk_places)
+        ],
+        dtype=np.bool_,
+    )
+    on_foot = _admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
+    on_foot &= walked[sumo_map.walk_places.lane] & _near(sumo_map.walk_places)
+    return Usable(
+        spawnable=_all_around(exact, lanes, reach),
+        drivable=sumo_map.drivable,
+        walkable=on_foot & ~walks.roadside[walks.lane],
+    )
+
+
+def _lanes(sumo_map: SumoMap, places: NodePositions) -> list[RoadNetLane]:
+    return [sumo_map.net.lanes[name] for name in places.lanes]
+
+
+def _admitted(sumo_map: SumoMap, places: NodePositions, vclass: str) -> BoolArray:
+    """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
+    allowed = np.array([lane.allows(vclass) for lane in _lanes(sumo_map, places)], dtype=np.bool_)
+    return (places.lane >= 0) & allowed[places.lane]
+
+
+def _at_dead_end(sumo_map: SumoMap, places: NodePositions) -> BoolArray:
+    """Nodes close to the end of a SUMO lane without links: a front could not reach over it."""
+    lanes = _lanes(sumo_map, places)
+    dead = np.array([not sumo_map.net.links_from.get(lane.id) for lane in lanes], dtype=np.bool_)
+    length = np.array([lane.length for lane in lanes])
+    return dead[places.lane] & (places.pos > length[places.lane] - REACH)
+
+
+def _near(places: NodePositions) -> BoolArray:
+    return np.less_equal(places.deviation, DEVIATION)  # false for NaN
+
+
+def _all_around(good: BoolArray, lanes: LaneGraph, steps: int) -> BoolArray:
+    """Nodes that are good, with everything up to ``steps`` successors or predecessors away."""
+    follows = lanes.relation == Relation.SUCCESSOR
+    source, target = lanes.source[follows], lanes.target[follows]
+    ahead, behind = good.copy(), good.copy()
+    for _ in range(steps):
+        ahead[source[~ahead[target]]] = False
+        behind[target[~behind[source]]] = False
+    return ahead & behind

@@ -1,0 +1,1 @@
+"""Processes of runs, from outside: started, followed, resumed."""

@@ -1,0 +1,181 @@
+"""The runner's side of a run in lockstep: each state as values, and the word to go on."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.base.categories import Category
+from odscen.base.frames import SumoPose
+from odscen.sumo.worker.lockstep import COLUMNS
+from odscen.sumo.worker.protocol import Command, EgoPose, Lockstep, State, encode
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.runner.elevation import ElevationLookup
+    from odscen.sumo.worker.protocol import Message
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """Everyone after one step; body centres in the OpenDRIVE frame, arrays of shape ``(N,)``.
+
+    Attributes
+    ----------
+    time
+        Simulated seconds at which the step began, as in the recorded trajectories.
+    index
+        Row of the plan, each at most once.
+    x, y, z, hdg, pitch
+        Metres and radians; z is the ground below the centre, pitch its slope, positive uphill.
+    speed
+        m/s.
+    signals
+        SUMO's bits, see :class:`~odscen.sumo.worker.snapshots.Signal`.
+    lights
+        State of every traffic light by SUMO id.
+    departed, arrived
+        Road users so far.
+    incidents
+        New events but departures and arrivals, as in ``events.json``.
+    """
+
+    time: float
+    index: NDArray[np.int64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    z: NDArray[np.float64]
+    hdg: NDArray[np.float64]
+    pitch: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    signals: NDArray[np.int64]
+    lights: Mapping[str, str] = field(default_factory=dict)
+    departed: int = 0
+    arrived: int = 0
+    incidents: Sequence[Mapping[str, Any]] = ()
+
+
+class InStep:
+    """A companion of a run that is called after each step.
+
+    Parameters
+    ----------
+    on_step
+        Called with each step; returns where the vehicle driven from outside is before the next
+        step, if there is one. May call :meth:`stop`; must not raise.
+    placed
+        Row in the plan of the vehicle that is driven from outside.
+
+    Notes
+    -----
+    Without such a vehicle SUMO makes its next step while ``on_step`` works on the last one.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        ground: ElevationLookup,
+        on_step: Callable[[Step], EgoPose | None],
+        *,
+        placed: int | None = None,
+    ) -> None:
+        self._plan = plan
+        self._ground = ground
+        self._on_step = on_step
+        self._placed = placed
+        self._lengths = np.array([actor.length for actor in plan.actors])
+        self._z = np.array([actor.z for actor in plan.actors])
+        self._walks = np.array([actor.category == Category.PEDESTRIAN for actor in plan.actors])
+        self._lanes: list[str] = []
+        self._lights: dict[str, str] = {}
+        self._stdin: IO[bytes] | None = None
+        self._stopped = False
+
+    @property
+    def start(self) -> Lockstep:
+        """How the worker is to go."""
+        return Lockstep(-1 if self._placed is None else self._placed)
+
+    def attach(self, process: subprocess.Popen[bytes]) -> None:
+        """Let the worker make its first step."""
+        self._stdin = process.stdin
+        self._say(Command("step"))
+
+    def take(self, message: Message, payload: bytes) -> None:
+        """Work on a step."""
+        if not isinstance(message, State):
+            return
+        if self._placed is None and not self._stopped:
+            self._say(Command("step"))
+        step = self._step(message, payload)
+        if self._stopped:
+            return
+        driven = self._on_step(step)
+        if driven is not None:
+            self._say(driven)
+        if self._placed is not None and not self._stopped:
+            self._say(Command("step"))
+
+    def detach(self) -> None:
+        """Close the way to the worker, which has ended."""
+        if self._stdin is not None:
+            with suppress(OSError):
+                self._stdin.close()
+        self._stdin = None
+
+    def stop(self) -> None:
+        """End the run; its results so far are written."""
+        if not self._stopped:
+            self._stopped = True
+            self._say(Command("stop"))
+
+    def _say(self, command: Command | EgoPose) -> None:
+        if self._stdin is None:
+            return
+        with suppress(OSError, ValueError):  # the worker has just ended
+            self._stdin.write(encode(command).encode())
+            self._stdin.flush()
+
+    def _step(self, state: State, payload: bytes) -> Step:
+        self._lanes += state.lanes
+        self._lights |= state.lights
+        rows = np.frombuffer(payload, dtype="<f8").reshape(-1, COLUMNS)
+        index = rows[:, 0].astype(np.int64)
+        lane, pos = rows[:, 6].astype(np.int64), rows[:, 7]
+        near = self._z[index]
+        for row, (number, along) in enumerate(zip(lane.tolist(), pos.tolist(), strict=True)):
+            known = self._ground.height(self._lanes[number], along) if number >= 0 else None
+            if known is not None:
+                near[row] = known
+        pose = self._ground.centres(
+            SumoPose(rows[:, 1], rows[:, 2], 0.0, rows[:, 3]),
+            self._lengths[index],
+            self._plan.net_offset,
+            near,
+            self._walks[index],
+        )
+        x, y, z, hdg, pitch = (np.asarray(part, dtype=np.float64) for part in pose)
+        self._z[index] = z
+        return Step(
+            time=state.time,
+            index=index,
+            x=x,
+            y=y,
+            z=z,
+            hdg=hdg,
+            pitch=pitch,
+            speed=rows[:, 4],
+            signals=rows[:, 5].astype(np.int64),
+            lights=dict(self._lights),
+            departed=state.departed,
+            arrived=state.arrived,
+            incidents=state.incidents,
+        )

@@ -1,0 +1,249 @@
+"""Runs in slices, from the runner's side: a folder that is there from the start, and resuming.
+
+While such a run goes on its folder has ``status.json`` and no ``summary.json``; when it has ended
+it is like any other. Whatever ends it before its time (Ctrl-C, ``kill -9``, a full disk, power),
+:func:`resume` goes on from the last complete slice and ends with the same results.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.atomic_folders import new_folder
+from odscen.base.errors import ConflictError, InputError, NotFoundError, WorkspaceError
+from odscen.results.measures.expectations import parse_expectation
+from odscen.results.measures.summary import summary_to_json
+from odscen.results.records.run_records import Plan
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.checkpoint import (
+    clear_parts,
+    last_number,
+    read_checkpoint,
+    survey,
+    write_whole,
+)
+from odscen.sumo.folder.run_status import locked, read_status, write_status
+from odscen.sumo.runner.run_folder import (
+    PreparedRun,
+    RunResult,
+    found_files,
+    make_summary,
+    write_run_folder,
+)
+from odscen.sumo.runner.worker_process import run_worker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from odscen.results.measures.expectations import Expectation
+    from odscen.sumo.runner.worker_process import Companion
+    from odscen.sumo.worker.protocol import OnProgress
+
+FORMAT = "odscen-run-settings"
+VERSION = 1
+
+
+def run_long(
+    prepared: PreparedRun,
+    out: Path,
+    *,
+    expectations: Sequence[Expectation] = (),
+    progress: OnProgress | None = None,
+    time_limit: float | None = None,
+    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    live: Companion | None = None,
+) -> RunResult:
+    """Run in slices in a new folder ``out``, which is there while it goes on.
+
+    Parameters as in :func:`odscen.sumo.runner.run_jobs.run_prepared`.
+
+    Raises
+    ------
+    WorkspaceError
+        If the folder cannot be written.
+    """
+    with _told(out):
+        with new_folder(out) as folder:
+            write_run_folder(prepared, folder)
+            _write_settings(prepared, folder, expectations)
+            write_status(folder, prepared.plan, None)
+        with locked(out) as lock:
+            return _go_on(prepared, out, lock, expectations, progress, time_limit, finish, live)
+
+
+def resume(
+    folder: Path,
+    *,
+    progress: OnProgress | None = None,
+    tell: Callable[[str], None] | None = None,
+    time_limit: float | None = None,
+    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    live: Companion | None = None,
+) -> RunResult:
+    """Go on with an interrupted run from its last complete slice.
+
+    Parameters
+    ----------
+    tell
+        Called with what the user should know: where it goes on, and which slices are damaged.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no run here.
+    ConflictError
+        If it has ended already, or is going on.
+    """
+    if read_status(folder) is None:
+        if (folder / layout.SUMMARY_FILE).is_file():
+            msg = f"run {folder.name!r} has ended; there is nothing to resume"
+            raise ConflictError(msg)
+        what = "interrupted run"
+        raise NotFoundError(what, folder.name, interrupted(folder.parent))
+    with _told(folder), locked(folder) as lock:
+        prepared, expectations = _restore(folder)
+        number, problems = survey(folder)
+        if tell is not None:
+            for problem in problems:
+                tell(problem)
+            begin = read_checkpoint(folder, number).time if number else 0.0
+            tell(f"going on at {begin:g} s, after slice {number}" if number else "begins anew")
+        (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
+        return _go_on(prepared, folder, lock, expectations, progress, time_limit, finish, live)
+
+
+def refuse_interrupted(out: Path) -> None:
+    """Refuse to replace a run that can be resumed: hours may be in it.
+
+    Raises
+    ------
+    ConflictError
+        If there is one in ``out``, or one that is going on.
+    """
+    status = read_status(out)
+    if status is not None:
+        msg = (
+            f"run {out.name!r} has not ended (it is at {status.get('time', 0):g} s); "
+            f"odscen resume {out} goes on with it; delete the folder to begin anew"
+        )
+        raise ConflictError(msg)
+
+
+def interrupted(runs: Path) -> list[str]:
+    """Names of the runs in a folder that have not ended, sorted."""
+    if not runs.is_dir():
+        return []
+    return sorted(path.name for path in runs.iterdir() if read_status(path) is not None)
+
+
+def about(folder: Path) -> dict[str, Any]:
+    """What a run that has not ended will say of itself, for example its map; empty if unknown."""
+    try:
+        settings = json.loads((folder / layout.SETTINGS_FILE).read_text(encoding="utf-8"))
+        return dict(settings["about"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def _go_on(
+    prepared: PreparedRun,
+    folder: Path,
+    lock: int,
+    expectations: Sequence[Expectation],
+    progress: OnProgress | None,
+    time_limit: float | None,
+    finish: Callable[[Path, Mapping[str, Any]], None] | None,
+    live: Companion | None,
+) -> RunResult:
+    ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live, keep=(lock,))
+    clear_parts(folder)  # a torn one takes room that what follows may need
+    summary = make_summary(prepared, folder, ended, expectations)
+    summary["slices"] = _slices(folder)
+    if ended.done is None:
+        kept = summary["slices"]["time"]
+        summary["error"] = (
+            f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
+            f"to go on from there: odscen resume {folder}"
+        )
+    elif finish is not None:
+        finish(folder, summary)
+    summary["files"] = found_files(folder)
+    write_whole(folder / layout.SUMMARY_FILE, summary_to_json(summary))
+    if ended.done is not None:
+        _clear(folder)
+    return RunResult(folder, summary)
+
+
+def _slices(folder: Path) -> dict[str, Any]:
+    """What ``summary.json`` says of the slices: each one's end, and what it took."""
+    done = [read_checkpoint(folder, n) for n in range(1, last_number(folder) + 1)]
+    return {
+        "time": done[-1].time if done else 0.0,
+        "done": [
+            {
+                "time": one.time,
+                "running": one.running,
+                "steps": one.steps,
+                "wall_seconds": round(one.wall_seconds, 3),
+                "memory_mb": round(one.memory / 1e6, 1),
+            }
+            for one in done
+        ],
+    }
+
+
+def _clear(folder: Path) -> None:
+    """Remove what was there only to go on from; the run has ended."""
+    (folder / layout.STATUS_FILE).unlink(missing_ok=True)
+    (folder / layout.SETTINGS_FILE).unlink(missing_ok=True)
+    shutil.rmtree(folder / layout.SLICES_FOLDER, ignore_errors=True)
+    (folder / layout.LOCK_FILE).unlink(missing_ok=True)
+
+
+def _write_settings(
+    prepared: PreparedRun, folder: Path, expectations: Sequence[Expectation]
+) -> None:
+    settings = {
+        "format": FORMAT,
+        "version": VERSION,
+        "problems": list(prepared.problems),
+        "notes": list(prepared.notes),
+        "about": dict(prepared.about),
+        "expectations": [one.text for one in expectations],
+    }
+    text = json.dumps(settings, indent=2, ensure_ascii=False) + "\n"
+    (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
+
+
+def _restore(folder: Path) -> tuple[PreparedRun, tuple[Expectation, ...]]:
+    path = folder / layout.SETTINGS_FILE
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if (data["format"], data["version"]) != (FORMAT, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a run to resume"
+            raise InputError(msg, file=str(path))
+        prepared = PreparedRun(
+            plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
+            sumo_files={},
+            net=folder / layout.SUMO_FOLDER / layout.NET_FILE,
+            problems=tuple(data["problems"]),
+            notes=tuple(data["notes"]),
+            about=data["about"],
+        )
+        return prepared, tuple(parse_expectation(text) for text in data["expectations"])
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        msg = f"cannot be resumed: {error!r}"
+        raise InputError(msg, file=str(path)) from error
+
+
+@contextmanager
+def _told(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        msg = f"run folder {folder}: {error.strerror or error} ({error.filename or ''})"
+        raise WorkspaceError(msg) from error

@@ -1,0 +1,237 @@
+"""What a run folder holds: what a run is made of, and what is left of it when it has ended."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Literal
+
+from odscen import __version__
+from odscen.results.measures.expectations import COUNTS, evaluate
+from odscen.results.measures.gridlock import find_trouble, trouble_summary
+from odscen.results.measures.summary import actor_counts, actors_from_json, key_figures
+from odscen.results.measures.traffic import TABLES
+from odscen.results.records.run_records import events_from_json, rounded
+from odscen.sumo.folder import layout
+from odscen.sumo.outputs.measured import write_figures
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from odscen.results.measures.expectations import Expectation
+    from odscen.results.measures.lane_places import LanePlaces
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.realize.forecast import Forecast
+    from odscen.sumo.runner.worker_process import Ended
+
+RunStatus = Literal["completed", "failed"]
+
+FORMAT = "odscen-run"
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedRun:
+    """Everything that a run is made of; nothing on disk yet but the network.
+
+    Attributes
+    ----------
+    plan
+        What is to happen, actor by actor.
+    sumo_files
+        Text by file name: routes, configuration and perhaps signals, from
+        :func:`odscen.sumo.realize.realization.realize`.
+    net
+        SUMO network file of the map.
+    scenario_json
+        The scenario document, kept in the run folder.
+    problems, notes
+        What could not be realized, and which routes had to be repaired, in words.
+    about
+        Further fields of the summary, for example the map's name and hash.
+    expected
+        What it will need on disk and in memory.
+    places
+        Where each lane lies; figures of traffic by place need them.
+    """
+
+    plan: Plan
+    sumo_files: Mapping[str, str]
+    net: Path
+    scenario_json: str | None = None
+    problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+    expected: Forecast | None = None
+    places: LanePlaces | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """A finished run: its folder, and ``summary`` as in ``summary.json``."""
+
+    folder: Path
+    summary: Mapping[str, Any]
+
+    @property
+    def status(self) -> RunStatus:
+        """``completed`` if the simulation ended by itself, whatever became of the actors."""
+        status: RunStatus = self.summary["status"]
+        return status
+
+    @property
+    def expectations_met(self) -> bool:
+        """Whether every expectation has passed; true if there is none."""
+        return all(verdict["passed"] for verdict in self.summary["expectations"])
+
+    @property
+    def exit_code(self) -> int:
+        """0 completed, 1 completed with failed expectations, 3 failed."""
+        if self.status == "failed":
+            return 3
+        return 0 if self.expectations_met else 1
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the summary with the folder and absolute paths of its files."""
+        files = {name: str(self.folder / file) for name, file in self.summary["files"].items()}
+        return {**self.summary, "folder": str(self.folder), "files": files}
+
+
+def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
+    """Write what a run starts from: the scenario, the plan, and the SUMO files."""
+    if prepared.scenario_json is not None:
+        (folder / layout.SCENARIO_FILE).write_text(prepared.scenario_json, encoding="utf-8")
+    (folder / layout.PLAN_FILE).write_text(prepared.plan.to_json(), encoding="utf-8")
+    if prepared.places is not None:
+        (folder / layout.LANE_PLACES_FILE).write_text(prepared.places.to_json(), encoding="utf-8")
+    sumo = folder / layout.SUMO_FOLDER
+    sumo.mkdir()
+    write_sumo_files(prepared.sumo_files, prepared.net, sumo, link=True)
+
+
+def write_sumo_files(files: Mapping[str, str], net: Path, folder: Path, *, link: bool) -> None:
+    """Write the SUMO files and the network into ``folder``.
+
+    With ``link`` the network is a hard link where the file system has them: many runs on one map
+    then hold it once. What a user takes away should be a copy.
+    """
+    for name, text in sorted(files.items()):
+        (folder / name).write_text(text, encoding="utf-8")
+    target = folder / layout.NET_FILE
+    if link:
+        try:
+            os.link(net, target)
+        except OSError:
+            pass
+        else:
+            return
+    shutil.copyfile(net, target)
+
+
+def make_summary(
+    prepared: PreparedRun, folder: Path, ended: Ended, expectations: Sequence[Expectation]
+) -> dict[str, Any]:
+    """What ``summary.json`` says of a run that has ended, well or badly."""
+    plan, done = prepared.plan, ended.done
+    # A long run may have been in the hands of several processes.
+    wall_seconds = done.wall_seconds if done and plan.slice_length else ended.wall_seconds
+    summary: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "status": "completed" if done else "failed",
+        "error": ended.error,
+        "stopped": bool(done and done.stopped),
+        "scenario": plan.scenario,
+        **prepared.about,
+        "seed": plan.seed,
+        "until": plan.until,
+        "step_length": plan.step_length,
+        "sim_seconds": done.sim_seconds if done else None,
+        "steps": done.steps if done else None,
+        "wall_seconds": round(wall_seconds, 3),
+        "real_time_factor": round(done.sim_seconds / wall_seconds, 2) if done else None,
+        "actors": dict.fromkeys(COUNTS) | {"planned": len(plan.actors)},
+        "insertion_error_max": None,
+        "figures": {},
+        "gridlock": None,
+    }
+    if done:
+        text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
+        outcomes = actors_from_json(text)
+        meso = bool(prepared.about.get("meso"))
+        traffic = write_figures(folder, end=done.sim_seconds, meso=meso)
+        figures = key_figures(outcomes) | rounded(traffic)
+        summary["actors"] = actor_counts(outcomes)
+        summary["insertion_error_max"] = figures["insertion_error_max"]
+        summary["figures"] = figures
+        text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
+        events = events_from_json(text)
+        trouble = find_trouble(plan, outcomes, events, end=done.sim_seconds)
+        summary["gridlock"] = trouble_summary(trouble)
+    summary["expectations"] = [
+        {"expectation": v.expectation, "value": v.value, "passed": v.passed}
+        for v in evaluate(expectations, summary)
+    ]
+    summary["problems"] = list(prepared.problems)
+    summary["notes"] = list(prepared.notes)
+    summary["files"] = found_files(folder)
+    summary["versions"] = {
+        "odscen": __version__,
+        "sumo": version("libsumo"),
+        "python": ".".join(map(str, sys.version_info[:3])),
+    }
+    return summary
+
+
+def drop_torn_records(folder: Path) -> None:
+    """Remove Parquet files without their end, and what SUMO wrote that was not made into tables.
+
+    A killed run leaves them, and nothing can read them.
+    """
+    for name in (layout.LANES_FILE, layout.EMISSIONS_FILE, layout.TRIPINFO_FILE, layout.SSM_FILE):
+        (folder / name).unlink(missing_ok=True)
+    file = folder / layout.TRAJECTORIES_FILE
+    if not file.is_file():
+        return
+    with file.open("rb") as opened:
+        opened.seek(max(0, file.stat().st_size - 4))
+        whole = opened.read() == b"PAR1"
+    if not whole:
+        file.unlink()
+
+
+def found_files(folder: Path) -> dict[str, str]:
+    """Files of a run by what they are, relative to its folder; only those that are there."""
+    sumo = layout.SUMO_FOLDER
+    names = {
+        "scenario": layout.SCENARIO_FILE,
+        "plan": layout.PLAN_FILE,
+        "net": f"{sumo}/{layout.NET_FILE}",
+        "routes": f"{sumo}/{layout.ROUTES_FILE}",
+        "signals": f"{sumo}/{layout.SIGNALS_FILE}",
+        "measures": f"{sumo}/{layout.MEASURES_FILE}",
+        "config": f"{sumo}/{layout.CONFIG_FILE}",
+        "trajectories": layout.TRAJECTORIES_FILE,
+        "trajectory_parts": layout.TRAJECTORIES_FOLDER,
+        "lanes": layout.LANES_FILE,
+        "lane_parts": layout.LANES_FOLDER,
+        "trips": layout.TRIPS_FILE,
+        "trip_parts": layout.TRIPS_FOLDER,
+        "conflicts": layout.CONFLICTS_FILE,
+        "conflict_parts": layout.CONFLICTS_FOLDER,
+        "lane_places": layout.LANE_PLACES_FILE,
+        "figures": layout.FIGURES_FILE,
+        **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},
+        "events": layout.EVENTS_FILE,
+        "actors": layout.ACTORS_FILE,
+        "report": layout.REPORT_FILE,
+        "parity": layout.PARITY_FILE,
+        "parity_figures": layout.PARITY_FIGURES_FILE,
+        "log": layout.LOG_FILE,
+    }
+    found = {key: name for key, name in names.items() if (folder / name).exists()}
+    return {**found, "summary": layout.SUMMARY_FILE}

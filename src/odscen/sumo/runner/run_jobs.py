@@ -1,0 +1,195 @@
+"""Runs: from a prepared scenario to a finished run folder, one process per run.
+
+A run folder appears whole or not at all: it is made beside its final place and renamed when the run
+has ended, well or badly. A failed run is a folder too, with status ``failed``, the reason and the
+log; nothing that goes wrong inside SUMO raises here.
+"""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.atomic_folders import new_folder
+from odscen.base.errors import WorkspaceError
+from odscen.results.measures.summary import summary_to_json
+from odscen.sumo.folder import layout
+from odscen.sumo.realize.forecast import refuse_without_room
+from odscen.sumo.runner.long_runs import refuse_interrupted, run_long
+from odscen.sumo.runner.run_folder import (
+    PreparedRun,
+    RunResult,
+    drop_torn_records,
+    found_files,
+    make_summary,
+    write_run_folder,
+    write_sumo_files,
+)
+from odscen.sumo.runner.worker_process import run_worker
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from concurrent.futures import Future
+    from pathlib import Path
+
+    from odscen.results.measures.expectations import Expectation
+    from odscen.sumo.runner.worker_process import Companion, Ended
+    from odscen.sumo.worker.protocol import OnProgress, Progress
+
+__all__ = ["PreparedRun", "RunJob", "RunResult", "run_many", "run_prepared", "write_sumo_files"]
+
+
+def run_prepared(
+    prepared: PreparedRun,
+    out: Path,
+    *,
+    expectations: Sequence[Expectation] = (),
+    progress: OnProgress | None = None,
+    time_limit: float | None = None,
+    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    live: Companion | None = None,
+    tell: Callable[[str], None] | None = None,
+    simulate: Callable[[Path], Ended] | None = None,
+) -> RunResult:
+    """Run in a new folder ``out``; whatever was there is replaced.
+
+    A run in slices is there while it goes on, see :mod:`odscen.sumo.runner.long_runs`.
+
+    Parameters
+    ----------
+    progress
+        Called in this thread, a few times a second.
+    time_limit
+        Wall seconds after which the run is stopped and has failed.
+    finish
+        Called with the folder and the summary when a run has completed, before the folder appears:
+        the place to add a report.
+    live
+        Makes it a run that can be watched and steered, or that goes in step with another.
+    tell
+        Called with what the user should know before a long run.
+    simulate
+        Runs what is in a folder and writes the results there, instead of SUMO's worker.
+
+    Raises
+    ------
+    WorkspaceError
+        If the folder cannot be written, or the disk cannot hold the run.
+    ConflictError
+        If a run that has not ended is in ``out``.
+    """
+    refuse_interrupted(out)
+    if prepared.expected is not None:
+        refuse_without_room(prepared.expected, out)
+    if prepared.plan.slice_length is not None:
+        if tell is not None and prepared.expected is not None:
+            tell(f"{out.name}: {prepared.expected}")
+        return run_long(
+            prepared,
+            out,
+            expectations=expectations,
+            progress=progress,
+            time_limit=time_limit,
+            finish=finish,
+            live=live,
+        )
+    try:
+        with new_folder(out) as folder:
+            write_run_folder(prepared, folder)
+            if simulate is None:
+                ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+            else:
+                ended = simulate(folder)
+            if ended.done is None:
+                drop_torn_records(folder)
+            summary = make_summary(prepared, folder, ended, expectations)
+            if finish is not None and ended.done is not None:
+                finish(folder, summary)
+                summary["files"] = found_files(folder)
+            (folder / layout.SUMMARY_FILE).write_text(summary_to_json(summary), encoding="utf-8")
+    except OSError as error:
+        msg = f"run folder {out}: {error.strerror or error} ({error.filename or ''})"
+        raise WorkspaceError(msg) from error
+    return RunResult(out, summary)
+
+
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks for Ctrl-C."""
+
+
+class _StoppedError(Exception):
+    """Another run of the same call has failed to start, or the user has interrupted."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunJob:
+    """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder."""
+
+    name: str
+    prepare: Callable[[], PreparedRun]
+    out: Path
+
+
+def run_many(
+    jobs: Sequence[RunJob],
+    *,
+    processes: int = 1,
+    expectations: Sequence[Expectation] = (),
+    progress: Callable[[RunJob, Progress], None] | None = None,
+    done: Callable[[RunJob, RunResult], None] | None = None,
+    time_limit: float | None = None,
+    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> tuple[RunResult, ...]:
+    """Run several scenarios, ``processes`` at a time; results in the order of ``jobs``.
+
+    ``progress`` and ``done`` are called from the threads that wait for the processes, ``done`` in
+    the order in which runs end. An error in preparing a run ends all of it: scenarios are checked
+    before they are run.
+    """
+    stopping = threading.Event()
+
+    def one(job: RunJob) -> RunResult:
+        def follow(message: Progress) -> None:
+            if stopping.is_set():  # ends this worker process too
+                raise _StoppedError
+            if progress is not None:
+                progress(job, message)
+
+        result = run_prepared(
+            job.prepare(),
+            job.out,
+            expectations=expectations,
+            progress=follow,
+            time_limit=time_limit,
+            finish=finish,
+            tell=tell,
+        )
+        if done is not None:
+            done(job, result)
+        return result
+
+    with ThreadPoolExecutor(max_workers=max(1, processes)) as pool:
+        futures = [pool.submit(one, job) for job in jobs]
+        try:
+            _wait(futures)
+            return tuple(future.result() for future in futures)
+        except BaseException:
+            stopping.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _wait(futures: Sequence[Future[RunResult]]) -> None:
+    """Wait until all have ended, or raise what the first of them raises.
+
+    Polars has system calls go on after Ctrl-C (https://github.com/pola-rs/polars/issues/21739): a
+    wait without a timeout would hear of it when it is over.
+    """
+    running = set(futures)
+    while running:
+        ended, running = wait(running, timeout=_LISTEN, return_when=FIRST_EXCEPTION)
+        for future in ended:
+            future.result()

@@ -1,0 +1,221 @@
+"""Start the worker process in a prepared run folder and follow it to its end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from odscen.sumo.folder.layout import LOG_FILE, PLAN_FILE
+from odscen.sumo.runner.allocator import fast_allocator
+from odscen.sumo.worker.protocol import (
+    Command,
+    Done,
+    EgoPose,
+    Failed,
+    FrameMessage,
+    Progress,
+    ShotMessage,
+    State,
+    decode,
+    encode,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from odscen.sumo.worker.protocol import Lockstep, Message, OnProgress, Pace
+
+WORKER = "odscen.sumo.worker.simulate"
+
+
+class Companion(Protocol):
+    """Who goes with a run while it lasts: a watcher, or another simulator in step with it.
+
+    Methods are called in the thread that follows the worker.
+    """
+
+    @property
+    def start(self) -> Pace | Lockstep:
+        """How the worker is to go."""
+
+    def attach(self, process: subprocess.Popen[bytes]) -> None:
+        """Connect with a worker that has just been started with a pipe as its stdin."""
+
+    def take(self, message: Message, payload: bytes) -> None:
+        """Take in what the worker says."""
+
+    def detach(self) -> None:
+        """Learn that the worker has ended, however it did."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a worker process ended.
+
+    Attributes
+    ----------
+    done
+        What it reported at its end; ``None`` if the run failed.
+    wall_seconds
+        From starting the process to its end.
+    error
+        Why it failed, with SUMO's own words where it said any.
+    """
+
+    done: Done | None
+    wall_seconds: float
+    error: str | None
+
+
+def run_worker(
+    folder: Path,
+    *,
+    progress: OnProgress | None = None,
+    time_limit: float | None = None,
+    live: Companion | None = None,
+    keep: tuple[int, ...] = (),
+) -> Ended:
+    """Run the simulation prepared in ``folder``.
+
+    Never raises for what happens inside the process: a crash, an error of SUMO's or running out of
+    time are described in the result.
+
+    Parameters
+    ----------
+    folder
+        Holds ``plan.json`` and ``sumo/``.
+    progress
+        Called with each progress message, in this thread.
+    time_limit
+        Wall seconds after which the process is killed.
+    live
+        Makes it a run that can be watched and steered, or that goes in step with another.
+    keep
+        File descriptors that the process inherits.
+    """
+    start = time.perf_counter()
+    command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
+    if live is not None:
+        command.append(encode(live.start))
+    late = threading.Event()
+    # Python's own words (a traceback before the worker has opened its log) belong in the log too.
+    with (
+        (folder / LOG_FILE).open("ab") as log,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL if live is None else subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
+            # a failed run, and the folder of a run that was called off would appear.
+            start_new_session=True,
+            env={**_surroundings(), **os.environ},
+            pass_fds=keep,
+        ) as process,
+    ):
+        timer = _kill_after(process, time_limit, late)
+        try:
+            last = _follow(process, progress, live)
+        except BaseException:  # an interrupt, or the caller's progress function
+            _kill(process)
+            raise
+        finally:
+            if timer is not None:
+                timer.cancel()
+            if live is not None:
+                live.detach()
+    seconds = time.perf_counter() - start
+    if isinstance(last, Done) and process.returncode == 0:
+        return Ended(last, seconds, None)
+    if late.is_set():
+        return Ended(None, seconds, f"stopped after the time limit of {time_limit:g} s")
+    reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
+    words = sumo_words(folder)
+    return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
+
+
+def _surroundings() -> dict[str, str]:
+    """Environment of the worker where the user's own does not say otherwise."""
+    # One thread simulates; those that NumPy would start only wait, and burn time in doing so.
+    variables = {"OPENBLAS_NUM_THREADS": "1"}
+    allocator = fast_allocator()
+    if allocator is not None:
+        variables["LD_PRELOAD"] = allocator
+    return variables
+
+
+def _follow(
+    process: subprocess.Popen[bytes], progress: OnProgress | None, live: Companion | None
+) -> Done | Failed | None:
+    """Pass on what the worker says; return the last thing it said of its end."""
+    last: Done | Failed | None = None
+    if live is not None:
+        live.attach(process)
+    for message, payload in messages(process):
+        if live is not None:
+            live.take(message, payload)
+        if isinstance(message, Progress) and progress is not None:
+            progress(message)
+        elif isinstance(message, Done | Failed):
+            last = message
+    return last
+
+
+def messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]]:
+    """Yield what the worker says, each message with the bytes that belong to it."""
+    if process.stdout is None:
+        return
+    for line in process.stdout:
+        message = decode(line)
+        if message is None or isinstance(message, Command | EgoPose):
+            continue
+        size = message.size if isinstance(message, FrameMessage | State | ShotMessage) else 0
+        yield message, process.stdout.read(size)
+
+
+def sumo_words(folder: Path, *, lines: int = 12) -> str:
+    """SUMO's error messages in a run's log, else its last lines."""
+    try:
+        text = (folder / LOG_FILE).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    said = [line.rstrip() for line in text.splitlines() if line.strip()]
+    first = next((i for i, line in enumerate(said) if line.startswith("Error")), None)
+    return "\n".join(said[-lines:] if first is None else said[first : first + lines])
+
+
+def _kill_after(
+    process: subprocess.Popen[bytes], seconds: float | None, late: threading.Event
+) -> threading.Timer | None:
+    if seconds is None:
+        return None
+
+    def kill() -> None:
+        late.set()
+        _kill(process)
+
+    timer = threading.Timer(seconds, kill)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End the worker and whatever it has started: its session is its own."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def _exit_words(code: int) -> str:
+    if code < 0:
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
+        return f"SUMO crashed: its process was ended by signal {name}"
+    return f"the simulation process ended with exit code {code} without a result"

@@ -1,0 +1,131 @@
+"""The process that completes slices beside the worker: ``python -m odscen.sumo.worker.completer RUN FD``.
+
+A process and not a thread: libsumo holds Python's lock while it steps, so that a thread of the
+worker would slow down the simulation and be slow itself. What became of each actor is kept here
+too, so that the results of 50,000 actors are there soon after the last slice. Started by
+:class:`odscen.sumo.worker.completion.Completion` only, with a connection as FD.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+from dataclasses import dataclass, replace
+from itertools import chain
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from odscen.base.errors import OdscenError
+from odscen.results.measures.summary import Fates
+from odscen.results.records.run_records import Event, Plan, event_from_line, event_line
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.checkpoint import (
+    EVENTS_LINES,
+    STATE_FILE,
+    Checkpoint,
+    check_state,
+    complete,
+    fingerprints,
+    last_number,
+    recorded_part,
+    slice_folder,
+)
+from odscen.sumo.folder.parts import tidy_part
+from odscen.sumo.folder.run_status import write_status
+from odscen.sumo.outputs.conflict_files import tidy_conflicts
+from odscen.sumo.outputs.output_tables import tidy_outputs, trips_in, write_results
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from odscen.results.measures.summary import Trip
+
+_CONTENTS = (STATE_FILE, EVENTS_LINES, *layout.RECORDED)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A slice that SUMO has written into ``part``, and that is not complete.
+
+    Attributes
+    ----------
+    checkpoint
+        Without ``files``.
+    events
+        What has happened in it.
+    lengths
+        Of lanes, metres.
+    lanes
+        How many vehicles came in on each lane with the state.
+    """
+
+    part: Path
+    checkpoint: Checkpoint
+    events: list[Event]
+    lengths: Mapping[str, float]
+    lanes: Mapping[str, int]
+
+    def complete(self, plan: Plan, run: Path) -> None:
+        """Tidy what SUMO has written and make the slice complete."""
+        part, last = self.part, self.checkpoint.last
+        with (part / EVENTS_LINES).open("w", encoding="utf-8") as out:
+            out.writelines(event_line(event) + "\n" for event in self.events)
+        if not last:
+            check_state(part / STATE_FILE)
+        tidy_part(part / layout.TRAJECTORIES_FILE)
+        tidy_outputs(part, self.lengths, present=self.lanes, last=last)
+        tidy_conflicts(part, plan)
+        checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))
+        complete(run, part, checkpoint)
+        write_status(run, plan, checkpoint)
+
+
+def main() -> int:
+    """Complete slices for as long as a worker asks for it; 0 when it asked for the results."""
+    run, connection = Path(sys.argv[1]), Connection(int(sys.argv[2]))
+    plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8"))
+    fates = Fates(plan)
+    gc.freeze()  # plan and fates stay, and need not be gone through again and again
+    for number in range(1, last_number(run) + 1):
+        fates.hear(*_happened(run, number))
+    while True:
+        fates.settle()  # while the worker simulates
+        try:
+            written: Written | None = connection.recv()
+        except EOFError:  # the worker is gone; what it has asked for is done
+            return 1
+        try:
+            if written is None:
+                _write_results(run, fates)
+            else:
+                written.complete(plan, run)
+                fates.hear(*_happened(run, written.checkpoint.number))
+        except (OdscenError, OSError) as error:
+            connection.send(error)
+            return 1
+        connection.send(None)
+        if written is None:
+            return 0
+
+
+def _happened(run: Path, number: int) -> tuple[Iterator[Event], dict[str, Trip]]:
+    """Events and trips of a complete slice, from its files: the same in a run that was resumed."""
+    lines = _event_lines(run, number)
+    return map(event_from_line, lines), trips_in(recorded_part(run, layout.TRIPS_FILE, number))
+
+
+def _event_lines(run: Path, number: int) -> Iterator[str]:
+    with (slice_folder(run, number) / EVENTS_LINES).open(encoding="utf-8") as lines:
+        for line in lines:
+            yield line.rstrip("\n")
+
+
+def _write_results(run: Path, fates: Fates) -> None:
+    """Write events and actors of the whole run."""
+    lines = chain.from_iterable(_event_lines(run, n) for n in range(1, last_number(run) + 1))
+    write_results(run, lines, fates.rows())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

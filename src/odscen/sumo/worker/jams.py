@@ -1,0 +1,171 @@
+"""Where traffic is stuck, found while the simulation goes, with the reason as far as it shows.
+
+A lane is jammed while somebody on it has stood for :data:`STUCK` seconds, which is longer than a
+red light. Who is first in it is asked what it has ahead; if that is another standing vehicle, that
+one is asked, and so on to the head of the queue, whose reason is everybody's. Asking begins
+earlier, at :data:`WATCHED` seconds: whoever cannot go on at green will be looked at at red, too.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.results.records.run_records import Event, EventKind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.sumo.worker.observed import Ahead, Standing
+    from odscen.sumo.worker.session import Session
+
+PERIOD = 15.0
+"""Simulated seconds between two looks."""
+WATCHED = 45.0
+"""Seconds of standing from which the reason is looked for."""
+STUCK = 180.0
+"""Seconds of standing that make a jam."""
+
+_HOPS = 200
+"""Vehicles that a reason is followed through."""
+
+RELEASE = 60.0
+"""Seconds without anybody watched after which a jam is over: moving up a little does not end it."""
+
+CIRCLE = "vehicles wait for each other in a circle"
+NO_WAY_ON = "its lane does not lead on along its way"
+WRONG_LANE = "it did not get to the lane that its way needs"
+RED = "a red light"
+PEOPLE = "people on a crossing"
+GIVES_WAY = "it has to give way to traffic that does not end"
+NO_ROOM = "no room on the road ahead"
+UNKNOWN = "the reason does not show"
+
+
+class Stuck(NamedTuple):
+    """A vehicle that stood at the last look: where (OpenDRIVE frame), since when, and why."""
+
+    lane: str
+    x: float | None
+    y: float | None
+    since: float
+    reason: str
+
+
+class JamWatch:
+    """Finds jams and says why somebody was stuck.
+
+    Attributes
+    ----------
+    due
+        When to look next, simulated seconds.
+    """
+
+    def __init__(self, net_offset: tuple[float, float]) -> None:
+        self.due = 0.0
+        self._offset = net_offset
+        self._since: dict[str, float] = {}
+        self._seen: dict[str, float] = {}
+        self._stuck: dict[str, Stuck] = {}
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        return {
+            "next": self.due,
+            "since": dict(self._since),
+            "seen": dict(self._seen),
+            "stuck": dict(self._stuck),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self.due = state["next"]
+        self._since = dict(state["since"])
+        self._seen = dict(state["seen"])
+        self._stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
+
+    def stuck(self, vehicle: str) -> Stuck | None:
+        """Where and why a vehicle stood at the last look, if it did."""
+        return self._stuck.get(vehicle)
+
+    def look(self, session: Session, time: float) -> list[Event]:
+        """Jams that have begun or ended since the last look."""
+        self.due = time + PERIOD
+        queues: dict[str, list[Standing]] = {}
+        for one in session.standing(WATCHED):
+            queues.setdefault(one.lane, []).append(one)
+        jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= STUCK}
+        self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
+        over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
+        events = [self._end(time, lane) for lane in sorted(over)]
+        before, self._stuck = self._stuck, {}
+        for lane, queue in sorted(queues.items()):
+            first = max(queue, key=lambda one: (one.pos, one.vehicle))
+            reason, head = explain(session, first.vehicle)
+            if reason in (RED, UNKNOWN) and first.vehicle in before:
+                reason = before[first.vehicle].reason
+            for one in queue:
+                self._stuck[one.vehicle] = self._place(session, one, time, reason)
+            if lane in jammed and lane not in self._since:
+                self._since[lane] = time - first.waited
+                self._seen[lane] = time
+                events.append(self._begin(time, first, len(queue), head))
+        return events
+
+    def nobody_left(self, time: float) -> list[Event]:
+        """Jams that are over because the road is empty."""
+        return [self._end(time, lane) for lane in sorted(self._since)]
+
+    def _place(self, session: Session, one: Standing, time: float, reason: str) -> Stuck:
+        front = session.vehicle_front(one.vehicle)
+        dx, dy = self._offset
+        x = None if front is None else front.x - dx
+        y = None if front is None else front.y - dy
+        return Stuck(one.lane, x, y, time - one.waited, reason)
+
+    def _begin(self, time: float, first: Standing, queue: int, head: str) -> Event:
+        stuck = self._stuck[first.vehicle]
+        return Event(
+            time,
+            EventKind.JAM_BEGIN,
+            first.vehicle,
+            x=stuck.x,
+            y=stuck.y,
+            lane=stuck.lane,
+            partner=None if head == first.vehicle else head,
+            detail=stuck.reason,
+            waited=first.waited,
+            queue=queue,
+        )
+
+    def _end(self, time: float, lane: str) -> Event:
+        lasted = self._seen.pop(lane) - self._since.pop(lane)
+        return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
+
+
+def explain(session: Session, vehicle: str) -> tuple[str, str]:
+    """Why a vehicle stands, and the vehicle at the head of the queue that it stands in."""
+    seen = [vehicle]
+    ahead = session.ahead(vehicle)
+    while ahead is not None and _own_reason(ahead) is None and ahead.leader:
+        if ahead.leader in seen or len(seen) >= _HOPS:
+            return CIRCLE if ahead.leader in seen else NO_ROOM, seen[-1]
+        seen.append(ahead.leader)
+        ahead = session.ahead(ahead.leader)
+    if ahead is None:
+        return UNKNOWN, seen[-1]
+    return _own_reason(ahead) or UNKNOWN, seen[-1]
+
+
+def _own_reason(ahead: Ahead) -> str | None:
+    """Return the reason that is not just the vehicle ahead."""
+    if not ahead.onwards:
+        return WRONG_LANE if ahead.beside else NO_WAY_ON
+    if ahead.leader is not None:
+        return None
+    if ahead.light in ("r", "u"):
+        return RED
+    if ahead.people:
+        return PEOPLE
+    if not ahead.open:
+        return GIVES_WAY
+    return None

@@ -1,0 +1,145 @@
+"""A run in step with another simulator: a step when told to, and all that is to know after it.
+
+A :class:`~odscen.sumo.worker.protocol.State` is followed by little-endian float64 rows, one for each
+vehicle and person of the plan that is on the road:
+
+====== =====================================================================================
+row    index, x, y, angle_deg, speed, signals, lane, pos
+====== =====================================================================================
+
+``index`` is the actor's row in the plan; x, y, angle_deg are SUMO's own (front, SUMO frame), for
+height and slope, which the body centre needs, are not known to SUMO. ``lane`` counts the names of
+lanes told so far, -1 for none. ``pos`` is metres along it.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.results.records.run_records import EventKind, event_row
+from odscen.sumo.worker.protocol import Command, EgoPose, State, decode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.worker.observed import Poses
+    from odscen.sumo.worker.protocol import Lockstep, Message
+    from odscen.sumo.worker.recorder import Recorder
+    from odscen.sumo.worker.session import Session
+
+COLUMNS = 8
+
+INVALID = 1e8
+"""SUMO's INVALID_DOUBLE_VALUE is -2^30; no place is this far out."""
+
+_BLOCK = 65536
+_PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED)
+
+
+class LockstepWatch:
+    """The worker's side.
+
+    Parameters
+    ----------
+    how
+        Who is driven from outside.
+    commands
+        File descriptor that commands arrive on. When its other end is closed (the program that
+        started the run is gone) the run is to stop.
+    send
+        Sends a message, and bytes after it.
+
+    Attributes
+    ----------
+    stopped
+        Whether the run has been ended before its time.
+    """
+
+    def __init__(
+        self, plan: Plan, how: Lockstep, commands: int, send: Callable[[Message, bytes], None]
+    ) -> None:
+        self.stopped = False
+        self._row = {actor.id: row for row, actor in enumerate(plan.actors)}
+        self._placed = plan.actors[how.placed].id if how.placed >= 0 else None
+        self._step_length = plan.step_length
+        self._commands = commands
+        self._rest = b""
+        self._queue: list[Command | EgoPose] = []
+        self._send = send
+        self._steps = 0
+        self._told = 0
+        self._lights: dict[str, str] = {}
+        self._lane: dict[str, int] = {"": -1}
+
+    def next_step(self, session: Session, recorder: Recorder) -> bool:
+        """Tell of the step just made and obey until the next; false if the run is to stop."""
+        self.show(session, recorder)
+        while True:
+            command = self._next()
+            if isinstance(command, EgoPose):
+                if self._placed is not None:
+                    session.place(self._placed, command)
+            elif command.do == "step":
+                self._steps += 1
+                return True
+            elif command.do == "stop":
+                self.stopped = True
+                return False
+
+    def show_last(self, session: Session, recorder: Recorder) -> None:
+        """Tell of the last step."""
+        self.show(session, recorder)
+
+    def show(self, session: Session, recorder: Recorder) -> None:
+        """Tell of the step just made; there is nothing to tell before the first."""
+        if not self._steps:
+            return
+        known = len(self._lane) - 1
+        vehicles, persons = session.vehicle_poses(), session.person_poses()
+        rows = np.concatenate(
+            [
+                self._rows(vehicles, session.vehicle_places(vehicles.ids)),
+                self._rows(persons, session.person_places(persons.ids)),
+            ]
+        ).tobytes()
+        states = session.light_states()
+        changed = {name: state for name, state in states.items() if self._lights.get(name) != state}
+        self._lights = states
+        events, self._told = recorder.events[self._told :], len(recorder.events)
+        state = State(
+            size=len(rows),
+            time=session.time - self._step_length,
+            lights=changed,
+            lanes=list(self._lane)[known + 1 :],
+            departed=recorder.departed,
+            arrived=recorder.arrived,
+            incidents=[event_row(event) for event in events if event.kind not in _PLAIN],
+        )
+        self._send(state, rows)
+
+    def _rows(self, poses: Poses, places: list[tuple[str, float]]) -> np.ndarray:
+        rows = np.empty((len(poses.ids), COLUMNS), dtype="<f8")
+        rows[:, 0] = [self._row.get(name, -1) for name in poses.ids]
+        rows[:, 1] = poses.x
+        rows[:, 2] = poses.y
+        rows[:, 3] = poses.angle_deg
+        rows[:, 4] = poses.speed
+        rows[:, 5] = poses.signals
+        rows[:, 6] = [self._lane.setdefault(lane, len(self._lane) - 1) for lane, _ in places]
+        rows[:, 7] = [pos for _, pos in places]
+        return rows[(rows[:, 0] >= 0) & (np.abs(rows[:, 1]) < INVALID)]
+
+    def _next(self) -> Command | EgoPose:
+        """Wait for the next command; to stop, once nobody is there to give one."""
+        while not self._queue:
+            block = os.read(self._commands, _BLOCK)
+            if not block:
+                return Command("stop")
+            *lines, self._rest = (self._rest + block).split(b"\n")
+            heard = (decode(line) for line in lines)
+            self._queue += [message for message in heard if isinstance(message, Command | EgoPose)]
+        return self._queue.pop(0)

@@ -1,0 +1,195 @@
+"""Messages between the runner and the worker: JSON, one object per line, either way.
+
+A run that can be watched (see :mod:`odscen.sumo.runner.live_run`) also sends frames: a line :class:`FrameMessage` and
+then so many bytes. A run in lockstep (see :mod:`odscen.sumo.worker.lockstep`) sends a :class:`State` and
+its bytes after each step. A run that nobody can watch sends :class:`Progress` and its end only.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is: simulated seconds, counts of vehicles and persons.
+
+    ``time_left`` is about how many wall seconds it will take at full speed; ``None`` if unknown.
+    """
+
+    time: float
+    until: float
+    running: int
+    departed: int
+    arrived: int
+    planned: int
+    time_left: float | None = None
+
+    @property
+    def share(self) -> float:
+        """Share done, 0 to 1: of the time, or of the arrivals if those are further on."""
+        arrivals = self.arrived / self.planned if self.planned else 0.0
+        return min(1.0, max(self.time / self.until, arrivals))
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The run has ended without an error: simulated seconds, steps, wall seconds of the simulation.
+
+    ``stopped`` if somebody who watched it has ended it before its time.
+    """
+
+    sim_seconds: float
+    steps: int
+    wall_seconds: float
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The run has ended in an error; ``reason`` is one line, the log has SUMO's words."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class FrameMessage:
+    """Everyone's place after a step; ``size`` bytes follow the line, see ``sumo.snapshots``."""
+
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lights:
+    """State of each traffic light that has changed since the last such message, by SUMO id."""
+
+    states: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Incidents:
+    """Events worth a mark on the map, as in ``events.json``: conflicts, jumps, hard stops."""
+
+    events: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How the run goes on: ``speed`` in simulated seconds per second, ``None`` as fast as it can.
+
+    As a message, what is so now; as an argument of the worker, how to start. A run that starts
+    ``paused`` makes its first step, so that there is something to see.
+    """
+
+    paused: bool = False
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """To the worker; ``speed`` belongs to ``speed``, and ``frame`` asks for the next frame."""
+
+    do: Literal["pause", "resume", "step", "speed", "stop", "frame"]
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Lockstep:
+    """As an argument of the worker: make a step only when told to, and tell all after each.
+
+    ``placed`` is the row in the plan of a vehicle that somebody else drives, -1 for none.
+    """
+
+    placed: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """All after one step; ``size`` bytes follow the line, see ``sumo.lockstep``.
+
+    Attributes
+    ----------
+    time
+        Simulated seconds at which the step began, as in the recorded trajectories.
+    lights
+        State of each traffic light that has changed, by SUMO id.
+    lanes
+        Ids of SUMO lanes seen for the first time; rows count all of them in this order.
+    departed, arrived
+        Road users so far.
+    incidents
+        As in ``events.json``, new ones.
+    """
+
+    size: int
+    time: float
+    lights: dict[str, str] = field(default_factory=dict)
+    lanes: list[str] = field(default_factory=list)
+    departed: int = 0
+    arrived: int = 0
+    incidents: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class EgoPose:
+    """To the worker: the vehicle that somebody else drives; front, SUMO frame, m/s."""
+
+    x: float
+    y: float
+    angle_deg: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShotMessage:
+    """A camera's picture of a mirrored run; ``size`` bytes of JPEG follow the line."""
+
+    size: int
+
+
+Message = (
+    Progress
+    | Done
+    | Failed
+    | FrameMessage
+    | Lights
+    | Incidents
+    | Pace
+    | Lockstep
+    | State
+    | ShotMessage
+)
+OnProgress = Callable[[Progress], None]
+
+_KINDS: dict[str, type[Message | Command | EgoPose]] = {
+    "progress": Progress,
+    "done": Done,
+    "failed": Failed,
+    "frame": FrameMessage,
+    "lights": Lights,
+    "incidents": Incidents,
+    "pace": Pace,
+    "lockstep": Lockstep,
+    "state": State,
+    "shot": ShotMessage,
+    "place": EgoPose,
+    "command": Command,
+}
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+
+
+def encode(message: Message | Command | EgoPose) -> str:
+    """One line, newline included."""
+    return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
+
+
+def decode(line: str | bytes) -> Message | Command | EgoPose | None:
+    """Inverse of :func:`encode`; ``None`` for a line that is no message."""
+    try:
+        data = json.loads(line)
+        return _KINDS[data.pop("kind")](**data)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None

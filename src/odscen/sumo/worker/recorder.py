@@ -1,0 +1,232 @@
+"""What happened to whom, collected while the simulation steps.
+
+Only counts are read per step, and, where they are not 0, id lists and poses of those who have just
+departed: the cost does not grow with the number of vehicles running. Four times a minute all are
+looked at for jams. Trajectories are SUMO's own business (FCD output).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.base.frames import body_centre
+from odscen.results.records.run_records import Event, EventKind, Plan
+from odscen.sumo.worker.jams import JamWatch
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from odscen.sumo.worker.observed import Collision, Front, StepLists
+    from odscen.sumo.worker.session import Session
+
+
+class _EventfulStep(NamedTuple):
+    """A step in which something happened; ``number`` counts all steps."""
+
+    number: int
+    time: float
+    lists: StepLists
+
+
+class Recorder:
+    """Turns the session's lists into events.
+
+    Steps in which something happened are put by and gone through together, at every look for jams
+    and whenever somebody asks: after a step of SUMO nothing of Python is in the processor's caches,
+    and one event alone costs several times as much as one of many.
+
+    Attributes
+    ----------
+    drained
+        How many events were drained before.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self.drained = 0
+        self._events: list[Event] = []
+        self._departed = 0
+        self._arrived = 0
+        self._planned = {actor.id: actor for actor in plan.actors}
+        self._offset = plan.net_offset
+        self._departures: dict[str, float] = {}
+        self._touching: set[tuple[str, str]] = set()
+        self._stopping: set[str] = set()
+        self._jams = JamWatch(plan.net_offset)
+        self._number = self._settled = 0
+        self._put_by: list[_EventfulStep] = []
+
+    @property
+    def events(self) -> list[Event]:
+        """Events since the last :meth:`drain`, in order of time."""
+        self._settle()
+        return self._events
+
+    @property
+    def departed(self) -> int:
+        """How many vehicles and persons have departed so far."""
+        self._settle()
+        return self._departed
+
+    @property
+    def arrived(self) -> int:
+        """How many vehicles and persons have arrived so far."""
+        self._settle()
+        return self._arrived
+
+    def since(self, number: int) -> list[Event]:
+        """Events but the first ``number`` ones, as far as they have not been drained."""
+        return self.events[max(0, number - self.drained) :]
+
+    @property
+    def count(self) -> int:
+        """How many events there have been."""
+        return self.drained + len(self.events)
+
+    def drain(self) -> list[Event]:
+        """Hand out the events and forget them: a long run keeps them on disk."""
+        events, self._events = self.events, []
+        self.drained += len(events)
+        return events
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        self._settle()
+        return {
+            "drained": self.drained,
+            "departed": self._departed,
+            "arrived": self._arrived,
+            "departures": dict(self._departures),
+            "touching": sorted(self._touching),
+            "stopping": sorted(self._stopping),
+            "jams": self._jams.state(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self._events, self._put_by = [], []
+        self.drained = state["drained"]
+        self._departed, self._arrived = state["departed"], state["arrived"]
+        self._departures = dict(state["departures"])
+        self._touching = {(one, other) for one, other in state["touching"]}
+        self._stopping = set(state["stopping"])
+        self._jams.restore(state["jams"])
+
+    def nobody_left(self, time: float) -> None:
+        """Say that the run ends because the road is empty: every jam is over."""
+        self.events.extend(self._jams.nobody_left(time))
+
+    def lose(self, time: float, names: Iterable[str]) -> None:
+        """Say that SUMO did not bring these back with a saved state."""
+        self.events.extend(Event(time, EventKind.LOST, name) for name in sorted(names))
+
+    def record(self, session: Session, time: float) -> None:
+        """Record the step that began at ``time`` and has just been made."""
+        self._number += 1
+        lists = session.happened()
+        if lists is not None:
+            self._put_by.append(_EventfulStep(self._number, time, lists))
+        if time >= self._jams.due:
+            self.events.extend(self._jams.look(session, time))
+
+    def _settle(self) -> None:
+        """Go through the steps that were put by."""
+        steps, self._put_by = self._put_by, []
+        for number, time, lists in steps:
+            self._quiet_before(number)
+            self._record(time, lists)
+            self._settled = number
+        self._quiet_before(self._number + 1)
+
+    def _quiet_before(self, number: int) -> None:
+        """If nothing happened in the step before this one, nobody touched or braked hard."""
+        if self._settled < number - 1:
+            self._touching, self._stopping = set(), set()
+
+    def _record(self, time: float, lists: StepLists) -> None:
+        fronts = lists.fronts
+        for name in (*lists.departed, *lists.departed_persons):
+            self._depart(time, name, fronts[name])
+        for vehicle in lists.teleports_started:
+            self._teleport(time, vehicle)
+        for vehicle in lists.teleports_ended:
+            self._place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
+        self._stops(time, lists.emergency_stops, fronts)
+        self._collisions(time, lists.collisions)
+        for name in (*lists.arrived, *lists.arrived_persons):
+            self._arrive(time, name)
+
+    def _depart(self, time: float, name: str, front: Front | None) -> None:
+        if name in self._departures:  # back on the road after a teleport is no second departure
+            return
+        self._departures[name] = time
+        self._departed += 1
+        if front is None:
+            self._events.append(Event(time, EventKind.DEPARTED, name))
+            return
+        planned = self._planned.get(name)
+        length = planned.length if planned else 0.0
+        x, y = body_centre(
+            front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
+        )
+        error = math.hypot(x - planned.x, y - planned.y) if planned else None
+        self._events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
+
+    def _arrive(self, time: float, name: str) -> None:
+        self._arrived += 1
+        departed = self._departures.pop(name, None)
+        spent = None if departed is None else time - departed
+        self._events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
+
+    def _teleport(self, time: float, vehicle: str) -> None:
+        """Tell where and why it stood until now, as it has no place any more."""
+        stuck = self._jams.stuck(vehicle)
+        if stuck is None:
+            self._events.append(Event(time, EventKind.TELEPORT_START, vehicle))
+            return
+        self._events.append(
+            Event(
+                time,
+                EventKind.TELEPORT_START,
+                vehicle,
+                x=stuck.x,
+                y=stuck.y,
+                lane=stuck.lane,
+                detail=stuck.reason,
+                waited=time - stuck.since,
+            )
+        )
+
+    def _place(self, time: float, kind: EventKind, name: str, front: Front | None) -> None:
+        if front is None:
+            self._events.append(Event(time, kind, name))
+            return
+        dx, dy = self._offset
+        self._events.append(Event(time, kind, name, x=front.x - dx, y=front.y - dy))
+
+    def _stops(
+        self, time: float, stopping: Sequence[str], fronts: Mapping[str, Front | None]
+    ) -> None:
+        """Report the first step only of each emergency stop."""
+        for vehicle in stopping:
+            if vehicle not in self._stopping:
+                self._place(time, EventKind.EMERGENCY_STOP, vehicle, fronts[vehicle])
+        self._stopping = set(stopping)
+
+    def _collisions(self, time: float, collisions: Sequence[Collision]) -> None:
+        """Report a pair once, when it begins to touch."""
+        touching = {(c.collider, c.victim) for c in collisions}
+        for collision in collisions:
+            if (collision.collider, collision.victim) in self._touching:
+                continue
+            self._events.append(
+                Event(
+                    time,
+                    EventKind.COLLISION,
+                    collision.collider,
+                    lane=collision.lane,
+                    partner=collision.victim,
+                    detail=collision.type,
+                )
+            )
+        self._touching = touching

@@ -1,0 +1,118 @@
+"""The process that runs one simulation: ``python -m odscen.sumo.worker.simulate RUN/plan.json [PACE]``.
+
+libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
+run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
+beside it, steps until nobody is left or the end is reached (in slices, see
+:mod:`odscen.sumo.worker.slices`, if the plan says so), writes ``events.json`` and ``actors.json``, and
+sends :mod:`odscen.sumo.worker.protocol` messages to its stdout. Whatever SUMO says goes to ``sumo.log``.
+With a :class:`~odscen.sumo.worker.protocol.Pace` as second argument the run can be watched and takes
+commands on its stdin; with a :class:`~odscen.sumo.worker.protocol.Lockstep` it makes each step when it is
+told to.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from odscen.base.errors import OdscenError
+from odscen.results.measures.summary import Fates
+from odscen.results.records.run_records import Plan, event_line
+from odscen.sumo.folder.layout import (
+    CONFIG_FILE,
+    LOG_FILE,
+    SUMO_FOLDER,
+    TRAJECTORIES_FILE,
+    TRIPS_FILE,
+)
+from odscen.sumo.folder.parts import tidy_part
+from odscen.sumo.outputs.conflict_files import tidy_conflicts
+from odscen.sumo.outputs.output_tables import outputs_to, tidy_outputs, trips_in, write_results
+from odscen.sumo.worker.lockstep import LockstepWatch
+from odscen.sumo.worker.output_capture import captured_output
+from odscen.sumo.worker.protocol import Done, Failed, Lockstep, Message, Pace, decode, encode
+from odscen.sumo.worker.session import open_session
+from odscen.sumo.worker.slices import run_slices
+from odscen.sumo.worker.steering import Steering
+from odscen.sumo.worker.stepping import Stepper
+from odscen.sumo.worker.watch import Watch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def main() -> int:
+    """Run the plan named on the command line; 0 when the simulation ended by itself."""
+    plan_file = Path(sys.argv[1])
+    folder = plan_file.parent
+    with captured_output(folder / LOG_FILE) as stdout:
+
+        def send(message: Message, payload: bytes = b"") -> None:
+            stdout.buffer.write(encode(message).encode() + payload)
+            stdout.buffer.flush()
+
+        try:
+            plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
+            gc.freeze()  # the plan stays, and need not be gone through again and again
+            watch = _watch(plan, sys.argv[2], send) if len(sys.argv) > 2 else None
+            send(simulate(plan, folder, send, watch))
+        except (OdscenError, OSError) as error:
+            send(Failed(str(error)))
+            return 3
+    return 0
+
+
+def simulate(
+    plan: Plan,
+    folder: Path,
+    send: Callable[[Message], None],
+    watch: Watch | LockstepWatch | None = None,
+) -> Done:
+    """Run the simulation in ``folder`` and write its events and actors.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO refuses to start or stops with an error.
+    """
+    stepper = Stepper(plan, send, watch)
+    if plan.slice_length is not None:
+        return run_slices(plan, folder, stepper)
+    done = _in_one_piece(plan, folder, stepper)
+    events = stepper.recorder.events
+    fates = Fates(plan)
+    fates.hear(events, trips_in(folder / TRIPS_FILE))
+    write_results(folder, map(event_line, events), fates.rows())
+    return done
+
+
+def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
+    start = time.perf_counter()
+    sumo = folder / SUMO_FOLDER
+    arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
+    with open_session(arguments) as session:
+        now = stepper.run(session, plan.until)
+        lengths = session.lane_lengths()
+    tidy_part(folder / TRAJECTORIES_FILE)
+    tidy_outputs(folder, lengths, present={}, last=True)
+    tidy_conflicts(folder, plan)
+    return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
+
+
+def _watch(plan: Plan, how: str, send: Callable[[Message, bytes], None]) -> Watch | LockstepWatch:
+    start = decode(how)
+    if isinstance(start, Lockstep):
+        return LockstepWatch(plan, start, sys.stdin.fileno(), send)
+    steering = Steering(
+        sys.stdin.fileno(),
+        start if isinstance(start, Pace) else Pace(),
+        step_length=plan.step_length,
+    )
+    return Watch(plan, steering, send)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,387 @@
+"""Runs that a page has started: one worker process and one thread each."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import shutil
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.atomic_folders import discard
+from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
+from odscen.carla.served_run import ServedJob, run_served
+from odscen.results.records.run_records import Plan
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.problems import refuse_errors
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.run_status import going, read_status
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.worker.protocol import Command, Failed, Pace
+from odscen.sumo.worker.snapshots import origin
+from odscen.web.kept_runs import KeptRuns
+from odscen.web.run_messages import RunForecast, RunInfo, RunProgress, RunState
+from odscen.workflow import SUFFIX, check_scenario, load_map, read_scenario, resume
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from odscen.carla.client import Address
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.runner.run_jobs import PreparedRun, RunResult
+    from odscen.web.run_messages import GoOn, NewRun, RunControl
+    from odscen.workflow import LoadedMap
+    from odscen.workspace.store import Workspace
+
+MOST = 8
+"""Runs that can go on at a time."""
+PATIENCE = 5.0
+"""Wall seconds that runs have for their end when the server ends."""
+
+
+@dataclass(slots=True, eq=False)
+class Active:
+    """A run that this server has started.
+
+    Attributes
+    ----------
+    plan
+        What is to happen; ``None`` while it is prepared.
+    carla
+        Whether a CARLA server shows it too.
+    interrupted
+        Whether its user has interrupted it, to go on later.
+    """
+
+    id: str
+    scenario: Scenario
+    live: Live
+    plan: Plan | None = None
+    finishing: bool = False
+    carla: bool = False
+    interrupted: bool = False
+    error: str | None = None
+    ended: RunState | None = None
+    future: Future[None] = field(default_factory=Future)
+
+    @property
+    def state(self) -> RunState:
+        """What it does now."""
+        if self.ended is not None:
+            return self.ended
+        if self.finishing or self.live.ended:
+            return "finishing"
+        if self.live.progress is None and self.live.picture.number == 0:
+            return "preparing"
+        return "paused" if self.live.pace.paused else "running"
+
+    @property
+    def long(self) -> bool:
+        """Whether it goes in slices, and can be interrupted."""
+        return self.plan is not None and self.plan.slice_length is not None
+
+    def end(self, state: RunState, error: str | None = None) -> None:
+        """Say how it has ended."""
+        self.error = error
+        self.ended = state
+        self.live.wake()
+
+
+class Runs:
+    """Runs in a workspace, going on and finished."""
+
+    def __init__(self, workspace: Workspace, carla: Address) -> None:
+        self.kept = KeptRuns(workspace.runs)
+        self._workspace = workspace
+        self._carla = carla
+        self._pool = ThreadPoolExecutor(max_workers=MOST, thread_name_prefix="run")
+        self._lock = threading.Lock()
+        self._active: dict[str, Active] = {}
+
+    def start(self, name: str, scenario: Scenario, wish: NewRun) -> str:
+        """Start a run of a scenario; its id.
+
+        Raises
+        ------
+        ScenarioError
+            If the scenario has errors.
+        ConflictError
+            If too many are going on, or CARLA shows another one.
+        """
+        refuse_errors(check_scenario(self._workspace, scenario))
+        if wish.carla and (wish.every is not None or not wish.trajectories):
+            msg = (
+                "a run that CARLA shows is recorded step by step; leave every and trajectories out"
+            )
+            raise InputError(msg)
+        with self._lock:
+            self._refuse_more()
+            if wish.carla and any(one.carla and one.ended is None for one in self._active.values()):
+                msg = "CARLA shows another run already; stop that one, or wait for its end"
+                raise ConflictError(msg)
+            pace = Pace(paused=wish.paused, speed=wish.speed)
+            active = Active(self._free_id(name), scenario, Live(pace), carla=wish.carla)
+            self._active[active.id] = active
+        active.future = self._pool.submit(self._run, active, lambda: self._simulate(active, wish))
+        return active.id
+
+    def resume(self, run: str, wish: GoOn) -> None:
+        """Go on with an interrupted run.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such run.
+        ConflictError
+            If it has ended, is going on, or too many are.
+        """
+        folder = self.kept.folder(run)
+        if (state := self.info(run).state) != "interrupted":
+            msg = f"run {run!r} is {state}; only an interrupted one can go on"
+            raise ConflictError(msg)
+        scenario = read_scenario(folder / layout.SCENARIO_FILE)
+        plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
+        with self._lock:
+            self._refuse_more()
+            active = Active(run, scenario, Live(Pace(speed=wish.speed)), plan=plan)
+            self._active[run] = active
+        active.future = self._pool.submit(self._run, active, lambda: self._go_on(active))
+
+    def forecast(self, scenario: Scenario, wish: NewRun) -> RunForecast:
+        """What a run will need; takes as long as getting it ready.
+
+        Raises
+        ------
+        ScenarioError
+            If the scenario has errors.
+        """
+        refuse_errors(check_scenario(self._workspace, scenario))
+        prepared = self._prepared(scenario, wish)
+        expected = prepared.expected
+        assert expected is not None
+        return RunForecast(
+            planned=len(prepared.plan.actors),
+            running=expected.running,
+            disk=expected.disk,
+            memory=expected.memory,
+            free=shutil.disk_usage(self._workspace.root).free,
+        )
+
+    def active(self, run: str) -> Active:
+        """Return a run that this server has started.
+
+        Raises
+        ------
+        NotFoundError
+            If it has not.
+        """
+        with self._lock:
+            if run not in self._active:
+                what = "run of this server"
+                raise NotFoundError(what, run, list(self._active))
+            return self._active[run]
+
+    def control(self, run: str, control: RunControl) -> RunInfo:
+        """Steer a run.
+
+        Raises
+        ------
+        ConflictError
+            If it has ended.
+        """
+        active = self.active(run)
+        if active.live.ended:
+            msg = f"run {run!r} has ended"
+            raise ConflictError(msg)
+        if control.action == "interrupt":
+            if not active.long:
+                msg = f"run {run!r} is not in slices and could not go on later; stop it"
+                raise ConflictError(msg)
+            active.interrupted = True
+            active.live.kill()
+            return self.info(run)
+        active.live.command(Command(control.action, control.speed))
+        return self.info(run)
+
+    def info(self, run: str) -> RunInfo:
+        """One run, going on or finished; :class:`NotFoundError` if there is none of that id."""
+        with self._lock:
+            active = self._active.get(run)
+        if active is None:
+            return self.kept.info(run)
+        progress = active.live.progress
+        over = active.ended is not None
+        return RunInfo(
+            run=run,
+            state=active.state,
+            scenario=active.scenario.name,
+            map=active.scenario.map.name,
+            speed=active.live.pace.speed,
+            carla=active.carla,
+            progress=None if progress is None else RunProgress(**asdict(progress)),
+            summary=self.kept.summary(run) if over else None,
+            error=active.error,
+            finished=self.kept.end_time(run) if over else None,
+            slices=self.kept.slices(run),
+        )
+
+    def rows(self, *, scenario: str | None = None) -> list[RunInfo]:
+        """Runs, without their summaries; the newest last.
+
+        ``scenario`` is the name of a scenario file, if only its runs are wanted.
+        """
+        wanted = (lambda _run: True) if scenario is None else _names_of(scenario).fullmatch
+        with self._lock:
+            names = dict.fromkeys(filter(wanted, self._active))
+        done = [name for name in self.kept.by_age() if wanted(name) and name not in names]
+        order = dict.fromkeys([*done, *names])
+        rows = []
+        for name in order:
+            with suppress(InputError):  # not a name of ours, or just removed
+                rows.append(self.info(name).model_copy(update={"summary": None}))
+        return rows
+
+    def remove(self, run: str) -> None:
+        """Remove a finished or interrupted run."""
+        with self._lock:
+            active = self._active.get(run)
+            if active is not None and active.ended is None:
+                msg = f"run {run!r} is going on; stop it first"
+                raise ConflictError(msg)
+            self._active.pop(run, None)
+        if active is not None and not (self._workspace.runs / run).exists():
+            return  # it failed before it had anything to keep
+        folder = self.kept.folder(run)
+        if going(folder) == "running":
+            msg = f"run {run!r} is going on in another process"
+            raise ConflictError(msg)
+        try:
+            discard(folder)
+        except OSError as error:
+            msg = f"run {run!r}: {error.strerror or error}"
+            raise WorkspaceError(msg) from error
+
+    def close(self) -> None:
+        """Stop everything that is going on; what does not stop in time is ended."""
+        with self._lock:
+            going = [one for one in self._active.values() if one.ended is None]
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for one in going:
+            if one.long:  # can go on when there is a server again
+                one.live.kill()
+            one.live.command(Command("stop"))
+        for one in going:
+            try:
+                one.future.exception(timeout=PATIENCE)
+            except TimeoutError:
+                one.live.kill()
+
+    def _run(self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]) -> None:
+        try:
+            state, error = simulate()
+        except OdscenError as wrong:
+            active.end("failed", str(wrong))
+        except BaseException as wrong:
+            active.end("failed", f"{type(wrong).__name__}: {wrong}")
+            raise
+        else:
+            active.end(state, error)
+
+    def _simulate(self, active: Active, wish: NewRun) -> tuple[RunState, str | None]:
+        prepared = self._prepared(active.scenario, wish)
+        active.plan = prepared.plan
+        active.live.wake()
+
+        if wish.carla:
+            return self._mirror(active, prepared.plan, wish)
+
+        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+            active.finishing = True
+            loaded = self._loaded(active.scenario)
+            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
+
+        out = self._workspace.runs / active.id
+        return _end_of(run_prepared(prepared, out, finish=finish, live=active.live), active)
+
+    def _go_on(self, active: Active) -> tuple[RunState, str | None]:
+        folder = self._workspace.runs / active.id
+        return _end_of(resume(self._workspace, folder, live=active.live), active)
+
+    def _prepared(self, scenario: Scenario, wish: NewRun) -> PreparedRun:
+        loaded = self._loaded(scenario)
+        return prepare(
+            scenario,
+            loaded.sumo,
+            loaded.entry.path("net"),
+            self._workspace.assets(),
+            seed=wish.seed,
+            until=wish.until,
+            step_length=wish.step_length,
+            recording=Recording(trajectories=wish.trajectories, every=wish.every),
+        )
+
+    def _loaded(self, scenario: Scenario) -> LoadedMap:
+        return load_map(self._workspace.map_for(scenario.map.name, scenario.map.sha256))
+
+    def _refuse_more(self) -> None:
+        if sum(one.ended is None for one in self._active.values()) >= MOST:
+            msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
+            raise ConflictError(msg)
+
+    def _mirror(self, active: Active, plan: Plan, wish: NewRun) -> tuple[RunState, str | None]:
+        """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
+        with TemporaryDirectory(prefix="odscen-") as folder:
+            file = Path(folder) / f"{active.id}{SUFFIX}"
+            file.write_text(dumps(active.scenario), encoding="utf-8")
+            last = run_served(
+                ServedJob(
+                    workspace=str(self._workspace.root),
+                    scenario=str(file),
+                    log=str(Path(folder) / "carla.log"),
+                    address=str(self._carla),
+                    step_length=plan.step_length,
+                    origin=origin(plan),
+                    seed=wish.seed,
+                    until=wish.until,
+                    paused=wish.paused,
+                    speed=wish.speed,
+                ),
+                active.live,
+            )
+        if isinstance(last, Failed):
+            return "failed", last.reason
+        return ("stopped" if last.stopped else "completed"), None
+
+    def _free_id(self, name: str) -> str:
+        for number in itertools.count(1):
+            free = f"{_stem(name)}-{number}"
+            if free not in self._active and not (self._workspace.runs / free).exists():
+                return free
+        raise AssertionError
+
+
+def _end_of(result: RunResult, active: Active) -> tuple[RunState, str | None]:
+    """How a run has ended, and why, if it has not ended as planned."""
+    if result.status == "completed":
+        return ("stopped" if result.summary["stopped"] else "completed"), None
+    if read_status(result.folder) is None:
+        return "failed", str(result.summary["error"])
+    return "interrupted", None if active.interrupted else str(result.summary["error"])
+
+
+def _stem(scenario: str) -> str:
+    """Beginning of the ids of a scenario's runs; a number follows."""
+    return scenario[:56]
+
+
+def _names_of(scenario: str) -> re.Pattern[str]:
+    """Ids of a scenario's runs that a server has started."""
+    return re.compile(rf"{re.escape(_stem(scenario))}-[1-9]\d*")

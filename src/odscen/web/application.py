@@ -1,0 +1,135 @@
+"""The application: routes, guard, and the built page if there is one."""
+
+from __future__ import annotations
+
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fastapi import FastAPI
+from starlette.exceptions import HTTPException
+from starlette.responses import HTMLResponse, Response
+from starlette.staticfiles import StaticFiles
+
+from odscen import __version__
+from odscen.carla.client import Address
+from odscen.web import (
+    carla_routes,
+    demand_routes,
+    map_routes,
+    result_routes,
+    run_routes,
+    scenario_routes,
+)
+from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
+from odscen.web.messages import Health
+from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
+from odscen.web.services import Services, Shared
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Collection
+
+    from starlette.types import Scope
+
+    from odscen.workspace.store import Workspace
+
+STATIC = Path(__file__).parent / "static"
+"""Where the built front end lies."""
+
+_PLAIN = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>odscen</title></head>
+<body><main><h1>odscen</h1>
+<p>The server is running, but its page has not been built. In a checkout, build it with</p>
+<pre>cd frontend &amp;&amp; npm ci &amp;&amp; npm run build</pre>
+<p>and load this page again. The interface for programs is described at
+<a href="/api/docs">/api/docs</a>.</p></main></body></html>
+"""
+
+
+def create_app(
+    workspace: Workspace,
+    *,
+    token: str | None = None,
+    hosts: Collection[str] | None = LOOPBACK,
+    max_upload: int = MAX_UPLOAD,
+    static: Path = STATIC,
+    carla: Address = Address(),  # noqa: B008 - immutable
+) -> FastAPI:
+    """Make the server's application.
+
+    Parameters
+    ----------
+    workspace
+        Maps, scenarios and runs that it serves.
+    token
+        What clients have to show; ``None`` if anybody who can reach it may use it.
+    hosts
+        Names that it answers to; ``None`` for all, which only a token makes safe.
+    max_upload
+        Bytes of a request, at most.
+    static
+        Folder of the built front end.
+    carla
+        Where the CARLA server is that runs can be shown on, if there is one.
+    """
+    shared = Services.of(workspace, carla)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        yield
+        shared.close()
+
+    app = FastAPI(
+        title="odscen",
+        version=__version__,
+        docs_url="/api/docs",
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+        lifespan=lifespan,
+        responses=RESPONSES,
+    )
+    app.state.services = shared
+    add_error_handlers(app)
+
+    @app.get("/api/health")
+    def health(shared: Shared) -> Health:
+        """Say that the server is there."""
+        return Health(version=__version__, workspace=str(shared.workspace.root))
+
+    for routes in (
+        map_routes,
+        scenario_routes,
+        demand_routes,
+        run_routes,
+        result_routes,
+        carla_routes,
+    ):
+        app.include_router(routes.router)
+
+    @app.get("/api", include_in_schema=False)
+    @app.get("/api/{path:path}", include_in_schema=False)
+    def nothing(path: str = "") -> Response:
+        return error_response(404, "NotFound", f"there is no /api/{path}")
+
+    if (static / "index.html").is_file():
+        app.mount("/", _BuiltPage(directory=static, html=True))
+    else:
+        app.get("/", include_in_schema=False)(lambda: HTMLResponse(_PLAIN))
+    app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
+    return app
+
+
+class _BuiltPage(StaticFiles):
+    """The built front end; its own addresses, which are no files, all lead to its one page."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Answer with a file, else with the page."""
+        try:
+            response = await super().get_response(path, scope)
+        except HTTPException as error:
+            if error.status_code != 404 or "." in Path(path).name:
+                raise
+            response = await super().get_response("index.html", scope)
+        if response.media_type == "text/html":  # names the files that belong to it
+            response.headers["Cache-Control"] = "no-cache"
+        return response

@@ -1,0 +1,158 @@
+"""The live view of a run over a WebSocket.
+
+What is sent follows the client: after each frame the server waits for any text, and meanwhile
+newer frames take the place of older ones. A client that never answers is sent one frame, and costs
+nothing more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import orjson
+from starlette.websockets import WebSocketDisconnect
+
+from odscen.sumo.worker.snapshots import origin
+
+if TYPE_CHECKING:
+    from starlette.websockets import WebSocket
+
+    from odscen.web.active_runs import Active
+
+GRACE = 5.0
+"""Wall seconds after the end of a run in which a client may still ask for the last frame."""
+
+
+class LiveView:
+    """One client that watches one run."""
+
+    def __init__(self, socket: WebSocket, run: Active) -> None:
+        self._socket = socket
+        self._run = run
+        self._changed = asyncio.Event()
+        self._ready = True
+        self._gone = False
+        self._said: dict[str, Any] = {}
+        self._lights: dict[str, str] = {}
+        self._incidents = 0
+        self._frame = 0
+
+    async def show(self) -> None:
+        """Serve the client until it leaves or the run is over and shown."""
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            with suppress(RuntimeError):  # the server has ended meanwhile
+                loop.call_soon_threadsafe(self._changed.set)
+
+        listening = asyncio.create_task(self._listen())
+        self._run.live.add_watcher(wake)
+        try:
+            with suppress(WebSocketDisconnect, RuntimeError):
+                await self._serve()
+        finally:
+            self._run.live.remove_watcher(wake)
+            listening.cancel()
+
+    async def _serve(self) -> None:
+        live = self._run.live
+        while not self._gone:
+            self._changed.clear()
+            over = self._run.ended is not None
+            if self._ready:
+                await self._tell_changes()
+                if live.picture.number > self._frame:
+                    await self._send_frame()
+                elif over:
+                    break
+                else:
+                    live.ask_frame()
+                    await self._changed.wait()
+            elif over:
+                await self._wait_once()
+                self._ready = True
+            else:
+                await self._changed.wait()
+        if not self._gone:
+            end = {"type": "end", "state": self._run.ended, "error": self._run.error}
+            await self._send(end)
+            await self._socket.close()
+
+    async def _wait_once(self) -> None:
+        """Wait for a client's answer, but not for ever; go on with nothing more to show."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._answered(), GRACE)
+            return
+        self._frame = self._run.live.picture.number
+
+    async def _answered(self) -> None:
+        while not (self._ready or self._gone):
+            await self._changed.wait()
+            self._changed.clear()
+
+    async def _tell_changes(self) -> None:
+        """Tell what has changed since this client was told last."""
+        live, plan = self._run.live, self._run.plan
+        if plan is not None and "hello" not in self._said:
+            self._said["hello"] = True
+            await self._send(self._hello())
+        state = {"type": "state", "state": self._run.state, "speed": live.pace.speed}
+        if state != self._said.get("state"):
+            self._said["state"] = state
+            await self._send(state)
+        lights, incidents = live.lights, live.incidents
+        changed = {n: state for n, state in lights.items() if self._lights.get(n) != state}
+        if changed:
+            self._lights = lights
+            await self._send({"type": "lights", "lights": changed})
+        if len(incidents) > self._incidents:
+            new = incidents[self._incidents :]
+            self._incidents += len(new)
+            await self._send({"type": "events", "events": new})
+
+    def _hello(self) -> dict[str, Any]:
+        plan = self._run.plan
+        if plan is None:
+            raise AssertionError
+        return {
+            "type": "hello",
+            "scenario": plan.scenario,
+            "until": plan.until,
+            "step_length": plan.step_length,
+            "origin": origin(plan),
+            "actors": [
+                {
+                    "index": index,
+                    "id": actor.id,
+                    "category": actor.category,
+                    "model": actor.model,
+                    "length": actor.length,
+                    "width": actor.width,
+                    "ego": actor.ego,
+                    "flow": actor.flow,
+                    "depart": actor.depart,
+                }
+                for index, actor in enumerate(plan.actors)
+            ],
+        }
+
+    async def _send_frame(self) -> None:
+        picture = self._run.live.picture
+        self._frame = picture.number
+        self._ready = False
+        await self._socket.send_bytes(picture.frame)
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        await self._socket.send_text(orjson.dumps(message).decode())
+
+    async def _listen(self) -> None:
+        while True:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                self._gone = True
+                self._changed.set()
+                return
+            self._ready = True
+            self._changed.set()

@@ -1,0 +1,164 @@
+"""How a network is written down: what SUMO reads must be what was meant."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.convert.model.net import (
+    CROSSING,
+    INTERNAL,
+    NORMAL,
+    WALKING_AREA,
+    Net,
+    NetEdge,
+    NetJunction,
+    NetLane,
+    NetLink,
+    Phase,
+    Request,
+    TrafficLight,
+)
+
+CARS = frozenset({"passenger", "bus"})
+
+
+def lane(name: str, *points: tuple[float, float, float], **more: object) -> NetLane:
+    return NetLane(SumoLaneId(name), 0, 10.0, 13.89, 3.5, CARS, np.array(points), **more)
+
+
+STREET = lane("a_0", (0.0, 0.0, 0.0), (10.0, 0.0, 0.0), change_left=False, xodr=("7_-1", "8_-1"))
+WAY = lane(":j_0_0", (10.0, 0.0, 0.0), (12.0, 0.0, 0.0))
+
+
+def net(
+    *,
+    edges: tuple[NetEdge, ...] = (),
+    junctions: tuple[NetJunction, ...] = (),
+    lights: tuple[TrafficLight, ...] = (),
+    flat: bool = True,
+    lefthand: bool = False,
+) -> Net:
+    street = NetEdge(SumoEdgeId("a"), NORMAL, (STREET,), "i", "j", 'Rue "A" & <B>')
+    inner = NetEdge(SumoEdgeId(":j_0"), INTERNAL, (WAY,))
+    return Net(
+        (100.0, -5.0),
+        lefthand,
+        (street, inner, *edges),
+        (NetLink(SumoEdgeId("a"), SumoEdgeId("b"), 0, 1, WAY.id, "l", "m", "j", 3),),
+        junctions,
+        lights,
+        flat=flat,
+    )
+
+
+def text(made: Net) -> ET.Element:
+    return ET.fromstring(made.to_xml())
+
+
+def test_shapes_are_moved_by_the_offset_that_the_file_states() -> None:
+    xml = text(net())
+    assert xml.find("location").get("netOffset") == "100.00,-5.00"
+    assert xml.find("edge[@id='a']/lane").get("shape") == "100.0000,-5.0000 110.0000,-5.0000"
+    assert xml.find("location").get("convBoundary") == "100.0,-5.0,112.0,-5.0"
+
+
+def test_heights_are_written_unless_the_network_is_flat() -> None:
+    high = text(net(flat=False))
+    assert high.find("edge[@id='a']/lane").get("shape").split()[0] == "100.0000,-5.0000,0.0000"
+
+
+def test_a_lane_says_who_may_use_it_where_it_comes_from_and_what_may_not_be_crossed() -> None:
+    found = text(net()).find("edge[@id='a']/lane")
+    assert found.get("allow") == "bus passenger"
+    assert found.find("param").attrib == {"key": "origId", "value": "7_-1 8_-1"}
+    assert found.get("changeLeft") == "emergency", "only emergency vehicles may cross"
+    assert found.get("changeRight") is None
+
+
+def test_names_are_quoted() -> None:
+    assert text(net()).find("edge[@id='a']").get("name") == 'Rue "A" & <B>'
+
+
+@given(st.text(max_size=20))
+def test_any_name_of_a_street_leaves_the_file_well_formed(name: str) -> None:
+    odd = NetEdge(SumoEdgeId("b"), NORMAL, (lane("b_0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),),
+                  "j", "k", name)  # fmt: skip
+    found = text(net(edges=(odd,))).find("edge[@id='b']")
+    assert found.get("name", "") == "".join(c if c.isprintable() else " " for c in name)
+
+
+def test_edges_inside_junctions_come_first_as_sumo_wants_them() -> None:
+    assert [edge.get("id") for edge in text(net()).iter("edge")] == [":j_0", "a"]
+
+
+def test_a_connection_names_its_lanes_its_way_and_its_light() -> None:
+    assert text(net()).find("connection").attrib == {
+        "from": "a", "to": "b", "fromLane": "0", "toLane": "1", "via": ":j_0_0", "tl": "j",
+        "linkIndex": "3", "dir": "l", "state": "m",
+    }  # fmt: skip
+
+
+def test_the_last_letter_of_a_response_is_the_first_link() -> None:
+    requests = (
+        Request(frozenset(), frozenset({1, 2})),
+        Request(frozenset({0}), frozenset({0})),
+        Request(frozenset({0}), frozenset({0})),
+    )
+    junction = NetJunction(
+        "j", "priority", (10.0, 0.0, 0.0), np.zeros((3, 3)), (STREET.id,), (WAY.id,), requests
+    )
+    rows = text(net(junctions=(junction,))).findall("junction/request")
+    assert [row.get("response") for row in rows] == ["000", "001", "001"]
+    assert [row.get("foes") for row in rows] == ["110", "001", "001"]
+    assert [row.get("index") for row in rows] == ["0", "1", "2"]
+
+
+def test_a_light_has_its_phases_and_names_the_signals_behind_its_links() -> None:
+    phases = (Phase(31.0, "Gr", "stage 1", 8.0, 62.0), Phase(3.0, "yr"))
+    light = TrafficLight("j", phases, signals=(("s1", "s2"), ()))
+    found = text(net(lights=(light,))).find("tlLogic")
+    assert [p.attrib for p in found.iter("phase")] == [
+        {"duration": "31", "state": "Gr", "name": "stage 1"},
+        {"duration": "3", "state": "yr"},
+    ]
+    assert [(p.get("key"), p.get("value")) for p in found.iter("param")] == [
+        ("linkSignalID:0", "s1 s2")
+    ]
+
+
+def test_only_actuated_phases_have_bounds() -> None:
+    light = TrafficLight("j", (Phase(31.0, "G", "", 8.0, 62.0), Phase(3.0, "y")), "actuated")
+    first, second = text(net(lights=(light,))).findall("tlLogic/phase")
+    assert (first.get("minDur"), first.get("maxDur")) == ("8", "62")
+    assert second.get("minDur") is None
+
+
+def test_counts_are_those_outside_junctions() -> None:
+    walked = [
+        NetEdge(SumoEdgeId(name), function, (lane(f"{name}_0", (0, 0, 0), (1, 0, 0)),))
+        for name, function in (
+            (":j_c0", CROSSING),
+            (":j_w0", WALKING_AREA),
+            (":j_w1", WALKING_AREA),
+        )
+    ]
+    assert net(edges=tuple(walked)).counts() == {
+        "edges": 1, "lanes": 1, "junctions": 0, "tl_logics": 0, "crossings": 1,
+        "walking_areas": 2,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("lefthand", [True, False])
+def test_the_file_says_on_which_side_one_drives(lefthand: bool) -> None:
+    assert (text(net(lefthand=lefthand)).get("lefthand") == "true") is lefthand
+
+
+def test_a_network_of_nothing_can_be_written() -> None:
+    xml = text(Net((0.0, 0.0), False, (), (), ()))
+    assert [child.tag for child in xml] == ["location"]

@@ -1,0 +1,239 @@
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import pytest
+
+from odscen.base.categories import Body, Category
+from odscen.lanegraph.graphs import MapGraph
+from odscen.scenario.checks.scenario_checks import check
+from odscen.scenario.checks.signal_timing import Light
+from odscen.scenario.document.problems import Problem
+from odscen.scenario.document.scenario_document import (
+    Actor,
+    Environment,
+    Flow,
+    MapReference,
+    Scenario,
+)
+from tests.graphs import SHA256, fork, line_of_segments, two_lane_road
+
+GRAPH = fork()
+MAP = MapReference(name="toy", sha256=SHA256)
+WHOLE = ("r1", "j9", "r2", "r3")
+
+
+class Catalogue:
+    """Three models, one preset."""
+
+    models: ClassVar = {
+        "car.small": (Category.CAR, Body(3.0, 1.5, 1.4)),
+        "car.huge": (Category.CAR, Body(20.0, 3.4, 3.0)),
+        "bus.one": (Category.BUS, Body(12.0, 2.5, 3.0)),
+    }
+
+    def category_of(self, model: str) -> Category | None:
+        return self.models[model][0] if model in self.models else None
+
+    def dimensions(self, model: str) -> Body | None:
+        return self.models[model][1] if model in self.models else None
+
+    def weather(self, preset: str) -> Mapping[str, float] | None:
+        return {"wetness": 0.0} if preset == "ClearNoon" else None
+
+
+def actor(spawn: str = "1.0.-1.10", **fields: Any) -> Actor:
+    return Actor.model_validate({"id": "a", "category": "car", "spawn": spawn} | fields)
+
+
+def scenario(*actors: Actor, **fields: Any) -> Scenario:
+    return Scenario.model_validate(
+        {"name": "test", "map": MAP, "roi": WHOLE, "actors": actors} | fields
+    )
+
+
+def problems(*actors: Actor, graph: MapGraph = GRAPH, **fields: Any) -> tuple[Problem, ...]:
+    return check(scenario(*actors, **fields), graph, Catalogue())
+
+
+def codes(*actors: Actor, graph: MapGraph = GRAPH, **fields: Any) -> list[str]:
+    return [problem.code for problem in problems(*actors, graph=graph, **fields)]
+
+
+def test_a_good_scenario_has_no_problems() -> None:
+    assert codes(actor(), actor("1.0.-1.20", id="b", goal="3.0.-1.29", ego=True)) == []
+
+
+@pytest.mark.parametrize(
+    ("one", "code", "where"),
+    [
+        (actor("9.9.9.9"), "unknown_spawn", "actors[0].spawn"),
+        (actor("1.0.-1.50"), "unknown_spawn", "actors[0].spawn"),
+        (actor("ped.1.0.-2.0"), "wrong_graph", "actors[0].spawn"),
+        (actor(category="pedestrian"), "wrong_graph", "actors[0].spawn"),
+        (actor("1.0.1.49"), "no_goal", "actors[0].spawn"),
+        (actor(goal="8.8.8.8"), "unknown_goal", "actors[0].goal"),
+        (actor(goal="1.0.1.49"), "goal_unreachable", "actors[0].goal"),
+        (actor(goal="1.0.-1.10"), "goal_unreachable", "actors[0].goal"),
+        (actor(goal="ped.1.0.-2.9"), "goal_unreachable", "actors[0].goal"),
+        (actor(goal="1.0.-1.30"), "goal_not_candidate", "actors[0].goal"),
+        (actor(lateral_offset=1.8), "off_lane", "actors[0].lateral_offset"),
+        (actor(lateral_offset=-1.0), "body_over_border", "actors[0].lateral_offset"),
+        (actor(speed=90), "speed_implausible", "actors[0].speed"),
+        (actor(speed=0.5), "speed_implausible", "actors[0].speed"),
+        (actor(model="car.none"), "unknown_model", "actors[0].model"),
+        (actor(model="bus.one"), "model_of_other_category", "actors[0].model"),
+        (actor(depart=600), "departs_too_late", "actors[0].depart"),
+        (actor("91.0.-1.4"), "tight_curve", "actors[0].spawn"),
+    ],
+)
+def test_each_rule_for_one_actor_names_its_place(one: Actor, code: str, where: str) -> None:
+    assert [(p.code, p.where) for p in problems(one)] == [(code, where)]
+
+
+def test_a_spawn_or_goal_outside_the_region_names_the_segment_to_add() -> None:
+    outside = problems(actor("2.0.-1.3"), roi=("r1", "j9"))
+    assert [(p.code, p.segments) for p in outside] == [("spawn_outside_roi", ("r2",))]
+    far = problems(actor(goal="2.0.-1.29"), roi=("r1", "j9"))
+    assert [(p.code, p.segments) for p in far] == [("goal_outside_roi", ("r2",))]
+    assert "add the segment" in far[0].message
+
+
+def test_the_end_of_the_region_is_a_goal_inside_a_junction_too() -> None:
+    assert codes(actor(goal="90.0.-1.9"), roi=("r1", "j9")) == []
+
+
+def test_bodies_that_overlap_are_found_with_their_offsets_and_models() -> None:
+    road = two_lane_road()
+    beside = actor("1.0.-1.10"), actor("1.0.-2.10", id="b")
+    assert codes(*beside, graph=road, roi=("r1",)) == []
+    near = [
+        actor("1.0.-1.10", lateral_offset=-0.9),
+        actor("1.0.-2.10", id="b", lateral_offset=0.9),
+    ]
+    assert "bodies_overlap" in codes(*near, graph=road, roi=("r1",))
+    # 4 m apart on a lane: 5 m long cars overlap, 3 m long ones do not.
+    behind = actor("1.0.-1.10"), actor("1.0.-1.12", id="b")
+    assert codes(*behind, graph=road, roi=("r1",)) == ["bodies_overlap"]
+    small = [one.model_copy(update={"model": "car.small"}) for one in behind]
+    assert codes(*small, graph=road, roi=("r1",)) == []
+    later = behind[0], behind[1].model_copy(update={"depart": 5.0})
+    assert codes(*later, graph=road, roi=("r1",)) == []
+
+
+def test_a_node_carries_one_actor_or_one_flow() -> None:
+    flow = Flow(id="f", spawn="1.0.-1.10", per_hour=100)
+    assert codes(actor(), actor(id="b", depart=9)) == ["node_taken"]
+    assert codes(actor(), flows=(flow,)) == ["node_taken"]
+
+
+def test_ids_are_given_once_and_the_ego_is_one_vehicle() -> None:
+    twice = codes(actor(), actor("1.0.-1.20"))
+    assert twice == ["duplicate_id"]
+    assert codes(actor(ego=True), actor("1.0.-1.20", id="b", ego=True)) == ["several_egos"]
+    walker = actor("ped.1.0.-2.0", category="pedestrian", ego=True)
+    assert codes(walker) == ["ego_not_vehicle"]
+
+
+def test_the_region_is_checked() -> None:
+    line = line_of_segments()
+    assert codes(graph=line, roi=()) == ["roi_empty", "no_actors"]
+    assert codes(graph=line, roi=("r1", "r3")) == ["roi_not_connected", "no_actors"]
+    assert codes(graph=line, roi=("r1", "r9", "r1")) == [
+        "unknown_segment",
+        "segment_twice",
+        "no_actors",
+    ]
+
+
+def test_another_map_is_the_first_problem_and_silences_the_rest() -> None:
+    other = MapReference(name="toy", sha256="1" * 64)
+    assert codes(actor("9.9.9.9"), map=other) == ["map_mismatch"]
+    coarse = MapReference(name="toy", sha256=SHA256, spacing=5)
+    assert codes(actor("9.9.9.9"), map=coarse) == ["spacing_mismatch"]
+
+
+def test_flows_are_checked() -> None:
+    flow = Flow(id="f", spawn="1.0.-1.0", per_hour=100, begin=100, end=100)
+    assert codes(flows=(flow,)) == ["flow_window_empty"]
+    mixed = Flow(
+        id="f", spawn="1.0.-1.0", per_hour=9, mix={Category.CAR: 1, Category.PEDESTRIAN: 1}
+    )
+    assert codes(flows=(mixed,)) == ["wrong_graph"]
+    late = Flow(id="f", spawn="1.0.-1.0", per_hour=9, begin=700)
+    assert codes(flows=(late,)) == ["departs_too_late"]
+
+
+def test_weather_is_looked_up_in_the_catalogue() -> None:
+    assert codes(actor(), environment=Environment(preset="Hail")) == ["unknown_preset"]
+    odd = Environment(parameters={"frogs": 1.0, "wetness": 3.0})
+    assert codes(actor(), environment=odd) == ["unknown_parameter"]
+
+
+def test_all_problems_come_at_once() -> None:
+    found = problems(
+        actor("9.9.9.9", speed=90, ego=True), actor("1.0.1.49", id="b", ego=True), roi=(*WHOLE, "x")
+    )
+    assert [p.code for p in found] == [
+        "unknown_segment",
+        "several_egos",
+        "speed_implausible",
+        "unknown_spawn",
+        "no_goal",
+    ]
+    assert [p.severity for p in found] == ["error", "error", "warning", "error", "error"]
+
+
+def test_a_setting_that_no_run_acts_on_is_a_warning() -> None:
+    found = problems(actor(crosses_anywhere=True, ignores_red=True))
+    assert [(p.severity, p.code, p.where) for p in found] == [
+        ("warning", "not_acted_on", "actors[0].crosses_anywhere")
+    ]
+
+
+LIGHTS = (Light(("5", "6"), (20.0, 20.0, 7.0)), Light(("X0",), (30.0, 7.0)))
+
+
+def signal_codes(
+    *timings: dict[str, Any], lights: tuple[Light, ...] = LIGHTS
+) -> list[tuple[str, str]]:
+    timed = scenario(actor(), signals={"junctions": timings})
+    return [(p.code, p.where) for p in check(timed, GRAPH, lights=lights)]
+
+
+def test_lights_are_timed_by_any_of_their_junctions_or_by_their_own_id() -> None:
+    good = {"junction": "6", "green": [5, 60, 7]}, {"junction": "X0", "control": "actuated"}
+    assert signal_codes(*good) == []
+
+
+@pytest.mark.parametrize(
+    ("timings", "code", "where"),
+    [
+        ([{"junction": "7"}], "unknown_light", "junctions[0].junction"),
+        ([{"junction": "J5"}], "unknown_light", "junctions[0].junction"),
+        ([{"junction": "5"}, {"junction": "6"}], "light_twice", "junctions[1].junction"),
+        ([{"junction": "5", "green": [9, 9]}], "wrong_number_of_greens", "junctions[0].green"),
+        ([{"junction": "X0", "green": [9, 4.9]}], "green_too_short", "junctions[0].green[1]"),
+    ],
+)
+def test_timing_that_a_light_cannot_have_is_an_error(
+    timings: list[dict[str, Any]], code: str, where: str
+) -> None:
+    assert signal_codes(*timings) == [(code, f"signals.{where}")]
+
+
+def test_an_unknown_light_is_named_with_those_that_there_are() -> None:
+    timed = scenario(actor(), signals={"junctions": [{"junction": "7"}]})
+    (problem,) = check(timed, GRAPH, lights=LIGHTS)
+    assert "'7'; there are lights in '5', '6', 'X0'" in problem.message
+    (problem,) = check(timed, GRAPH, lights=())
+    assert "the map has no traffic lights" in problem.message
+    assert check(timed, GRAPH) == ()
+
+
+def test_a_wrong_number_of_greens_is_answered_with_those_of_the_program() -> None:
+    timed = scenario(actor(), signals={"junctions": [{"junction": "X0", "green": [9]}]})
+    (problem,) = check(timed, GRAPH, lights=LIGHTS)
+    assert (
+        "2 stages, but green has 1 times; give one for each (the map's are 30, 7)"
+        in problem.message
+    )

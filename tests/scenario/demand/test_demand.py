@@ -1,0 +1,215 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from odscen.base.errors import InputError, NotFoundError, ScenarioError
+from odscen.scenario.checks.scenario_checks import check
+from odscen.scenario.demand.count_stations import Passing, contradictions, geh
+from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve
+from odscen.scenario.demand.demand_tables import read_counts, read_matrix, read_profile, read_zones
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.scenario_document import Background, Counts, Matrix, Scenario
+from odscen.scenario.edits import demand_edits, scenario_edits
+from tests.graphs import fork
+
+GRAPH = fork()
+
+
+def scenario() -> Scenario:
+    return scenario_edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"))
+
+
+def codes(one: Scenario) -> list[str]:
+    return sorted({p.code for p in check(one, GRAPH) if p.code != "no_actors"})
+
+
+def counts(*rows: tuple[str, float, float, float]) -> Counts:
+    return Counts.model_validate({"id": "survey", "rows": rows})
+
+
+@given(
+    st.lists(st.floats(0, 100), min_size=1, max_size=48).filter(lambda s: sum(s) > 1e-3),
+    st.floats(0, DAY - 1),
+    st.floats(0, 1),
+)
+def test_times_drawn_from_a_profile_have_the_share_that_it_gives_them(
+    shares: list[float], clock: float, quantile: float
+) -> None:
+    curve = Curve(tuple(shares), clock=clock)
+    assert curve.amount(DAY) == pytest.approx(DAY, rel=1e-6)
+    time = float(curve.draw(np.array([quantile]), begin=0.0, end=DAY)[0])
+    assert 0 <= time <= DAY
+    assert curve.amount(time) == pytest.approx(quantile * DAY, abs=1.0)
+
+
+def test_a_weekday_is_busiest_in_the_afternoon_and_quiet_at_night() -> None:
+    times = Curve(BUILT_IN["weekday"]).draw(np.linspace(0, 1, 10_001), begin=0, end=DAY)
+    hours = np.histogram(times, bins=24, range=(0, DAY))[0]
+    assert hours.argmax() == 17
+    assert hours[0:5].max() < hours[7] / 5
+
+
+def test_a_run_that_starts_at_noon_gets_the_demand_of_the_afternoon_first() -> None:
+    noon = Curve(BUILT_IN["weekday"], clock=DAY / 2)
+    assert noon.amount(6 * 3600) > 1.5 * Curve(BUILT_IN["weekday"]).amount(6 * 3600)
+
+
+def test_demand_survives_being_written_and_read() -> None:
+    one = demand_edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2", "r3"])
+    one = demand_edits.set_matrix(
+        one, GRAPH, matrix="m", trips=[("r1", "ends", 2.5)], profile="weekday"
+    )
+    one = demand_edits.set_counts(one, GRAPH, counts="c", rows=[("r1>j9", 0, 900, 4)])
+    one = demand_edits.set_background(one, GRAPH, background="b", per_km=4)
+    assert loads(dumps(one)) == one
+    assert codes(one) == []
+    assert dumps(one).count("\n") < 40
+
+
+def test_a_scenario_without_demand_is_written_as_before() -> None:
+    assert "demand" not in dumps(scenario())
+
+
+def test_background_traffic_has_one_amount() -> None:
+    with pytest.raises(ValueError, match="one of fill, per_km and trips, not none"):
+        Background(id="b")
+    one = demand_edits.set_background(scenario(), GRAPH, background="b", per_km=4)
+    two = demand_edits.set_background(one, GRAPH, background="b", trips=100)
+    assert (two.demand.background[0].per_km, two.demand.background[0].trips) == (None, 100)
+
+
+def test_an_edit_of_the_same_name_changes_the_part_and_another_adds_one() -> None:
+    one = demand_edits.set_matrix(scenario(), GRAPH, matrix="m", trips=[("r1", "r2", 2)])
+    one = demand_edits.set_matrix(one, GRAPH, matrix="m", profile="weekend")
+    one = demand_edits.set_matrix(one, GRAPH, matrix="n", trips=[("r1", "r3", 2)])
+    assert [(m.id, m.profile, m.trips[0][1]) for m in one.demand.matrices] == [
+        ("m", "weekend", "r2"),
+        ("n", None, "r3"),
+    ]
+    left = demand_edits.remove_demand(one, GRAPH, part="m")
+    assert [m.id for m in left.demand.matrices] == ["n"]
+    with pytest.raises(NotFoundError, match="did you mean n"):
+        demand_edits.remove_demand(left, GRAPH, part="nn")
+
+
+def test_what_is_in_use_cannot_be_removed() -> None:
+    one = demand_edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2"])
+    one = demand_edits.set_matrix(one, GRAPH, matrix="m", trips=[("r1", "ends", 2)])
+    with pytest.raises(ScenarioError, match="'ends' is neither a zone nor a segment"):
+        demand_edits.remove_demand(one, GRAPH, part="ends")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"trips": [("r1", "r77", 1)]}, "'r77' is neither a zone nor a segment"),
+        ({"trips": [("r1", "r2", 1), ("r1", "r2", 3)]}, "given 2 times"),
+        ({"trips": [("r1", "r2", 1)], "profile": "monday"}, "there are weekday, weekend"),
+        ({"trips": [("r1", "r2", 1)], "begin": 5, "end": 5}, "not after it begins"),
+        ({"trips": [("r1", "r2", -1)]}, "greater than or equal to 0"),
+    ],
+)
+def test_a_matrix_that_cannot_be_right_is_refused(change: dict, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        demand_edits.set_matrix(scenario(), GRAPH, matrix="m", **change)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([("r77", 0, 900, 1)], "'r77', which the map does not have"),
+        ([("r1>r2", 0, 900, 1)], "no lane leads from 'r1' into 'r2'"),
+        ([("r1", 0, 900, 1), ("r1", 0, 900, 2)], "counted 2 times: 1 and 2"),
+        ([("r1", 0, 900, 1), ("r2", 450, 1350, 2)], "does not fit that of the first row"),
+    ],
+)
+def test_counts_that_cannot_be_right_are_refused(rows: list, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        demand_edits.set_counts(scenario(), GRAPH, counts="c", rows=rows)
+
+
+def test_names_are_shared_with_actors_and_flows() -> None:
+    one = scenario_edits.add_actor(scenario(), GRAPH, category="car", spawn="1.0.-1.10", id="rush")
+    with pytest.raises(ScenarioError, match="'rush' is taken"):
+        demand_edits.set_matrix(one, GRAPH, matrix="rush", trips=[("r1", "r2", 1)])
+
+
+def test_turns_that_add_up_to_more_than_their_stream_are_named() -> None:
+    survey = counts(("r1>j9", 0, 900, 50), ("r1>j9>r2", 0, 900, 40), ("r1>j9>r3", 0, 900, 30))
+    found = list(contradictions(survey, GRAPH))
+    assert [(one.places, one.begin) for one in found] == [(("r1>j9", "r1>j9>r2", "r1>j9>r3"), 0.0)]
+    assert "50 were counted at r1>j9" in found[0].message
+    assert "add up to 70" in found[0].message
+    one = demand_edits.set_counts(scenario(), GRAPH, counts="survey", rows=survey.rows)
+    assert codes(one) == ["counts_contradict"]
+
+
+def test_a_junction_that_more_enter_than_leave_is_named() -> None:
+    survey = counts(("r1>j9", 0, 900, 90), ("j9>r2", 0, 900, 40), ("j9>r3", 0, 900, 20))
+    messages = [one.message for one in contradictions(survey, GRAPH)]
+    assert messages == ["90 were counted on all ways into j9, but 60 on all ways out"]
+
+
+def test_counts_a_few_vehicles_apart_do_not_contradict_each_other() -> None:
+    survey = counts(("r1>j9", 0, 900, 90), ("j9>r2", 0, 900, 62), ("j9>r3", 0, 900, 31))
+    assert list(contradictions(survey, GRAPH)) == []
+
+
+def test_geh_is_that_of_the_textbook() -> None:
+    assert geh(1200, 1000, 3600) == pytest.approx(6.03, abs=0.005)
+    assert geh(300, 250, 900) == pytest.approx(geh(1200, 1000, 3600))
+    assert geh(0, 0, 900) == 0.0
+
+
+def test_a_way_passes_streams_turns_and_segments() -> None:
+    passing = Passing(GRAPH, ["r1>j9>r2", "r2", "r1>j9", "r1>j9>r3", "nowhere"])
+    row = {name: index for index, name in enumerate(GRAPH.segments.ids)}
+    passed = passing.of([row["r1"], row["j9"], row["r2"]])
+    assert [(passing.places[place], step) for place, step in passed] == [
+        ("r1>j9", 1),
+        ("r1>j9>r2", 2),
+        ("r2", 2),
+    ]
+
+
+def test_tables_are_read_with_seconds_or_times_of_day() -> None:
+    text = "place;begin;end;count\nr1 > j9;7:00;7:15;12\nr1>j9;26100;27000;9\n"
+    assert read_counts(text) == (
+        (("r1>j9", 25200, 26100, 12), ("r1>j9", 26100, 27000, 9)),
+        (2, 3),
+    )
+    assert read_counts(text.splitlines()[0] + "\nr1;7:00;7:15;12", clock=25200).values == (
+        ("r1", 0, 900, 12),
+    )
+    assert read_matrix("from,to,trips\n\na,b,3\n") == {None: ((("a", "b", 3),), (3,))}
+    sliced = read_matrix("from,to,trips,begin,end\na,b,3,0,900\na,b,4,900,1800\nb,a,1,0,900\n")
+    assert sliced == {
+        (0, 900): ((("a", "b", 3), ("b", "a", 1)), (2, 4)),
+        (900, 1800): ((("a", "b", 4),), (3,)),
+    }
+    assert read_profile("time,share\n0:00,1\n12:00,3\n") == (1, 3)
+    assert read_zones("zone,segment\nn,r1\nn,r2\n") == {"n": (("r1", "r2"), (2, 3))}
+
+
+@pytest.mark.parametrize(
+    ("read", "text", "message"),
+    [
+        (read_matrix, "from,to,number\na,b,3\n", "line 1.*needed are from, to, trips"),
+        (read_matrix, "from,to,trips\na,b,many\n", "line 2: trips must be a number.*'many'"),
+        (read_matrix, "from,to,trips\na,b\n", "line 2: 2 values for 3 columns"),
+        (read_matrix, "from,to,trips\n", "no lines below the first"),
+        (read_counts, "place,begin,end,count\nr1,900,0,3\n", "line 2: the slice from 900 to 0"),
+        (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: time '13:00'"),
+        (read_zones, "zone,segment\nold town,r1\n", "line 2: zone must be .*not 'old town'"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, message) -> None:
+    with pytest.raises(InputError, match=message):
+        read(text)
+
+
+def test_a_mix_of_a_matrix_may_hold_all_seven_categories() -> None:
+    mix = dict.fromkeys(("car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"), 1)
+    matrix = Matrix.model_validate({"id": "m", "trips": [("a", "b", 1)], "mix": mix})
+    assert len(matrix.mix) == 7

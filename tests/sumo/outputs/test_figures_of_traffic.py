@@ -1,0 +1,218 @@
+"""Figures of traffic held against what plain SUMO says of the same traffic by other means.
+
+One run of SUMO writes lane data, which our figures are made of, and beside it tripinfo, induction
+loops, and speed and emissions of every vehicle in every step.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+import pytest
+import sumo
+from lxml import etree
+
+from odscen.results.measures.queues import queue_lengths
+from odscen.results.measures.run_traffic import traffic_of_run
+from odscen.results.measures.traffic import TrafficFigures, over_run, traffic_figures
+from odscen.results.measures.traffic_sums import intervals
+from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.trip_table import trip_table
+from odscen.sumo.realize.measure_files import measures_xml
+from odscen.sumo.realize.sumo_lane_places import lane_places
+from tests.sumo.conftest import BIN
+from tests.sumo.runner.test_on_maps import built, net_file
+
+col = pl.col
+MAP = "signal_crossing"
+STEP = 0.1
+UNTIL = 1200.0
+NUMBER = 120
+"""Of vehicles."""
+ARMS = ("1", "2", "3", "4")
+CLOSE = 0.005
+"""Of a figure: half a per cent."""
+LOOP = 0.5
+"""Metres before the end of a lane."""
+
+TYPES = (
+    '<vType id="car" emissionClass="HBEFA4/PC_petrol_Euro-4" speedFactor="1" speedDev="0"/>'
+    '<vType id="truck" vClass="truck" length="9" emissionClass="HBEFA4/RT_le7.5t_Euro-VI_A-C"'
+    ' maxSpeed="10" speedFactor="1" speedDev="0"/>'
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    folder: Path
+    figures: TrafficFigures
+    steps: pl.DataFrame
+    trips: pl.DataFrame
+
+    def loops(self, edge: str) -> int:
+        """Vehicles that induction loops counted on all lanes of an edge."""
+        root = etree.parse(self.folder / "loops.xml").getroot()
+        found = [one for one in root if one.get("id").rpartition("_")[0] == edge]
+        assert found
+        return sum(int(one.get("nVehContrib")) for one in found)
+
+
+def routes() -> str:
+    chance = random.Random(5)
+    departs = sorted(round(chance.uniform(0.0, 800.0), 1) for _ in range(NUMBER))
+    lines = ["<routes>", TYPES]
+    for number, depart in enumerate(departs):
+        source, target = chance.sample(ARMS, 2)
+        kind = "truck" if number % 8 == 0 else "car"
+        edges = f"{source}.0.f {source}.1.f {target}.1.b {target}.0.b"
+        lines.append(
+            f'<vehicle id="v{number}" type="{kind}" depart="{depart}" departLane="best"'
+            f' departPos="0" departSpeed="max"><route edges="{edges}"/></vehicle>'
+        )
+    return "\n".join([*lines, "</routes>"])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    folder = tmp_path_factory.mktemp("plain")
+    sumo_map = built(MAP).sumo
+    net_file(MAP, folder)
+    lanes = {
+        lane.id: lane.length for lane in sumo_map.net.lanes.values() if lane.allows("passenger")
+    }
+    (folder / "routes.rou.xml").write_text(routes())
+    (folder / "measures.add.xml").write_text(measures_xml(60.0, emissions=True))
+    loops = [
+        f'<inductionLoop id="{lane}" lane="{lane}" pos="-{LOOP}" period="{UNTIL:g}"'
+        ' file="loops.xml"/>'
+        for lane in lanes
+        if not lane.startswith(":")
+    ]
+    (folder / "loops.add.xml").write_text("\n".join(["<additional>", *loops, "</additional>"]))
+    subprocess.run(
+        [
+            BIN / "sumo", "-n", f"{MAP}.net.xml", "-r", "routes.rou.xml",
+            "-a", "measures.add.xml,loops.add.xml", "--tripinfo-output", "trips.xml",
+            "--emission-output", "steps.csv", "--fcd-output", "fcd.parquet",
+            "--fcd-output.attributes", "id,speed,lane", "--end", str(UNTIL), "--seed", "3",
+            "--step-length", str(STEP), "--precision", "6", "--no-step-log", "--no-warnings",
+        ],
+        cwd=folder,
+        env={**os.environ, "SUMO_HOME": sumo.SUMO_HOME},
+        check=True,
+    )  # fmt: skip
+    table = lane_table(folder / "lanes.parquet", folder / "emissions.parquet", lanes)
+    places = lane_places(sumo_map)
+    queues = queue_lengths(pl.scan_parquet(folder / "fcd.parquet"), places, intervals(table, UNTIL))
+    steps = pl.read_csv(folder / "steps.csv", separator=";").drop_nulls("vehicle_id")
+    trips = trip_table(folder / "trips.xml", unfinished=True)
+    assert trips.height == NUMBER
+    assert trips["arrival"].null_count() == 0
+    return Run(folder, traffic_figures(table, places, end=UNTIL, queues=queues), steps, trips)
+
+
+def of(table: pl.DataFrame, **key: str) -> dict[str, float]:
+    """Row of a place over the whole run."""
+    ((name, value),) = key.items()
+    return over_run(table).row(by_predicate=col(name) == value, named=True)
+
+
+def test_delay_and_travel_time_are_those_of_tripinfo(run):
+    network = over_run(run.figures.network).row(0, named=True)
+    assert network["vehicles"] == network["departed"] == network["arrived"] == NUMBER
+    assert network["delay"] == pytest.approx(run.trips["time_loss"].mean(), rel=CLOSE)
+    assert network["seconds"] / NUMBER == pytest.approx(run.trips["duration"].mean(), rel=CLOSE)
+    assert network["distance"] == pytest.approx(run.trips["route_length"].sum(), rel=CLOSE)
+    assert run.trips["time_loss"].mean() > 10.0, "else there is nothing to be measured"
+
+
+def test_flows_are_those_of_induction_loops(run):
+    hours = UNTIL / 3600.0
+    for arm in ARMS:
+        into, out = run.loops(f"{arm}.0.f"), run.loops(f"{arm}.1.b")
+        segment = of(run.figures.segments, segment=f"r{arm}")
+        assert segment["vehicles"] == into + out
+        assert segment["flow"] == pytest.approx((into + out) / hours, rel=CLOSE)
+    junction = of(run.figures.junctions, junction="j10001")
+    assert junction["throughput"] == sum(run.loops(f"{arm}.1.f") for arm in ARMS) == NUMBER
+
+
+def test_movements_are_the_routes_that_were_driven(run):
+    root = etree.fromstring(routes().encode())
+    driven = [vehicle[0].get("edges").split() for vehicle in root.iter("vehicle")]
+    planned = pl.Series([f"r{way[0][0]}>j10001>r{way[-1][0]}" for way in driven]).value_counts()
+    found = over_run(run.figures.movements).select("movement", "vehicles").sort("movement")
+    assert found.rows() == sorted(planned.rows())
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [("co2", "vehicle_CO2"), ("fuel", "vehicle_fuel"), ("nox", "vehicle_NOx")],
+)
+def test_emissions_and_fuel_are_those_of_every_vehicle_and_step(run, ours, theirs):
+    grams = run.steps[theirs].sum() * STEP / 1000.0
+    whole = over_run(run.figures.network)[ours][0]
+    assert whole == pytest.approx(grams, rel=CLOSE)
+    places = run.figures.segments[ours].sum() + run.figures.junctions[ours].sum()
+    assert places == pytest.approx(whole), "every lane is in exactly one place"
+
+
+def test_speed_and_density_of_a_segment_are_those_of_its_vehicles(run):
+    on = run.steps.filter(col("vehicle_lane").str.starts_with("3."))
+    segment = of(run.figures.segments, segment="r3")
+    assert segment["speed"] == pytest.approx(on["vehicle_speed"].mean(), rel=2 * CLOSE)
+    number = on.height * STEP / UNTIL
+    assert segment["density"] * segment["length"] == pytest.approx(number, rel=2 * CLOSE)
+    assert segment["flow"] == pytest.approx(segment["density"] * segment["speed"] * 3.6)
+
+
+def test_delay_of_a_junction_is_lost_before_and_in_it(run):
+    limits = {lane.id: lane.speed for lane in built(MAP).sumo.net.lanes.values()}
+    to_it = col("vehicle_lane").str.contains(r"^:J10001|^\d\.\d\.f_|^:N\d\.105\.0_[12]_0")
+    wished = pl.min_horizontal(
+        col("vehicle_lane").replace_strict(limits, return_dtype=pl.Float64),
+        pl.when(col("vehicle_type") == "truck").then(10.0).otherwise(1000.0),
+    )
+    lost = (
+        run.steps.filter(to_it)
+        .select(((1.0 - col("vehicle_speed") / wished).clip(0.0) * STEP).sum())
+        .item()
+    )
+    junction = of(run.figures.junctions, junction="j10001")
+    assert junction["delay"] == pytest.approx(lost / NUMBER, rel=2 * CLOSE)
+    movements = over_run(run.figures.movements)
+    shared = (movements["delay"] * movements["vehicles"]).sum()
+    assert shared == pytest.approx(lost, rel=0.05), "what is lost where nobody gets on is nobody's"
+    assert junction["control"] == "signal"
+
+
+def test_queues_are_those_who_stand_at_one_time(run):
+    to_it = col("vehicle_lane").str.contains(r"^:J10001|^\d\.\d\.f_|^:N\d\.105\.0_[12]_0")
+    standing = (
+        run.steps.filter(to_it & (col("vehicle_speed") < 0.1)).group_by("timestep_time").len()
+    )
+    row = of(run.figures.junctions, junction="j10001")
+    assert row["queue_max"] == standing["len"].max()
+    assert row["standing"] == pytest.approx(standing["len"].sum() * STEP / UNTIL, rel=0.05)
+    junction = run.figures.junctions.filter(col("junction") == "j10001")
+    assert (junction["queue_p95"] <= junction["queue_max"]).all()
+
+
+def test_figures_of_the_run_are_ratios_of_its_trips(run):
+    found = traffic_of_run(run.figures, run.trips)
+    trips = [
+        (float(trip.get("duration")), float(trip.get("timeLoss")))
+        for trip in etree.parse(run.folder / "trips.xml").getroot()
+    ]
+    ratios = sorted(duration / (duration - lost) for duration, lost in trips)
+    assert found["travel_time_index"] == pytest.approx(sum(ratios) / len(ratios))
+    assert ratios[112] <= found["planning_time_index"] <= ratios[114]
+    share = found["planning_time_index"] / found["travel_time_index"] - 1.0
+    assert found["buffer_index"] == pytest.approx(share)
+    assert found["throughput"] == pytest.approx(NUMBER / UNTIL * 3600.0)
+    assert found["co2_per_km"] * found["vehicle_km"] == pytest.approx(1000.0 * found["co2_total"])

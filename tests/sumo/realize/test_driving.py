@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import math
+import statistics
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.sumo.realize.driving import KINDS, STYLES, Driver, draw_factor, driver, number
+from odscen.sumo.realize.weather_effects import (
+    BRAKING,
+    NO_EFFECT,
+    REACTION,
+    stopping_speed,
+    weather_effect,
+)
+from tests.sumo.conftest import BIN
+
+
+def made(category: Category = Category.CAR, **changes: Any) -> Driver:
+    values: dict[str, Any] = {
+        "style": "normal", "factor": 1.0, "speed": None, "limit": 13.89, "weather": NO_EFFECT,
+    }  # fmt: skip
+    return driver(category, DEFAULT_BODY[category], **{**values, **changes})
+
+
+def test_a_normal_car_in_good_weather_is_sumos_own() -> None:
+    attributes = dict(made().attributes)
+    assert attributes == {
+        "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
+        "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
+        "emergencyDecel": "9", "tau": "1", "sigma": "0.5", "minGap": "2.5",
+        "emissionClass": "HBEFA4/PC_petrol_Euro-4",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("category", Category)
+@pytest.mark.parametrize("electric", [False, True])
+def test_sumo_knows_every_emission_class_and_only_engines_burn_fuel(
+    category: Category, electric: bool, tmp_path: Path
+) -> None:
+    """Away from a stop for 8 s, by SUMO's own tool."""
+    name = dict(made(category, electric=electric).attributes)["emissionClass"]
+    cycle = tmp_path / "cycle.csv"
+    cycle.write_text("".join(f"{second};{1.5 * second}\n" for second in range(9)))
+    command = [
+        BIN / "emissionsDrivingCycle", "--timeline-file", cycle, "--compute-a",
+        "--emission-class", name, "--output", tmp_path / "out.csv",
+    ]  # fmt: skip
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    lines = (line.partition(":") for line in done.stdout.splitlines())
+    emitted = {key: float(value) for key, _, value in lines if value}
+    engine = category not in (Category.BICYCLE, Category.PEDESTRIAN)
+    assert (emitted["fuel"] > 0.0) == (emitted["CO2"] > 0.0) == (engine and not electric)
+    assert (emitted["electricity"] > 0.0) == (engine and electric)
+
+
+@pytest.mark.parametrize(
+    ("speed", "factor", "expected"), [(10.0, 1.0, 1.0), (20.0, 1.0, 20.0 / 10.0), (None, 0.9, 0.9)]
+)
+def test_a_desired_speed_above_the_limit_is_reached_where_the_actor_starts(
+    speed: float | None, factor: float, expected: float
+) -> None:
+    one = made(speed=speed, factor=factor, limit=10.0)
+    assert one.speed_factor == pytest.approx(expected)
+    assert one.max_speed == (speed or 55.56)
+
+
+def test_nobody_goes_faster_than_desired_even_without_a_limit() -> None:
+    assert made(speed=7.5, limit=None).max_speed == 7.5
+
+
+def test_a_walker_walks_at_its_own_speed_whatever_the_street_allows() -> None:
+    attributes = dict(made(Category.PEDESTRIAN, speed=1.7, factor=0.8).attributes)
+    assert attributes["maxSpeed"] == attributes["desiredMaxSpeed"] == "1.7"
+    assert dict(made(Category.PEDESTRIAN, factor=0.8).attributes)["maxSpeed"] == "1.112"
+
+
+def test_every_category_has_its_sumo_class() -> None:
+    assert set(KINDS) == set(Category)
+    assert len({kind.vclass for kind in KINDS.values()}) == 7
+
+
+def test_drawn_factors_follow_the_style_and_depend_on_nothing_else() -> None:
+    for style, expected in STYLES.items():
+        drawn = [draw_factor(3, f"a{i}", style, Category.CAR) for i in range(600)]
+        assert statistics.mean(drawn) == pytest.approx(expected.factor_mean, abs=0.015)
+        reach = 3 * expected.factor_deviation
+        assert max(abs(x - expected.factor_mean) for x in drawn) <= reach + 1e-9
+    assert draw_factor(3, "a", "normal", Category.CAR) == draw_factor(
+        3, "a", "normal", Category.BUS
+    )
+    assert draw_factor(3, "a", "normal", Category.CAR) != draw_factor(
+        4, "a", "normal", Category.CAR
+    )
+
+
+def test_clear_weather_does_nothing_to_driving() -> None:
+    clear = {"cloudiness": 20.0, "sun_altitude_angle": -30.0, "fog_density": 0.0, "wetness": 0.0}
+    assert weather_effect(clear) == NO_EFFECT
+    assert weather_effect({}) == NO_EFFECT
+
+
+def test_heavy_rain_has_the_numbers_of_its_sources() -> None:
+    effect = weather_effect({"precipitation": 100.0, "wetness": 100.0})
+    assert effect.speed == pytest.approx(1 - 0.084)
+    assert effect.grip == pytest.approx(0.7)
+    assert 1 / effect.headway == pytest.approx(1 - 0.1413)
+    assert weather_effect({"precipitation": 0.01}).speed == pytest.approx(0.97, abs=1e-4)
+
+
+def test_one_can_stop_within_what_one_sees_in_fog() -> None:
+    dense = weather_effect({"fog_density": 100.0})
+    v = dense.sight_speed
+    assert v * REACTION + v**2 / (2 * BRAKING) == pytest.approx(50.0)
+    assert weather_effect({"dust_storm": 100.0}).sight_speed == v
+    wet = weather_effect({"fog_density": 100.0, "wetness": 100.0})
+    assert wet.sight_speed < v
+
+
+@given(st.floats(1, 1e5), st.floats(0.3, 1.0))
+def test_stopping_speed_is_the_root_of_its_formula(sight: float, grip: float) -> None:
+    v = stopping_speed(sight, grip=grip)
+    assert v * REACTION + v**2 / (2 * BRAKING * grip) == pytest.approx(sight)
+
+
+@given(st.dictionaries(st.sampled_from(["precipitation", "wetness", "fog_density"]),
+                       st.floats(-50, 150)))  # fmt: skip
+def test_weather_never_makes_anybody_faster(parameters: dict[str, float]) -> None:
+    effect = weather_effect(parameters)
+    assert 0.9 <= effect.speed <= 1
+    assert 0.7 <= effect.grip <= 1
+    assert 1 <= effect.headway < 1.2
+    assert effect.sight_speed > 5
+
+
+def test_weather_acts_on_vehicles_and_not_on_walkers() -> None:
+    rain = weather_effect({"precipitation": 100.0, "wetness": 100.0, "fog_density": 100.0})
+    wet, dry = made(weather=rain), made()
+    assert wet.speed_factor == pytest.approx(dry.speed_factor * rain.speed, abs=1e-4)
+    assert wet.max_speed == pytest.approx(rain.sight_speed)
+    assert float(dict(wet.attributes)["decel"]) == pytest.approx(4.5 * rain.grip)
+    assert made(Category.PEDESTRIAN, weather=rain) == made(Category.PEDESTRIAN)
+
+
+@given(st.floats(-1e9, 1e9), st.integers(0, 6))
+def test_numbers_are_written_in_fixed_notation_that_reads_back(value: float, digits: int) -> None:
+    text = number(value, digits=digits)
+    assert "e" not in text
+    assert text != "-0"
+    assert math.isclose(float(text), value, abs_tol=0.5000001 * 10**-digits)

@@ -1,0 +1,287 @@
+"""Timing of traffic lights: the file that SUMO gets, and what its lights then do."""
+
+from __future__ import annotations
+
+import subprocess
+from dataclasses import dataclass
+from functools import cache
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from odscen.base.errors import ScenarioError
+from odscen.base.ids import JunctionId
+from odscen.convert.building.network import build_network
+from odscen.convert.lane_table.table import LaneTable, SumoLight
+from odscen.convert.model.net import Phase
+from odscen.lanegraph.build_graphs import build_map_graph
+from odscen.lanegraph.graphs import Relation
+from odscen.lanegraph.query import node_id
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.parse import parse
+from odscen.scenario.document.scenario_document import Signals
+from odscen.scenario.edits import scenario_edits
+from odscen.sumo.realize.program_files import scenario_lights, signals_xml
+from odscen.sumo.realize.realization import realize
+from odscen.sumo.realize.sumo_map import SumoMap
+from odscen.sumo.runner.prepare import prepare
+from odscen.sumo.runner.run_jobs import run_prepared, write_sumo_files
+from tests.sumo.conftest import BIN
+
+if TYPE_CHECKING:
+    from odscen.scenario.document.scenario_document import Scenario
+
+MAP = Path(__file__).parents[3] / "maps" / "signal_crossing.xodr"
+JUNCTION = "10001"
+
+PHASES = (
+    Phase(20.0, "GGr", "stage 1", 8.0, 40.0),
+    Phase(3.0, "yyr", "yellow"),
+    Phase(7.0, "rrG", "stage 2"),
+    Phase(12.0, "rrr", "crossings clear"),
+)
+LIGHTS = (
+    SumoLight("J5", (JunctionId("5"), JunctionId("6")), PHASES, 0.0, (("s1",), ("s1", "s2"), ())),
+    SumoLight("X0", (), PHASES, 0.0, ((), (), ())),
+)
+
+
+def logics(**signals: Any) -> list[etree._Element]:
+    text = signals_xml(Signals.model_validate(signals), LIGHTS)
+    assert text is not None
+    return etree.fromstring(text.encode()).findall("tlLogic")
+
+
+def phases(logic: etree._Element) -> list[tuple[str | None, ...]]:
+    names = ("name", "duration", "minDur", "maxDur")
+    return [tuple(phase.get(name) for name in names) for phase in logic.iterfind("phase")]
+
+
+def test_lights_are_known_by_their_junctions_or_else_by_their_own_id() -> None:
+    assert [light.names for light in scenario_lights(LIGHTS)] == [("5", "6"), ("X0",)]
+    assert scenario_lights(LIGHTS)[0].green == (20.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        {},
+        {"junctions": [{"junction": "5"}]},
+        {"junctions": [{"junction": "6", "control": "fixed", "green": [20, 7]}]},
+    ],
+)
+def test_what_the_network_does_anyway_is_not_written(signals: dict[str, Any]) -> None:
+    assert signals_xml(Signals.model_validate(signals), LIGHTS) is None
+
+
+def test_other_greens_change_the_stages_and_nothing_else() -> None:
+    (logic,) = logics(junctions=[{"junction": "6", "green": [33.5, 9], "offset": 12}])
+    assert dict(logic.attrib) == {
+        "id": "J5", "type": "static", "programID": "scenario", "offset": "12",
+    }  # fmt: skip
+    assert phases(logic) == [
+        ("stage 1", "33.5", None, None),
+        ("yellow", "3", None, None),
+        ("stage 2", "9", None, None),
+        ("crossings clear", "12", None, None),
+    ]
+    assert [phase.get("state") for phase in logic.iterfind("phase")] == [p.state for p in PHASES]
+    params = {param.get("key"): param.get("value") for param in logic.iterfind("param")}
+    assert params == {"linkSignalID:0": "s1", "linkSignalID:1": "s1 s2"}
+
+
+def test_actuated_lights_have_bounds_that_move_with_the_green() -> None:
+    first, second = logics(control="actuated", junctions=[{"junction": "X0", "green": [6, 7]}])
+    assert [first.get("type"), second.get("type")] == ["actuated", "actuated"]
+    assert phases(first)[0] == ("stage 1", "20", "8", "40")
+    assert phases(second)[0] == ("stage 1", "6", "6", "12")
+    assert all(low is None for _, _, low, _ in phases(first)[1:])
+
+
+def test_a_junction_may_differ_from_the_scenario() -> None:
+    (logic,) = logics(control="actuated", junctions=[{"junction": "X0", "control": "fixed"}])
+    assert logic.get("id") == "J5"
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    sumo: SumoMap
+    table: LaneTable
+    net_xml: bytes
+
+
+@cache
+def crossing() -> Built:
+    odr = parse(MAP.read_bytes(), file=MAP.name)
+    roads = RoadTable.of(odr)
+    graph = build_map_graph(odr, name="signal_crossing", sha256="0" * 64, table=roads)
+    network = build_network(odr, roads, graph.walks)
+    return Built(SumoMap.of(graph, network.table), network.table, network.net_xml)
+
+
+def net_file(folder: Path) -> Path:
+    net = folder / "crossing.net.xml"
+    net.write_bytes(crossing().net_xml)
+    return net
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Nodes well before and far behind a link that has a lane of its own; its place in states."""
+
+    spawn: int
+    goal: int
+    link: int
+
+
+@cache
+def left_turn() -> Turn:
+    """A turn whose cars SUMO hears.
+
+    A lane counts for a stage only where all links of it are green together.
+    """
+    sumo = crossing().sumo
+    links = list(etree.fromstring(crossing().net_xml).iterfind("connection[@tl]"))
+    lanes = [
+        sumo.net.edge_lanes[one.get("from", "")][int(one.get("fromLane", ""))] for one in links
+    ]
+    link, lane = next(
+        (link, lane)
+        for link, lane in zip(links, lanes, strict=True)
+        if lanes.count(lane) == 1 and lane.allows("passenger")
+    )
+    target = sumo.net.edge_lanes[link.get("to", "")][int(link.get("toLane", ""))]
+    before, behind = (
+        int(np.flatnonzero(sumo.lane_places.lane == sumo.lane_places.lanes.index(one.id))[0])
+        for one in (lane, target)
+    )
+    index = int(link.get("linkIndex", ""))
+    return Turn(walked(before, back=True, steps=30), walked(behind, back=False, steps=1000), index)
+
+
+def walked(node: int, *, back: bool, steps: int) -> int:
+    """Node so many steps further along the lanes, or the last one."""
+    lanes = crossing().sumo.graph.lanes
+    follows = lanes.relation == Relation.SUCCESSOR
+    ends = (lanes.target, lanes.source) if back else (lanes.source, lanes.target)
+    following = dict(zip(*(end[follows].tolist() for end in ends), strict=True))
+    for _ in range(steps):
+        node = following.get(node, node)
+    return node
+
+
+def from_one_side() -> Scenario:
+    """Cars that turn left from one side, and nobody anywhere else."""
+    graph = crossing().sumo.graph
+    turn = left_turn()
+    return scenario_edits.add_flow(
+        scenario_edits.new_scenario(graph, name="lights", roi=graph.segments.ids),
+        graph,
+        spawn=node_id(graph, turn.spawn),
+        goal=node_id(graph, turn.goal),
+        per_hour=900,
+        end=600.0,
+    )
+
+
+def timed(**fields: Any) -> Scenario:
+    lights = scenario_lights(crossing().table.lights)
+    return scenario_edits.set_timing(from_one_side(), lights, JUNCTION, **fields)
+
+
+def states(folder: Path, one: Scenario, *, until: float) -> list[tuple[str, str]]:
+    """Program and state of the light in each second, from plain SUMO on the exported files."""
+    prepared = prepare(one, crossing().sumo, net_file(folder), until=until, step_length=1.0)
+    write_sumo_files(prepared.sumo_files, prepared.net, folder, link=False)
+    (light,) = crossing().table.lights
+    watch = f'<timedEvent type="SaveTLSStates" source="{light.id}" dest="states.xml"/>'
+    (folder / "watch.add.xml").write_text(f"<additional>{watch}</additional>")
+    added = [name for name in prepared.sumo_files if name.endswith(".add.xml")]
+    files = ",".join([*added, "watch.add.xml"])
+    done = subprocess.run(
+        [BIN / "sumo", "-c", "scenario.sumocfg", "--additional-files", files],
+        cwd=folder, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "rror" not in done.stderr
+    rows = etree.parse(folder / "states.xml").getroot().iterfind("tlsState")
+    return [(row.get("programID", ""), row.get("state", "")) for row in rows]
+
+
+def lengths(seen: list[tuple[str, str]]) -> list[tuple[str, int]]:
+    """States one after the other, with their seconds."""
+    return [(state, len(list(same))) for (_, state), same in groupby(seen)]
+
+
+def test_the_table_keeps_the_lights_that_the_network_has() -> None:
+    (light,) = crossing().table.lights
+    (logic,) = etree.fromstring(crossing().net_xml).findall("tlLogic")
+    assert light.id == logic.get("id")
+    assert light.junctions == (JUNCTION,)
+    assert [p.state for p in light.phases] == [p.get("state") for p in logic.iterfind("phase")]
+    assert len(light.signals) == len(light.phases[0].state)
+    assert LaneTable.from_json(crossing().table.to_json()).lights == crossing().table.lights
+
+
+def test_the_light_shows_each_stage_as_long_as_the_scenario_says(tmp_path: Path) -> None:
+    (light,) = crossing().table.lights
+    stages = [phase for phase in light.phases if phase.is_stage]
+    greens = (23.0, *(phase.duration for phase in stages[1:]))
+    cycle = sum(phase.duration for phase in light.phases) - stages[0].duration + 23.0
+    seen = states(tmp_path, timed(green=greens), until=cycle + 30.0)
+    assert {program for program, _ in seen} == {"scenario"}
+    wanted = [(p.state, 23.0 if p is stages[0] else p.duration) for p in light.phases]
+    assert lengths(seen)[: len(wanted)] == wanted
+    assert lengths(seen)[len(wanted)] == wanted[0]
+
+
+def test_an_offset_lets_the_first_stage_begin_later(tmp_path: Path) -> None:
+    (light,) = crossing().table.lights
+    before, first = lengths(states(tmp_path, timed(offset=10), until=30.0))[:2]
+    assert before == (light.phases[-1].state, 10)
+    assert first == (light.phases[0].state, light.phases[0].duration)
+
+
+def test_traffic_from_one_side_gets_more_green_where_the_light_is_actuated(tmp_path: Path) -> None:
+    green: dict[str, float] = {}
+    for control in ("fixed", "actuated"):
+        folder = tmp_path / control
+        folder.mkdir()
+        seen = [state for _, state in states(folder, timed(control=control), until=600.0)]
+        assert len(seen) > 500
+        green[control] = float(np.mean([state[left_turn().link] == "G" for state in seen]))
+    assert green["actuated"] > 1.3 * green["fixed"]
+
+
+def test_actuation_changes_nothing_but_greens(tmp_path: Path) -> None:
+    (light,) = crossing().table.lights
+    seen = lengths(states(tmp_path, timed(control="actuated"), until=300.0))[:-1]
+    wanted = [(p.state, p.duration) for p in light.phases]
+    assert [state for state, _ in seen[: len(wanted)]] == [state for state, _ in wanted]
+    for (state, seconds), (_, planned) in zip(seen, wanted, strict=False):
+        assert seconds >= planned if "G" in state else seconds == planned
+
+
+def test_a_run_has_the_file_only_where_the_scenario_changes_something(tmp_path: Path) -> None:
+    plain = prepare(from_one_side(), crossing().sumo, net_file(tmp_path))
+    changed = prepare(timed(control="actuated"), crossing().sumo, net_file(tmp_path))
+    again = prepare(timed(control="actuated"), crossing().sumo, net_file(tmp_path))
+    assert "signals.add.xml" not in plain.sumo_files
+    assert "signals" not in plain.sumo_files["scenario.sumocfg"]
+    assert changed.sumo_files == again.sumo_files
+    config = changed.sumo_files["scenario.sumocfg"]
+    assert '<additional-files value="signals.add.xml,' in config
+    assert config.replace("signals.add.xml,", "") == plain.sumo_files["scenario.sumocfg"]
+    result = run_prepared(changed, tmp_path / "run")
+    assert result.status == "completed"
+    assert result.summary["files"]["signals"] == "sumo/signals.add.xml"
+
+
+def test_timing_that_is_not_possible_is_refused_before_anything_is_written() -> None:
+    timing = {"junction": "nowhere", "green": [1]}
+    wrong = Signals.model_validate({"junctions": [timing]})
+    with pytest.raises(ScenarioError, match="no traffic light stands in junction 'nowhere'"):
+        realize(from_one_side().model_copy(update={"signals": wrong}), crossing().sumo)

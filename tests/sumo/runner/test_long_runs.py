@@ -1,0 +1,335 @@
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
+from odscen.results.measures.expectations import parse_expectation
+from odscen.results.measures.summary import actors_from_json
+from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.sumo.folder import checkpoint, layout, run_status
+from odscen.sumo.folder.layout import RECORDED
+from odscen.sumo.folder.parts import check_room
+from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
+from odscen.sumo.realize import forecast
+from odscen.sumo.runner import worker_process
+from odscen.sumo.runner.allocator import fast_allocator
+from odscen.sumo.runner.live_run import Live
+from odscen.sumo.runner.long_runs import resume
+from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
+from odscen.sumo.worker.protocol import Command, Pace, Progress
+from tests.sumo.conftest import SLICE, TYPES, UNTIL
+
+
+@pytest.fixture(scope="module")
+def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Results of the run that nobody interrupts, by file."""
+    result = run_prepared(long, tmp_path_factory.mktemp("whole") / "run")
+    assert result.status == "completed"
+    return results(result.folder)
+
+
+def results(run: Path) -> dict[str, bytes]:
+    recorded = [file for name in RECORDED for file in recorded_files(run, name)]
+    files = [run / "actors.json", run / "events.json", *recorded]
+    return {str(file.relative_to(run)): file.read_bytes() for file in files}
+
+
+def killed(
+    long: PreparedRun, run: Path, monkeypatch: pytest.MonkeyPatch, **environment: int
+) -> str:
+    """Run, interrupted by ``killed_worker``; what the runner says of it."""
+    with monkeypatch.context() as patch:
+        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        for name, value in environment.items():
+            patch.setenv(name, str(value))
+        result = run_prepared(long, run)
+    return str(result.summary["error"]) if result.status == "failed" else ""
+
+
+def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    result = run_prepared(long, tmp_path / "run", expectations=[parse_expectation("inserted==90")])
+    assert result.exit_code == 0
+    assert result.summary["actors"]["arrived"] + result.summary["actors"]["running"] == 90
+    assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]
+    left = {path.name for path in result.folder.iterdir()}
+    assert left == {
+        "actors.json", "events.json", "lanes", "plan.json", "scenario.json", "summary.json", "sumo",
+        "sumo.log", "trajectories", "trips",
+    }  # fmt: skip
+    assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
+
+
+def test_the_parts_read_as_one_table_without_a_gap_or_a_row_twice(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    run_prepared(long, tmp_path / "run")
+    files = trajectory_files(tmp_path / "run")
+    assert len(files) == 4
+    table = pl.read_parquet(tmp_path / "run" / "trajectories" / "*.parquet")
+    assert table.select("timestep_time", "vehicle_id").is_duplicated().sum() == 0
+    steps = table.sort("vehicle_id", "timestep_time").select(
+        pl.col("timestep_time").diff().over("vehicle_id").alias("pause")
+    )
+    assert set(steps["pause"].drop_nulls()) == {0.5}
+    outcomes = actors_from_json((tmp_path / "run" / "actors.json").read_text())
+    assert {one.id for one in outcomes} == set(table["vehicle_id"])
+
+
+def test_a_table_with_too_many_rows_is_read_with_every_nth_record(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    run_prepared(long, tmp_path / "run")
+    everything = read_trajectories(tmp_path / "run")
+    some = read_trajectories(tmp_path / "run", most=1000)
+    assert everything is not None
+    assert some is not None
+    assert everything.every == 1
+    assert some.every == -(-everything.rows.height // 1000)
+    times = sorted(set(everything.rows["timestep_time"]))
+    assert sorted(set(some.rows["timestep_time"])) == times[:: some.every]
+
+
+KILLS = [
+    *(("KILL_AT", change) for change in (3, 6, 9, 13)),
+    *(("KILL_BOTH_AT", change) for change in (1, 7, 14, 20, 33, 47, 55, 58)),
+]
+"""The worker makes 14 changes, the process that completes slices 59."""
+
+
+@pytest.mark.parametrize(("who", "change"), KILLS)
+def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_bytes(
+    long: PreparedRun,
+    whole: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    who: str,
+    change: int,
+) -> None:
+    run = tmp_path / "run"
+    error = killed(long, run, monkeypatch, **{who: change})
+    assert "SIGKILL" in error
+    assert f"odscen resume {run}" in error
+    before = {file.name: file.read_bytes() for file in trajectory_files(run)}
+    told: list[str] = []
+    result = resume(run, tell=told.append)
+    assert result.status == "completed"
+    assert results(run) == whole
+    assert all(whole[f"trajectories/{name}"] == content for name, content in before.items())
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("change", [8, 40, 59])
+def test_a_run_of_which_only_the_completing_process_is_killed_says_so_and_resumes(
+    long: PreparedRun,
+    whole: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    change: int,
+) -> None:
+    run = tmp_path / "run"
+    error = killed(long, run, monkeypatch, KILL_COMPLETER_AT=change)
+    assert "the process that completes what was recorded has ended with exit code -9" in error
+    assert f"odscen resume {run}" in error
+    resume(run)
+    assert results(run) == whole
+
+
+def test_what_was_written_is_completed_when_the_simulation_crashes(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed when the third slice has been simulated; the second may not be complete then."""
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=11)
+    assert checkpoint.last_number(run) == 2
+
+
+def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=2)
+    last = checkpoint.last_number(run)
+    assert last == 2
+    state = checkpoint.slice_folder(run, last) / checkpoint.STATE_FILE
+    content = bytearray(state.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    state.write_bytes(content)
+    told: list[str] = []
+    resume(run, tell=told.append)
+    assert told[0] == f"slice {last} is damaged: state.xml.gz is not as it was written"
+    assert told[1] == f"going on at {(last - 1) * SLICE:g} s, after slice {last - 1}"
+    assert results(run) == whole
+
+
+def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = {name: len(content) for name, content in whole.items() if "part" in name}
+    assert sizes["trajectories/part-0001.parquet"] < sizes["trajectories/part-0002.parquet"]
+    run = tmp_path / "run"
+    limit = sizes["trajectories/part-0002.parquet"] - 1000
+    error = killed(long, run, monkeypatch, FILE_LIMIT=limit)
+    assert f"odscen resume {run}" in error
+    assert "What happened up to 60 s is kept" in error
+    assert list(map(str, trajectory_files(run))) == [str(run / "trajectories/part-0001.parquet")]
+    resume(run)
+    assert results(run) == whole
+
+
+def test_a_disk_without_room_for_another_slice_stops_the_run_before_anything_is_torn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = checkpoint.slice_folder(tmp_path, 4)
+    folder.mkdir(parents=True)
+    (folder / checkpoint.STATE_FILE).write_bytes(bytes(2_000_000))
+    part = checkpoint.recorded_part(tmp_path, layout.LANES_FILE, 4)
+    part.parent.mkdir()
+    part.write_bytes(bytes(4_000_000))
+    usage = shutil.disk_usage(tmp_path)
+    for free, room in ((9_000_000, True), (8_999_999, False)):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: usage._replace(free=free))
+        if room:
+            check_room(tmp_path, 4)
+        else:
+            with pytest.raises(SimulationError, match="slice 5 needs about 9 MB, 9 MB are free"):
+                check_room(tmp_path, 4)
+
+
+def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=9)
+    assert run_status.going(run) == "interrupted"
+    monkeypatch.setattr(run_status, "PATIENCE", 0.1)
+    with run_status.locked(run):
+        assert run_status.going(run) == "running"
+        with pytest.raises(ConflictError, match="going on in another process"):
+            resume(run)
+    with pytest.raises(ConflictError, match=r"odscen resume .*run goes on with it"):
+        run_prepared(long, run)
+    resume(run)
+    assert run_status.going(run) is None
+    with pytest.raises(ConflictError, match="has ended"):
+        resume(run)
+    with pytest.raises(NotFoundError, match="interrupted run"):
+        resume(tmp_path)
+
+
+def test_a_run_that_the_disk_cannot_hold_is_refused_before_it_starts(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = forecast.forecast(long.plan, long.sumo_files, every=None)
+    monkeypatch.setattr(
+        forecast.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(1, 1, 1000)
+    )
+    with pytest.raises(WorkspaceError, match=r"of disk, .* are free; record less"):
+        run_prepared(replace(long, expected=expected), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_forecast_holds_for_a_run_like_this(long: PreparedRun, tmp_path: Path) -> None:
+    expected = forecast.forecast(long.plan, long.sumo_files, every=None)
+    result = run_prepared(long, tmp_path / "run")
+    held = max(one["memory_mb"] for one in result.summary["slices"]["done"])
+    assert 50e6 < held * 1e6 < expected.memory < 1e9
+    sizes = sum(file.stat().st_size for file in trajectory_files(tmp_path / "run"))
+    assert sizes < expected.disk < 20 * sizes
+    fewer = forecast.forecast(long.plan, long.sumo_files, every=10.0)
+    assert fewer.disk < expected.disk
+    assert 10 < expected.running < 90
+
+
+def test_watching_goes_on_across_slices_and_changes_nothing(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path
+) -> None:
+    live = Live(Pace())
+    times: list[float] = []
+
+    def look() -> None:
+        if live.picture.number > len(times):
+            times.append(float(np.frombuffer(live.picture.frame, "<f4")[1]))
+        live.ask_frame()
+
+    live.add_watcher(look)
+    live.ask_frame()
+    result = run_prepared(long, tmp_path / "run", live=live)
+    assert result.status == "completed"
+    assert {int(time // SLICE) for time in times} == {0, 1, 2, 3}
+    assert results(tmp_path / "run") == whole
+
+
+def test_a_long_run_that_somebody_stops_keeps_what_has_happened(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    live = Live(Pace())
+
+    def stop(message: Progress) -> None:
+        if message.time > SLICE + 10.0:
+            live.command(Command("stop"))
+
+    live.command(Command("speed", 100.0))
+    result = run_prepared(long, tmp_path / "run", live=live, progress=stop)
+    assert result.status == "completed"
+    assert result.summary["stopped"]
+    end = result.summary["sim_seconds"]
+    assert SLICE + 10.0 < end < UNTIL
+    table = pl.read_parquet(trajectory_files(tmp_path / "run"))
+    assert table["timestep_time"].max() == end - 0.5
+    assert run_status.going(tmp_path / "run") is None
+
+
+def test_whoever_waits_for_room_at_a_boundary_is_not_lost(
+    long: PreparedRun, tmp_path: Path
+) -> None:
+    """The number of vehicles in the queue is more than can start before the boundary."""
+    cars = "".join(
+        f'<vehicle id="queue{i}" type="car" depart="55" departLane="1">'
+        '<route edges="A0B0 B0C0"/></vehicle>\n'
+        for i in range(20)
+    )
+    plan = replace(
+        long.plan, actors=tuple(replace(long.plan.actors[0], id=f"queue{i}") for i in range(20))
+    )
+    files = {**long.sumo_files, "routes.rou.xml": f"<routes>\n{TYPES}\n{cars}</routes>\n"}
+    result = run_prepared(replace(long, plan=plan, sumo_files=files), tmp_path / "run")
+    assert result.summary["actors"]["inserted"] == 20
+    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    late = [event for event in events if event.kind is EventKind.DEPARTED and event.time >= SLICE]
+    assert late
+    assert not [event for event in events if event.kind is EventKind.LOST]
+
+
+def test_whoever_does_not_come_back_with_a_saved_state_is_told(
+    long: PreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SUMO is made to forget a car; the run is resumed in a worker that is told so."""
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AFTER_SLICE=1)
+    assert checkpoint.last_number(run) == 1
+    on_road = checkpoint.read_checkpoint(run, 1).present
+    car = next(name for name in on_road if name.startswith("car"))
+    config = run / "sumo" / "scenario.sumocfg"
+    forget = f'<processing>\n<load-state.remove-vehicles value="{car}"/>'
+    config.write_text(config.read_text().replace("<processing>", forget))
+    resume(run)
+    events = events_from_json((run / "events.json").read_text())
+    lost = [event for event in events if event.kind is EventKind.LOST]
+    assert [(event.actor, event.time) for event in lost] == [(car, SLICE)]
+
+
+@pytest.mark.skipif(fast_allocator() is None, reason="there is no faster allocator here")
+def test_the_allocator_makes_no_difference_to_results(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LD_PRELOAD", "")
+    run_prepared(long, tmp_path / "run")
+    assert results(tmp_path / "run") == whole

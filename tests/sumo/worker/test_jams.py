@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from odscen.results.records.run_records import EventKind, events_from_json
+from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
+from odscen.sumo.runner.run_jobs import run_prepared
+from odscen.sumo.worker import jams
+from odscen.sumo.worker.observed import Ahead
+from tests.sumo.conftest import TYPES, Prepare
+
+FREE = Ahead(True, "M", True, None, people=False)
+
+
+class Street:
+    """Stands in for a session: what each vehicle has ahead."""
+
+    def __init__(self, **ahead: Ahead) -> None:
+        self._ahead = ahead
+
+    def ahead(self, name: str) -> Ahead | None:
+        return self._ahead.get(name)
+
+
+@pytest.mark.parametrize(
+    ("head", "reason"),
+    [
+        (FREE._replace(onwards=False), jams.NO_WAY_ON),
+        (FREE._replace(onwards=False, beside=True), jams.WRONG_LANE),
+        (FREE._replace(light="r", open=False), jams.RED),
+        (FREE._replace(light="g", open=False), jams.GIVES_WAY),
+        (FREE._replace(open=False, people=True), jams.PEOPLE),
+        (FREE, jams.UNKNOWN),
+    ],
+)
+def test_a_queue_stands_for_the_reason_of_its_head(head: Ahead, reason: str) -> None:
+    red = FREE._replace(light="r", open=False)
+    street = Street(a=FREE._replace(leader="b"), b=red._replace(leader="c"), c=head)
+    assert jams.explain(street, "a") == (reason, "c")  # type: ignore[arg-type]
+
+
+def test_vehicles_that_wait_for_each_other_are_a_circle() -> None:
+    street = Street(
+        a=FREE._replace(leader="b"), b=FREE._replace(leader="c"), c=FREE._replace(leader="b")
+    )
+    assert jams.explain(street, "a") == (jams.CIRCLE, "c")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("until", "dissolved"), [(280.0, False), (400.0, True)])
+def test_a_light_that_never_turns_green_is_named_with_place_and_time(
+    prepare: Prepare, grid: Path, tmp_path: Path, until: float, dissolved: bool
+) -> None:
+    """And so is the vehicle in front of it, which SUMO lifts over after 300 s."""
+    net = grid.read_text()
+    light = re.search(r'<tlLogic id="B1".*?state="(\w+)"', net, re.DOTALL)
+    assert light is not None
+    red = (
+        '<additional><tlLogic id="B1" type="static" programID="red" offset="0">'
+        f'<phase duration="9999" state="{"r" * len(light[1])}"/></tlLogic></additional>'
+    )
+    car = (
+        '<vehicle id="car0" type="car" depart="0" departLane="1">'
+        '<route edges="A1B1 B1C1"/></vehicle>'
+    )
+    run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{car}\n</routes>")
+    settings = RunSettings(until=until, step_length=0.5, seed=7, signals=True)
+    files = {**run.sumo_files, "signals.add.xml": red, "scenario.sumocfg": sumo_config(settings)}
+    plan = replace(run.plan, until=until)
+    result = run_prepared(replace(run, plan=plan, sumo_files=files), tmp_path / "run")
+    assert result.status == "completed", result.summary["error"]
+
+    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    (jam,) = [event for event in events if event.kind is EventKind.JAM_BEGIN]
+    assert (jam.actor, jam.lane, jam.detail) == ("car0", "A1B1_1", jams.RED)
+    rows = pl.read_parquet(tmp_path / "run" / "trajectories.parquet")
+    assert jam.waited is not None
+    stood = rows.filter(
+        (pl.col("vehicle_id") == "car0")
+        & pl.col("timestep_time").is_between(jam.time - jam.waited + 0.5, jam.time - 0.5)
+    )
+    assert stood["vehicle_speed"].max() < 0.1  # type: ignore[operator]
+    assert (stood["vehicle_x"][-1], stood["vehicle_y"][-1]) == pytest.approx((jam.x, jam.y))
+
+    gridlock = result.summary["gridlock"]
+    assert gridlock["jams"] == 1
+    assert (gridlock["jams_at_the_end"], gridlock["moved_on"]) == ((0, 1) if dissolved else (1, 0))
+    places = {place["kind"]: place for place in gridlock["places"]}
+    assert (places["jam"]["until"] is not None) == dissolved
+    assert {place["reason"] for place in places.values()} == {jams.RED}
+    assert all(place["lane"] == "A1B1_1" for place in places.values())
+    if dissolved:
+        lifted = places["moved_on"]
+        assert lifted["until"] - lifted["time"] == pytest.approx(300.0, abs=1.0)
+
+
+def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
+    prepare: Prepare, tmp_path: Path
+) -> None:
+    """The left lane is full of parked cars, and the one on the right is to turn left."""
+    parked = "\n".join(
+        f'<vehicle id="parked{k}" type="car" depart="0" departLane="2" departPos="{x}"'
+        ' departSpeed="0" insertionChecks="none"><route edges="A1B1 B1C1"/>'
+        f'<stop lane="A1B1_2" endPos="{x + 0.1}" duration="1000"/></vehicle>'
+        for k, x in enumerate(range(25, 100, 6))
+    )
+    left = (
+        '<vehicle id="car0" type="car" depart="1" departLane="1" departPos="80">'
+        '<route edges="A1B1 B1B2"/></vehicle>'
+    )
+    run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{parked}\n{left}\n</routes>")
+    result = run_prepared(replace(run, plan=replace(run.plan, until=260.0)), tmp_path / "run")
+    assert result.status == "completed", result.summary["error"]
+    (place,) = result.summary["gridlock"]["places"]
+    assert (place["kind"], place["actor"]) == ("jam", "car0")
+    assert place["reason"] == jams.WRONG_LANE

@@ -1,0 +1,123 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from odscen.base.errors import InputError, NotFoundError, OpenDriveError, WorkspaceError
+from odscen.workspace import map_build
+from odscen.workspace.store import Workspace, check_name, name_from_file
+
+SHIPPED = Path(__file__).parents[2] / "maps"
+SMALL = SHIPPED / "t_junction_signs.xodr"
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory):
+    store = Workspace.open(tmp_path_factory.mktemp("workspace"))
+    store.add_map(SMALL)
+    return store
+
+
+def test_a_map_is_built_once(workspace, monkeypatch):
+    def never(*_arguments, **_options):
+        pytest.fail("the map was built again")
+
+    monkeypatch.setattr(map_build, "build_map", never)
+    again = workspace.add_map(SMALL)
+    assert again.info == workspace.map("t_junction_signs").info
+
+
+def test_what_is_loaded_is_what_was_built(workspace):
+    entry = workspace.map("t_junction_signs")
+    graph = entry.graph()
+    assert graph.map_sha256 == entry.sha256
+    assert len(graph.lanes.s) == entry.info["graph"]["nodes"]
+    assert entry.lane_table().counts["lanes"] == entry.info["sumo"]["lanes"]
+    assert entry.drawing().name == "t_junction_signs"
+    assert entry.statistics().stop_signs == 1
+
+
+def test_progress_goes_from_nothing_to_all(tmp_path):
+    shares = []
+    Workspace.open(tmp_path).add_map(SMALL, progress=lambda _what, share: shares.append(share))
+    assert shares[0] == 0.0
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
+
+
+def test_a_failed_build_leaves_the_old_map_and_no_trace(tmp_path):
+    store = Workspace.open(tmp_path)
+    before = store.add_map(SMALL).sha256
+    broken = tmp_path / "t_junction_signs.xodr"
+    broken.write_bytes(SMALL.read_bytes()[:5000])
+    with pytest.raises(OpenDriveError, match=r"^t_junction_signs\.xodr: "):
+        store.add_map(broken)
+    assert store.map("t_junction_signs").sha256 == before
+    assert [path.name for path in (tmp_path / "maps").iterdir()] == ["t_junction_signs"]
+
+
+def test_other_content_of_the_same_name_replaces_the_map(tmp_path):
+    store = Workspace.open(tmp_path)
+    old = store.add_map(SMALL, name="m")
+    new = store.add_map(SHIPPED / "roundabout.xodr", name="m")
+    assert new.sha256 != old.sha256
+    assert store.map_names() == ["m"]
+    with pytest.raises(InputError, match="other content"):
+        store.map_for("m", old.sha256)
+
+
+def test_a_map_is_found_by_its_content_under_another_name(workspace):
+    entry = workspace.map("t_junction_signs")
+    assert workspace.map_for("renamed", entry.sha256) == entry
+
+
+def test_a_map_of_an_older_builder_is_built_again(tmp_path):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL)
+    old = {**entry.info, "builder": "0"}
+    (entry.folder / "map.json").write_text(json.dumps(old), encoding="utf-8")
+    assert store.map("t_junction_signs").info["builder"] != "0"
+
+
+def test_folders_in_the_making_are_not_maps(tmp_path):
+    store = Workspace.open(tmp_path)
+    (tmp_path / "maps" / ".building-x").mkdir()
+    (tmp_path / "maps" / "half").mkdir()
+    assert store.map_names() == []
+    with pytest.raises(NotFoundError, match="there is no map yet"):
+        store.map("half")
+
+
+@pytest.mark.parametrize("name", ["..", "a/b", "a\\b", "", ".hidden", "a" * 65, "a\n"])
+def test_names_that_could_be_paths_are_refused(name):
+    with pytest.raises(InputError, match="cannot be used"):
+        check_name(name)
+
+
+def test_odd_file_names_become_plain_map_names():
+    assert name_from_file(Path("/x/My town (new).xodr")) == "My_town_new"
+    assert name_from_file(Path("---.xodr")) == "map"
+
+
+def test_a_file_that_is_not_there_says_so(workspace):
+    with pytest.raises(InputError, match=r"nowhere\.xodr: No such file"):
+        workspace.add_map(Path("nowhere.xodr"))
+
+
+def test_a_workspace_that_is_a_file_says_so(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(WorkspaceError, match="file"):
+        Workspace.open(tmp_path / "file")
+
+
+def test_the_environment_names_the_workspace(tmp_path, monkeypatch):
+    monkeypatch.setenv("ODSCEN_WORKSPACE", str(tmp_path / "w"))
+    assert Workspace.open().root == tmp_path / "w"
+
+
+def test_every_real_map_is_added(shared_maps, tmp_path):
+    store = Workspace.open(tmp_path)
+    for path in sorted(shared_maps.glob("esmini/*.xodr")):
+        entry = store.add_map(path)
+        assert entry.info["graph"]["nodes"] > 0, path.name
+        assert entry.info["sumo"]["lanes"] > 0, path.name
