@@ -222,8 +222,8 @@ def run(
     processes
         How many run at a time.
     recording, meso, slice_length
-        See :func:`odscen.sumo.runner.prepare.prepare`. Criticality is recorded where an expectation asks
-        for it.
+        See :func:`odscen.sumo.runner.prepare.prepare`. Criticality is recorded where an
+        expectation asks for it.
     tell
         Called with what the user should know before a long run.
 

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from odscen.base.arrays import offsets, ranges
 from odscen.base.errors import InputError
-from odscen.drawing.map_drawing import Area, Lines, MapDrawing, Mark, Symbol, offsets, ranges
+from odscen.drawing.map_drawing import Area, Lines, MapDrawing, Mark, Symbol
 
 PLACES = st.floats(-5000, 5000).map(lambda value: round(value, 2))
 RING = st.lists(st.tuples(PLACES, PLACES), min_size=3, max_size=6)

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from odscen.base.errors import MissingDependencyError
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import (
-    RenderOptions,
     length_text,
     render_drawing,
     render_svg,
     round_length,
     svg_to_png,
 )
+from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import RELATION_COLORS, PlaceMarks
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.opendrive.lanes import RoadTable

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from odscen.base.arrays import offsets
 from odscen.opendrive.geometry import PlanView
-from odscen.opendrive.profiles import CubicTable, StepTable, locate, offsets
+from odscen.opendrive.profiles import CubicTable, StepTable, locate
 from odscen.opendrive.road_model import Geometry, GeometryKind
 
 lengths = st.floats(0.05, 300.0)

@@ -1,8 +1,8 @@
 """The worker, killed with signal 9 just before the ``KILL_AT``-th time it changes the run folder.
 
-Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it is the first time after that
-slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that completes
-slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many bytes fail as
+Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it is the first time
+after that slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that
+completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many bytes fail as
 on a full disk.
 """
 

@@ -32,7 +32,7 @@ class LaneKey(NamedTuple):
 
 
 class Roadside(NamedTuple):
-    """The walk beside a lane (see :mod:`odscen.lanegraph.pedestrian_graph`); the lane as in `LaneKey`.
+    """The walk beside a lane (:mod:`odscen.lanegraph.pedestrian_graph`); the lane as in `LaneKey`.
 
     ``beside`` is always true: it tells the walk from the lane, as tuples are compared by content.
     """

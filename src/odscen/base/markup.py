@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import itertools
 from html import escape
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+if TYPE_CHECKING:
+    from odscen.base.arrays import FloatArray, IntArray
 
 _VOID = frozenset({"meta", "input", "br"})
 # What XML 1.0 cannot hold; carriage returns do not survive a parser.

@@ -13,23 +13,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.base.frames import XodrPose
 from odscen.lanegraph.graphs import Relation
 from odscen.scenario.placing.region import Region
+from odscen.sumo.realize.departures import road_users
 from odscen.sumo.realize.driving import KINDS, STYLES, TWO_WHEELER_MIN_GAP
 from odscen.sumo.realize.realization import UNKNOWN_LIMIT
-from odscen.sumo.realize.road_users import road_users
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import IntArray, LaneGraph, MapGraph
+    from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph
     from odscen.results.records.run_records import Plan, PlannedActor
     from odscen.scenario.document.scenario_document import DrivingStyle, Scenario
-    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.road_user import RoadUser
 
-FloatArray = NDArray[np.float64]
 
 BEYOND = 8.0
 """Metres beyond the end of a junction at which a point of the path lies."""
@@ -108,7 +107,7 @@ def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[Nati
 
 
 def _walker(
-    row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: IntArray
+    row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: Int32Array
 ) -> NativeActor:
     walks = graph.walks
     way = np.column_stack([walks.x[nodes], walks.y[nodes], walks.z[nodes]])
@@ -119,7 +118,7 @@ def _walker(
 
 
 def _driver(
-    row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: IntArray
+    row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: Int32Array
 ) -> NativeActor:
     lanes = graph.lanes
     pose = XodrPose(planned.x, planned.y, planned.z, planned.hdg, float(lanes.pitch[user.spawn]))
@@ -165,7 +164,7 @@ def _actor(
 
 
 def _speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatArray:
-    """Speed wanted under each limit; the same rule as :func:`odscen.sumo.realize.driving.driver`."""
+    """Speed wanted under each limit; the rule of :func:`odscen.sumo.realize.driving.driver`."""
     known = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
     most = KINDS[user.category].max_speed if user.speed is None else user.speed
     wanted: FloatArray = np.minimum(known * planned.speed_factor, most)
@@ -179,18 +178,18 @@ def _gap(style: DrivingStyle, category: Category) -> float:
     return round(manner.min_gap * share * manner.headway, 2)
 
 
-def _points(lanes: LaneGraph, nodes: IntArray) -> FloatArray:
+def _points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:
     return np.column_stack([lanes.x[nodes], lanes.y[nodes], lanes.z[nodes]])
 
 
-def _changes(lanes: LaneGraph, nodes: IntArray) -> tuple[tuple[int, bool], ...]:
+def _changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...]:
     here, there = nodes[:-1], nodes[1:]
     left = lanes.left_lane[here] == lanes.lane[there]
     right = lanes.right_lane[here] == lanes.lane[there]
     return tuple((int(k), bool(right[k])) for k in np.flatnonzero(left | right))
 
 
-def _marks(lanes: LaneGraph, nodes: IntArray) -> list[int]:
+def _marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
     """Indices of the nodes a little beyond each junction that the way leaves."""
     inside = np.array([lanes.lanes.junctions[row] is not None for row in lanes.lane[nodes]])
     turns = {k for k, _ in _changes(lanes, nodes)}
@@ -208,7 +207,7 @@ def _marks(lanes: LaneGraph, nodes: IntArray) -> list[int]:
     return marks
 
 
-def _onward(lanes: LaneGraph, goal: int) -> IntArray:
+def _onward(lanes: LaneGraph, goal: int) -> Int32Array:
     """Nodes after the goal, straight on as far as there are any, for :data:`AHEAD` metres."""
     nodes: list[int] = []
     gone, node = 0.0, goal

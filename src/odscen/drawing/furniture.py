@@ -6,18 +6,19 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from odscen.drawing.map_drawing import NO_LINES, Lines, MapDrawing, Symbol, offsets
+from odscen.base.arrays import FloatArray, offsets
+from odscen.drawing.map_drawing import NO_LINES, Lines, MapDrawing, Symbol
 from odscen.opendrive.objects import crosswalks, object_outline, signal_kind, stop_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, RoadObject, Signal
 
-FloatArray = NDArray[np.float64]
 
 BAR, GAP = 0.5, 0.5
 """Metres painted and left out along the way across a crosswalk."""

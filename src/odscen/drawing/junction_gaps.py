@@ -9,15 +9,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.drawing.furniture import rings_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import BoolArray, IntArray
     from odscen.drawing.map_drawing import Lines
 
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 SMALL = 15.0
 """Square metres up to which a gap is no island."""

@@ -10,18 +10,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from odscen.drawing.map_drawing import Lines, offsets, ranges
+from odscen.base.arrays import BoolArray, FloatArray, IntArray, offsets, ranges
+from odscen.drawing.map_drawing import Lines
 from odscen.opendrive.road_model import GeometryKind
 
 if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import LaneSection, OpenDrive, Road
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 _STEP_STRAIGHT, _STEP_CURVED, _STEP_JUNCTION = 2.0, 1.0, 0.5
 """Metres between stations before thinning; junctions have the tightest turns."""

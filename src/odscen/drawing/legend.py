@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.drawing.map_sheet import RenderOptions
+    from odscen.drawing.sheet_options import RenderOptions
     from odscen.drawing.svg_layers import PlaceMarks
     from odscen.lanegraph.graphs import MapGraph
 

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from odscen.base.arrays import Bounds, FloatArray, IntArray, offsets, ranges
 from odscen.base.errors import InputError
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-Bounds = tuple[float, float, float, float]
-"""``min_x, min_y, max_x, max_y`` in metres."""
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FORMAT = "odscen-drawing"
 VERSION = 1
@@ -206,20 +203,6 @@ class MapDrawing:
 
 
 _PLAIN = ("crosswalks", "bars", "stop_lines", "parking_spaces", "buildings")
-
-
-def offsets(sizes: IntArray) -> IntArray:
-    """``(K + 1,)`` starts of pieces of the given sizes."""
-    return np.concatenate(([0], np.cumsum(sizes))).astype(np.int64)
-
-
-def ranges(first: IntArray, sizes: IntArray, *, step: IntArray | int = 1) -> IntArray:
-    """Concatenation of ``first[k] + step[k] * arange(sizes[k])`` without a loop."""
-    start = offsets(sizes)
-    within = np.arange(start[-1], dtype=np.int64) - np.repeat(start[:-1], sizes)
-    steps = np.repeat(np.broadcast_to(np.asarray(step, dtype=np.int64), sizes.shape), sizes)
-    everything: IntArray = np.repeat(first, sizes).astype(np.int64) + steps * within
-    return everything
 
 
 def _packed(lines: Lines) -> dict[str, list[int]]:

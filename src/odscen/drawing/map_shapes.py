@@ -9,21 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from odscen.base.arrays import Bounds, FloatArray, IntArray, offsets, ranges
 from odscen.drawing.furniture import add_furniture
 from odscen.drawing.junction_gaps import small_gaps
 from odscen.drawing.lane_borders import evaluate_borders, inner_rows, thinned
-from odscen.drawing.map_drawing import (
-    BRIDGE,
-    Area,
-    Bounds,
-    Lines,
-    MapDrawing,
-    Mark,
-    offsets,
-    ranges,
-)
+from odscen.drawing.map_drawing import BRIDGE, Area, Lines, MapDrawing, Mark
 from odscen.drawing.road_marks import road_marks
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
@@ -32,9 +23,6 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 TOLERANCE = 0.03
 """Metres that a drawn border may differ from the exact one."""

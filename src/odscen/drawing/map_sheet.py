@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from odscen.base.errors import MissingDependencyError
 from odscen.base.markup import Markup, element, join, number
 from odscen.drawing.legend import INK, legend, legend_entries, place_entries
+from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import (
     FONT,
     LayerOptions,
@@ -23,7 +24,8 @@ from odscen.drawing.svg_layers import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.drawing.map_drawing import Bounds, MapDrawing
+    from odscen.base.arrays import Bounds
+    from odscen.drawing.map_drawing import MapDrawing
     from odscen.drawing.svg_layers import PlaceMarks
     from odscen.lanegraph.graphs import MapGraph
     from odscen.lanegraph.map_statistics import MapStatistics
@@ -36,29 +38,6 @@ _SHEET = 1200.0
 _MARGIN, _HEAD = 36.0, 74.0
 _SYMBOL = 18.0
 _RING = 8.0
-
-
-@dataclass(frozen=True, slots=True)
-class RenderOptions:
-    """What the sheet shows.
-
-    Attributes
-    ----------
-    symbols, speed_limits
-        Lights and signs; speed-limit signs on top.
-    graph
-        Lane graph and pedestrian graph, if one is given.
-    segments
-        Segments of the graph, in alternating colours, if one is given.
-    margins
-        Name, figures, legend, scale; without them only the map is drawn.
-    """
-
-    symbols: bool = True
-    speed_limits: bool = False
-    graph: bool = True
-    segments: bool = False
-    margins: bool = True
 
 
 def render_svg(

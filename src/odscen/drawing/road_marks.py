@@ -5,16 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from odscen.base.arrays import IntArray, offsets, ranges
 from odscen.drawing.lane_borders import thinned
-from odscen.drawing.map_drawing import Lines, Mark, offsets, ranges
+from odscen.drawing.map_drawing import Lines, Mark
 
 if TYPE_CHECKING:
     from odscen.drawing.lane_borders import Borders, Sections
     from odscen.opendrive.road_model import RoadMark
 
-IntArray = NDArray[np.int64]
 
 _DASHES = {"broken": (3.0, 6.0), "botts dots": (0.2, 1.0)}
 _DASH_FAST = (6.0, 12.0)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.drawing.map_drawing import BRIDGE
@@ -18,11 +17,12 @@ from odscen.drawing.map_drawing import BRIDGE
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from odscen.drawing.map_drawing import Bounds, Lines, MapDrawing, Symbol
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import Bounds, FloatArray, IntArray
+    from odscen.drawing.map_drawing import Lines, MapDrawing, Symbol
     from odscen.lanegraph.graphs import MapGraph
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 AREA_COLORS = {
     "green": "#c3d2ae",

@@ -19,8 +19,8 @@ from odscen.opendrive.topology import lane_successors, side_links
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.base.arrays import IntArray
     from odscen.base.ids import LaneKey
-    from odscen.opendrive.profiles import IntArray
     from odscen.opendrive.road_model import OpenDrive
 
 MIN_SPACING, MAX_SPACING = 0.1, 100.0

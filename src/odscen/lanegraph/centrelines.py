@@ -15,9 +15,8 @@ import numpy as np
 from odscen.base.errors import OpenDriveError
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import BoolArray, FloatArray
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.profiles import IntArray
 
 SAMPLE_STEP = 1.0
 """Metres of s between samples of a centre line; a chord of 1 m at radius 5 m is 0.2 % short."""

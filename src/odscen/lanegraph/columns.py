@@ -16,7 +16,8 @@ from odscen.base.errors import GraphFormatError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.lanegraph.graphs import FloatArray, IntArray, MapGraph
+    from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.lanegraph.graphs import MapGraph
 
 Array = NDArray[Any]
 
@@ -119,7 +120,7 @@ def _check_walks(graph: MapGraph, segments: int) -> None:
     _in_range("kind", walks.kind, 0, 4)
 
 
-def _check_first_node(what: str, first_node: IntArray, rows: int) -> int:
+def _check_first_node(what: str, first_node: Int32Array, rows: int) -> int:
     _same_length(f"first_node of {what}", rows + 1, first_node)
     if first_node[0] != 0 or np.any(np.diff(first_node) < 0):
         _fail(f"first_node of {what}", "does not grow from 0")
@@ -132,7 +133,7 @@ def _same_length(what: str, count: int, *columns: Any) -> None:
         _fail(what, f"columns have different lengths: {', '.join(map(str, lengths))}")
 
 
-def _in_range(what: str, values: IntArray | FloatArray | Array, low: int, end: int) -> None:
+def _in_range(what: str, values: Int32Array | FloatArray | Array, low: int, end: int) -> None:
     if len(values) and not (values.min() >= low and values.max() < end):
         _fail(what, f"{values.min()} to {values.max()} is not within {low} to {end - 1}")
 

@@ -1,8 +1,8 @@
 """The graphs as arrays.
 
 A :class:`MapGraph` bundles the three graphs of one map: lane graph, segments, pedestrian graph. All
-arrays are indexed by dense integers; the string ids of :mod:`odscen.base.ids` are derived from them and
-stable (requirement R24).
+arrays are indexed by dense integers; the string ids of :mod:`odscen.base.ids` are derived from them
+and stable (requirement R24).
 """
 
 from __future__ import annotations
@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 
 
@@ -75,7 +73,7 @@ class Lanes:
     junctions: tuple[JunctionId | None, ...]
     lengths: FloatArray
     forward: BoolArray
-    first_node: IntArray
+    first_node: Int32Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +122,7 @@ class LaneGraph:
 
     spacing: float
     lanes: Lanes
-    lane: IntArray
+    lane: Int32Array
     s: FloatArray
     offset: FloatArray
     x: FloatArray
@@ -135,12 +133,12 @@ class LaneGraph:
     curvature: FloatArray
     width: FloatArray
     speed_limit: FloatArray
-    left_lane: IntArray
-    right_lane: IntArray
+    left_lane: Int32Array
+    right_lane: Int32Array
     lane_change: ByteArray
-    segment: IntArray
-    source: IntArray
-    target: IntArray
+    segment: Int32Array
+    source: Int32Array
+    target: Int32Array
     relation: ByteArray
     length: FloatArray
 
@@ -177,7 +175,7 @@ class Segments:
     kinds: tuple[Literal["road", "junction"], ...]
     parts: tuple[tuple[SegmentPart, ...], ...]
     lengths: FloatArray
-    adjacency: IntArray
+    adjacency: Int32Array
 
 
 class WalkKind(IntEnum):
@@ -220,17 +218,17 @@ class PedestrianGraph:
     spacing: float
     lane_keys: tuple[LaneKey, ...]
     roadside: BoolArray
-    first_node: IntArray
-    lane: IntArray
+    first_node: Int32Array
+    lane: Int32Array
     s: FloatArray
     x: FloatArray
     y: FloatArray
     z: FloatArray
     hdg: FloatArray
     width: FloatArray
-    segment: IntArray
-    source: IntArray
-    target: IntArray
+    segment: Int32Array
+    source: Int32Array
+    target: Int32Array
     kind: ByteArray
     length: FloatArray
     crosswalk: tuple[str, ...]

@@ -7,20 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.graphs import (
-    CHANGE_LEFT,
-    CHANGE_RIGHT,
-    ByteArray,
-    FloatArray,
-    Relation,
-)
+from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, ByteArray, Relation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray, IntArray
     from odscen.base.ids import LaneKey
     from odscen.lanegraph.lane_nodes import NodeTable
-    from odscen.opendrive.profiles import IntArray
     from odscen.opendrive.topology import SideLink
 
 

@@ -8,19 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.lanegraph.centrelines import CentreLines, node_offsets
-from odscen.lanegraph.graphs import (
-    CHANGE_LEFT,
-    CHANGE_RIGHT,
-    BoolArray,
-    ByteArray,
-    FloatArray,
-)
+from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, ByteArray
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.profiles import IntArray
 
 MIN_LANE_WIDTH = 1.0
 """Metres; where a lane is narrower nothing can drive, so it has no nodes there."""

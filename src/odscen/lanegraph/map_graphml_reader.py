@@ -1,4 +1,4 @@
-"""Reads the GraphML that :mod:`odscen.lanegraph.map_graphml` writes, also after networkx rewrote it."""
+"""Reads what :mod:`odscen.lanegraph.map_graphml` writes, also after networkx rewrote it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from odscen.base.errors import GraphFormatError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, SegmentId
 from odscen.lanegraph.columns import NODE_COLUMNS, WALK_NODE_COLUMNS, Array, check_map_graph
 from odscen.lanegraph.graphs import (
-    IntArray,
     LaneGraph,
     Lanes,
     MapGraph,
@@ -28,6 +27,8 @@ from odscen.lanegraph.query import WALK_PREFIX, split_node_id
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from odscen.base.arrays import Int32Array
 
 NAMESPACE = "{http://graphml.graphdrawing.org/xmlns}"
 FORMAT = "odscen-map-graph"
@@ -158,12 +159,12 @@ class _EdgeRows:
             _fail(f"node {name}", f"an edge needs it as {kind}; it is {actual or 'not there'}")
         return row
 
-    def directed(self, kind: str) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+    def directed(self, kind: str) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
         """Source, target, code and attributes, sorted by (source, code, target)."""
         rows = sorted(self._of.get(kind, []), key=lambda row: (row[0], row[2], row[1]))
         return _transposed(rows)
 
-    def undirected(self, kind: str) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+    def undirected(self, kind: str) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
         """Return the same with source < target, sorted by (source, target)."""
         rows = [(min(i, j), max(i, j), code, edge) for i, j, code, edge in self._of.get(kind, [])]
         rows.sort(key=lambda row: row[:3])
@@ -172,7 +173,7 @@ class _EdgeRows:
 
 def _transposed(
     rows: list[tuple[int, int, int, Attributes]],
-) -> tuple[IntArray, IntArray, Array, list[Attributes]]:
+) -> tuple[Int32Array, Int32Array, Array, list[Attributes]]:
     return (
         np.array([row[0] for row in rows], dtype=np.int32),
         np.array([row[1] for row in rows], dtype=np.int32),
@@ -257,7 +258,7 @@ def _walks(
     )
 
 
-def _lanes_of(nodes: Sequence[Attributes], prefix: str) -> tuple[tuple[LaneKey, ...], IntArray]:
+def _lanes_of(nodes: Sequence[Attributes], prefix: str) -> tuple[tuple[LaneKey, ...], Int32Array]:
     """Find the lanes of the nodes, and the first node of each; nodes must be in order."""
     keys: list[LaneKey] = []
     first: list[int] = []
@@ -295,7 +296,7 @@ def _column(rows: Sequence[Attributes], name: str, kind: type) -> Any:
         _fail("data", f"{name!r} has a value of the wrong type: {err}")
 
 
-def _rows(nodes: Sequence[Attributes], name: str, known: dict[str, int]) -> IntArray:
+def _rows(nodes: Sequence[Attributes], name: str, known: dict[str, int]) -> Int32Array:
     try:
         return np.array([known[node.get(name, "")] for node in nodes], dtype=np.int32)
     except KeyError as err:

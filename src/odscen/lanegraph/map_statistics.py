@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.drawing.map_drawing import ranges
+from odscen.base.arrays import ranges
 from odscen.opendrive.objects import crosswalks, signal_kind, stop_lines
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from odscen.drawing.map_drawing import Bounds
+    from odscen.base.arrays import Bounds
     from odscen.lanegraph.graphs import MapGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive

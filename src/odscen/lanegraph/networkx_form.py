@@ -16,9 +16,9 @@ def to_networkx(graph: MapGraph) -> tuple[nx.MultiDiGraph, nx.Graph]:
     """Make networkx graphs of the lane graph and the pedestrian graph, nodes named by their ids.
 
     Attributes have the names of :class:`~odscen.lanegraph.graphs.LaneGraph` and
-    :class:`~odscen.lanegraph.graphs.PedestrianGraph`; relations, kinds and segments are words. Edges
-    of the lane graph have their relation as key. ``graph["segments"]`` of both is the adjacency of
-    the segments as a :class:`networkx.Graph`.
+    :class:`~odscen.lanegraph.graphs.PedestrianGraph`; relations, kinds and segments are words.
+    Edges of the lane graph have their relation as key. ``graph["segments"]`` of both is the
+    adjacency of the segments as a :class:`networkx.Graph`.
     """
     import networkx as nx
 

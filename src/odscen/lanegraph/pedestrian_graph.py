@@ -14,24 +14,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from odscen.lanegraph.centrelines import CentreLines, node_offsets
-from odscen.lanegraph.graphs import (
-    BoolArray,
-    FloatArray,
-    PedestrianGraph,
-    WalkKind,
-)
+from odscen.lanegraph.graphs import PedestrianGraph, WalkKind
 from odscen.lanegraph.lane_nodes import wrapped
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.base.ids import LaneKey
     from odscen.lanegraph.lane_nodes import NodeTable
     from odscen.lanegraph.segments import SegmentMap
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.objects import Crosswalk
-    from odscen.opendrive.profiles import IntArray
     from odscen.opendrive.road_model import OpenDrive
 
 MIN_WALK_WIDTH = 0.5

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     import networkx as nx
 
-    from odscen.lanegraph.graphs import BoolArray, IntArray, MapGraph, Segments
+    from odscen.base.arrays import BoolArray, Int32Array
+    from odscen.lanegraph.graphs import MapGraph, Segments
 
 WALK_PREFIX = "ped."
 
@@ -43,7 +44,7 @@ class Roi:
     """
 
     segments: tuple[SegmentId, ...]
-    rows: IntArray
+    rows: Int32Array
     nodes: BoolArray
     edges: BoolArray
     walk_nodes: BoolArray
@@ -106,7 +107,7 @@ def is_walk_node_id(name: str) -> bool:
     return name.startswith(WALK_PREFIX)
 
 
-def segment_rows(segments: Segments, ids: Iterable[str]) -> IntArray:
+def segment_rows(segments: Segments, ids: Iterable[str]) -> Int32Array:
     """Rows of the segments ``ids``, ascending and without repetitions.
 
     Raises
@@ -211,7 +212,7 @@ def _induced_adjacency(segments: Segments, ids: Iterable[str]) -> nx.Graph[int]:
     return graph
 
 
-def _all_ids(keys: tuple[LaneKey, ...], first_node: IntArray, prefix: str) -> list[NodeId]:
+def _all_ids(keys: tuple[LaneKey, ...], first_node: Int32Array, prefix: str) -> list[NodeId]:
     return [
         NodeId(f"{prefix}{key.road}.{key.section}.{key.lane}.{k}")
         for key, count in zip(keys, np.diff(first_node).tolist(), strict=True)
@@ -234,7 +235,7 @@ def split_node_id(name: str) -> tuple[LaneKey, int]:
     return key, int(k)
 
 
-def _index(name: str, bare: str, keys: tuple[LaneKey, ...], first_node: IntArray) -> int:
+def _index(name: str, bare: str, keys: tuple[LaneKey, ...], first_node: Int32Array) -> int:
     what = "pedestrian node" if is_walk_node_id(name) else "node"
     try:
         key, k = split_node_id(bare)

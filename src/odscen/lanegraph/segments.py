@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.ids import JunctionId, RoadId, SegmentId
-from odscen.lanegraph.graphs import FloatArray, SegmentPart, Segments
+from odscen.lanegraph.graphs import SegmentPart, Segments
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from odscen.opendrive.profiles import IntArray
+    from odscen.base.arrays import FloatArray, IntArray
     from odscen.opendrive.road_model import ContactPoint, OpenDrive, Road, RoadLink
 
 TARGET_LENGTH = 100.0

@@ -20,7 +20,8 @@ from odscen.lanegraph.query import node_id, walk_node_id
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from odscen.lanegraph.graphs import BoolArray, FloatArray, IntArray, MapGraph
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
+    from odscen.lanegraph.graphs import MapGraph
 
 MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
@@ -40,10 +41,10 @@ class _PathFinder:
     def __init__(
         self,
         count: int,
-        source: IntArray,
-        target: IntArray,
+        source: Int32Array,
+        target: Int32Array,
         length: FloatArray,
-        lane: IntArray,
+        lane: Int32Array,
         mask: BoolArray | None,
         *,
         directed: bool,
@@ -59,7 +60,7 @@ class _PathFinder:
         self.out_degree = np.bincount(rows, minlength=len(self.nodes))
         if not directed:
             self.out_degree = self.out_degree + np.bincount(columns, minlength=len(self.nodes))
-        self._tree: tuple[int, FloatArray, IntArray] | None = None
+        self._tree: tuple[int, FloatArray, Int32Array] | None = None
 
     def distances(self, source: int) -> FloatArray:
         """Metres from ``source`` to every node of the map, shape ``(N,)``; inf if unreachable."""
@@ -71,7 +72,7 @@ class _PathFinder:
         """Nodes that can be reached from ``source`` in the region, itself included; ``(N,)``."""
         return np.isfinite(self.distances(source))
 
-    def path(self, source: int, target: int) -> IntArray:
+    def path(self, source: int, target: int) -> Int32Array:
         """Nodes of the shortest path, both ends included; empty if there is none."""
         distances, predecessors = self._from(source)
         if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
@@ -95,7 +96,7 @@ class _PathFinder:
     def _reversed(self) -> sparse.csr_matrix[np.float64]:
         return self._matrix.T.tocsr()
 
-    def leads(self, sources: IntArray, targets: IntArray) -> BoolArray:
+    def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
         """Whether a way leads from each source to the target in the same place; shape ``(K,)``.
 
         One pass for all, whatever their number. Sources and targets lie in the region.
@@ -107,7 +108,7 @@ class _PathFinder:
         pairs = zip(starts.tolist(), ends.tolist(), strict=True)
         return np.array([reached[a] >> columns[b] & 1 for a, b in pairs], dtype=np.bool_)
 
-    def reach(self, sources: IntArray, targets: IntArray) -> tuple[IntArray, BoolArray]:
+    def reach(self, sources: Int32Array, targets: Int32Array) -> tuple[Int32Array, BoolArray]:
         """Which of the targets each source can get to.
 
         Returns
@@ -130,7 +131,7 @@ class _PathFinder:
                 bits ^= low
         return row, table[:, [columns[part] for part in ends.tolist()]]
 
-    def _reached(self, parts: IntArray) -> tuple[dict[int, int], dict[int, int]]:
+    def _reached(self, parts: Int32Array) -> tuple[dict[int, int], dict[int, int]]:
         """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
         columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
         reached: dict[int, int] = {}
@@ -145,7 +146,7 @@ class _PathFinder:
         """Whether there is any goal candidate: whether anything can be reached."""
         return bool(self.out_degree[self._local[spawn]] > 0)
 
-    def goal_candidates(self, spawn: int) -> IntArray:
+    def goal_candidates(self, spawn: int) -> Int32Array:
         """Nodes that may be the goal of an actor that starts at ``spawn``, ascending (R38).
 
         Ends that can be reached. Where there is none (a ring, a closed town), the farthest
@@ -176,9 +177,9 @@ class _PathFinder:
         return np.asarray(self.out_degree <= self.end_degree, dtype=np.bool_)
 
     @cached_property
-    def _parts(self) -> IntArray:
+    def _parts(self) -> Int32Array:
         """Number of the strongly connected part that each node of the region is in."""
-        labels: IntArray = csgraph.connected_components(
+        labels: Int32Array = csgraph.connected_components(
             self._matrix, directed=self._directed, connection="strong"
         )[1]
         return labels
@@ -193,7 +194,7 @@ class _PathFinder:
         return after
 
     @cached_property
-    def _ends_ahead(self) -> IntArray:
+    def _ends_ahead(self) -> Int32Array:
         """At least how many ends, itself included, can be reached from each node of the region."""
         ends = np.flatnonzero(self._is_end)
         if not self._directed:
@@ -208,7 +209,7 @@ class _PathFinder:
         row = self._local[spawn]
         return bool(self._ends_ahead[row] > int(self._is_end[row]))
 
-    def _from(self, source: int) -> tuple[FloatArray, IntArray]:
+    def _from(self, source: int) -> tuple[FloatArray, Int32Array]:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
@@ -225,7 +226,7 @@ class _PathFinder:
     def _name(self, node: int) -> str:
         return f"node {node}"
 
-    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> Int32Array:
         """Return the farthest reachable node of each lane, the first where several are."""
         away = np.where(np.isfinite(distances), distances, -1.0)
         away[self._local[spawn]] = -1.0
@@ -251,18 +252,18 @@ class WaysTo:
         nodes: NDArray[np.integer],
         local: NDArray[np.integer],
         distances: FloatArray,
-        nexts: IntArray,
+        nexts: Int32Array,
     ) -> None:
         self.nodes = nodes
         self.distances = distances
         self._local = local
         self._next = nexts
 
-    def distance(self, sources: IntArray) -> FloatArray:
+    def distance(self, sources: Int32Array) -> FloatArray:
         """Metres from each source, which lies in the region."""
         return np.asarray(self.distances[self._local[sources]], dtype=np.float64)
 
-    def paths(self, sources: IntArray) -> list[IntArray]:
+    def paths(self, sources: Int32Array) -> list[Int32Array]:
         """Nodes of the way from each source, both ends included; empty where there is none."""
         current = self._local[sources]
         steps = [current]
@@ -276,7 +277,7 @@ class WaysTo:
         return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
 
     def stretches(
-        self, sources: NDArray[np.integer], marks: IntArray
+        self, sources: NDArray[np.integer], marks: Int32Array
     ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
         """Follow the marks of the nodes along each way, each run of equal ones once.
 
@@ -298,7 +299,7 @@ class WaysTo:
         nodes = np.where(table >= 0, self.nodes[table], -1)
         return np.where(table >= 0, marks[nodes], -1), nodes
 
-    def _after(self, marks: IntArray) -> NDArray[np.integer]:
+    def _after(self, marks: Int32Array) -> NDArray[np.integer]:
         """First node on the way from each node of the region that has another mark, or -1."""
         mark = marks[self.nodes]
         jump = np.where(self._next == _NO_PREDECESSOR, np.arange(len(mark)), self._next)
@@ -332,7 +333,7 @@ class Router(_PathFinder):
         """Whether no edge leaves ``node`` inside the region."""
         return bool(self._is_end[self._local[node]])
 
-    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> IntArray:
+    def _farthest_per_lane(self, spawn: int, distances: FloatArray) -> Int32Array:
         """Leave lanes inside junctions out if others remain."""
         farthest = super()._farthest_per_lane(spawn, distances)
         on_roads = farthest[~self._in_junction[farthest]]
@@ -368,26 +369,26 @@ class WalkRouter(_PathFinder):
         return f"node {walk_node_id(self._graph, node) if inside_map else node}"
 
 
-def goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> IntArray:
+def goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> Int32Array:
     """Goal candidates of a vehicle; see :meth:`Router.goal_candidates`."""
     return Router(graph, roi_mask).goal_candidates(spawn)
 
 
-def walk_goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> IntArray:
+def walk_goal_candidates(graph: MapGraph, roi_mask: BoolArray | None, spawn: int) -> Int32Array:
     """Goal candidates of a walker; see :meth:`WalkRouter.goal_candidates`."""
     return WalkRouter(graph, roi_mask).goal_candidates(spawn)
 
 
 def shortest_path(
     graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
-) -> IntArray:
+) -> Int32Array:
     """Lane-graph nodes of the shortest path, both ends included; empty if there is none."""
     return Router(graph, mask).path(source, target)
 
 
 def walk_shortest_path(
     graph: MapGraph, source: int, target: int, mask: BoolArray | None = None
-) -> IntArray:
+) -> Int32Array:
     """Pedestrian nodes of the shortest path, both ends included; empty if there is none."""
     return WalkRouter(graph, mask).path(source, target)
 
@@ -403,7 +404,7 @@ def walk_reachable(graph: MapGraph, source: int, mask: BoolArray | None = None) 
 
 
 def _shortest_edges(
-    count: int, rows: IntArray, columns: IntArray, length: FloatArray
+    count: int, rows: Int32Array, columns: Int32Array, length: FloatArray
 ) -> sparse.csr_matrix[np.float64]:
     """CSR matrix with the shortest of parallel edges (scipy would add them up)."""
     weight = np.maximum(length, MIN_EDGE_LENGTH)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import fresnel
 
-from odscen.opendrive.profiles import FloatArray, IntArray, locate, offsets
+from odscen.base.arrays import FloatArray, IntArray, offsets
+from odscen.opendrive.profiles import locate
 from odscen.opendrive.road_model import Geometry, GeometryKind
 
 if TYPE_CHECKING:

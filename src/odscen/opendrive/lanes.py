@@ -10,18 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from odscen.base.arrays import BoolArray, FloatArray, IntArray, offsets
 from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.geometry import PlanView
-from odscen.opendrive.profiles import (
-    CubicTable,
-    FloatArray,
-    IntArray,
-    StepTable,
-    locate,
-    offsets,
-)
+from odscen.opendrive.profiles import CubicTable, StepTable, locate
 from odscen.opendrive.surface import (
     LineOffset,
     ReferencePoints,
@@ -33,7 +26,6 @@ from odscen.opendrive.surface import (
 if TYPE_CHECKING:
     from odscen.opendrive.road_model import Lane, LaneSection, OpenDrive, Road
 
-BoolArray = NDArray[np.bool_]
 
 LANE_CHANGE_NONE = 0
 LANE_CHANGE_INCREASE = 1

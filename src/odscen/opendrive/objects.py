@@ -11,9 +11,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from odscen.base.arrays import FloatArray
     from odscen.base.ids import RoadId
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.profiles import FloatArray
     from odscen.opendrive.road_model import OpenDrive, Outline, RoadObject, Signal, Validity
 
 SignalKind = Literal["traffic_light", "pedestrian_light", "stop", "yield", "speed_limit", "other"]

@@ -15,11 +15,12 @@ from odscen.base.errors import OpenDriveError
 from odscen.opendrive import parse_rules as rules
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.parse_rules import Notes, Rule
-from odscen.opendrive.profiles import CubicTable, FloatArray, IntArray
+from odscen.opendrive.profiles import CubicTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from odscen.base.arrays import FloatArray, IntArray
     from odscen.base.ids import RoadId
     from odscen.opendrive.road_model import Road
 

@@ -11,20 +11,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from odscen.base.arrays import FloatArray, IntArray, offsets
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from odscen.opendrive.road_model import Cubic
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-
-def offsets(sizes: Iterable[int]) -> IntArray:
-    """Start of each group in a flattened array, and the end of the last: ``(groups + 1,)``."""
-    return np.concatenate([[0], np.cumsum(np.fromiter(sizes, np.int64))])
 
 
 def locate(starts: FloatArray, first: IntArray, group: IntArray, s: FloatArray) -> IntArray:

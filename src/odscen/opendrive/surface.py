@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
+    from odscen.base.arrays import FloatArray
     from odscen.opendrive.geometry import PlanPoints
-    from odscen.opendrive.profiles import FloatArray
 
 
 class ReferencePoints(NamedTuple):

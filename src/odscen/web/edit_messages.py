@@ -1,4 +1,4 @@
-"""Edits by name: every function of :mod:`odscen.scenario.edits.scenario_edits` and its kin as a message.
+"""Edits by name: each function of :mod:`odscen.scenario.edits` as a message.
 
 The messages are made from the functions' signatures, so that there is no second list to keep: kind
 is the function's name, the other fields are its arguments. What the server knows itself (the
@@ -187,7 +187,7 @@ class EditRequest(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     version: Annotated[int, Field(ge=0, lt=2**53)]
-    scenario_edits: Annotated[list[AnyEdit], Field(min_length=1, max_length=MOST_EDITS)]
+    edits: Annotated[list[AnyEdit], Field(min_length=1, max_length=MOST_EDITS)]
     label: Annotated[str, Field(min_length=1, max_length=80)] | None = None
 
     @property

@@ -19,7 +19,7 @@ from odscen.scenario.edits.scenario_edits import eligible_segments, new_scenario
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
-from odscen.sumo.realize.road_users import RoadUser
+from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.web.edit_messages import EditRequest, apply_edit
 from odscen.web.messages import (
@@ -98,7 +98,7 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
 
 @router.post("/{name}/edits")
 def edit(name: str, request: EditRequest, shared: Shared) -> ScenarioState:
-    """Make edits, all or none; each kind is a function of ``odscen.scenario.edits.scenario_edits``."""
+    """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
 
     def change(scenario: Scenario) -> Scenario:
         loaded = shared.map_of(scenario)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.convert.building.network import build_network
+from odscen.convert.lane_table.table_json import table_to_json
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import render_drawing
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -89,7 +90,7 @@ def build_map(
     (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
     (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
     (folder / FILES["net"]).write_bytes(network.net_xml)
-    (folder / FILES["lane_table"]).write_text(network.table.to_json(), encoding="utf-8")
+    (folder / FILES["lane_table"]).write_text(table_to_json(network.table), encoding="utf-8")
     header = odr.header
     info: dict[str, Any] = {
         "format": FORMAT,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import discard, new_folder
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.convert.lane_table.table_json import table_from_json
 from odscen.workspace.asset_catalogue import assets_in
 
 if TYPE_CHECKING:
@@ -94,9 +95,7 @@ class MapEntry:
 
     def lane_table(self) -> LaneTable:
         """The table between OpenDRIVE lanes and SUMO lanes."""
-        from odscen.convert.lane_table.table import LaneTable
-
-        return LaneTable.from_json(self.path("lane_table").read_bytes())
+        return table_from_json(self.path("lane_table").read_bytes())
 
     def drawing(self) -> MapDrawing:
         """What is drawn of the map."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from odscen.base.ids import LaneKey
-from odscen.convert.lane_table.table import LaneTable
+from odscen.convert.lane_table.table_json import table_from_json, table_to_json
 from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.convert.verify.fidelity import verify
 from odscen.sumo.realize.sumo_map import SumoMap
@@ -140,7 +140,7 @@ def test_a_crosswalk_at_a_dead_end_leaves_a_stub_behind_it(place: float, length:
 def test_a_map_without_anything_to_move_on_is_an_empty_network() -> None:
     found = made(road("1", section(lane(-1, kind="shoulder"))))
     assert found.edges() == {}
-    table = LaneTable.from_json(found.network.table.to_json())
+    table = table_from_json(table_to_json(found.network.table))
     assert table.to_sumo(LaneKey("1", 0, -1), 5.0) is None
     usable = usable_places(SumoMap.of(found.graph, table))
     assert not usable.spawnable.any()

@@ -1,4 +1,4 @@
-"""Networks measured against their maps by :mod:`odscen.convert.verify.fidelity`, which knows neither."""
+"""Networks against their maps by :mod:`odscen.convert.verify.fidelity`, which knows neither."""
 
 from __future__ import annotations
 

@@ -3,7 +3,8 @@ import pytest
 
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_index, walk_node_index
-from odscen.scenario.checks.goals import flow_goals, resolve_goals, stream, with_goals
+from odscen.scenario.checks.goals import flow_goals, resolve_goals, with_goals
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits import scenario_edits
 from tests.graphs import fork, ring

@@ -12,10 +12,10 @@ from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import is_connected, node_index
 from odscen.opendrive.parse import parse
-from odscen.scenario.checks.goals import stream
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.distributions import Choice, Constant, Normal, Uniform
 from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.sampling_config import (
     MapFilter,
     SamplingConfig,

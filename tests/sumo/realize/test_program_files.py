@@ -17,6 +17,7 @@ from odscen.base.errors import ScenarioError
 from odscen.base.ids import JunctionId
 from odscen.convert.building.network import build_network
 from odscen.convert.lane_table.table import LaneTable, SumoLight
+from odscen.convert.lane_table.table_json import table_from_json, table_to_json
 from odscen.convert.model.net import Phase
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import Relation
@@ -223,7 +224,7 @@ def test_the_table_keeps_the_lights_that_the_network_has() -> None:
     assert light.junctions == (JUNCTION,)
     assert [p.state for p in light.phases] == [p.get("state") for p in logic.iterfind("phase")]
     assert len(light.signals) == len(light.phases[0].state)
-    assert LaneTable.from_json(crossing().table.to_json()).lights == crossing().table.lights
+    assert table_from_json(table_to_json(crossing().table)).lights == crossing().table.lights
 
 
 def test_the_light_shows_each_stage_as_long_as_the_scenario_says(tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""Building the SUMO network: nodes, junctions, roundabouts, and the conversion report's findings."""
+"""The SUMO network built: nodes, junctions, roundabouts, and the conversion report's findings."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.convert.model.net import (
@@ -26,11 +25,11 @@ from odscen.convert.signals.signal_programs import SignalGroup, plan_stages, pro
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.model.net import Request
     from odscen.convert.model.right_of_way import Conflicts, Movement
     from odscen.convert.pedestrian.pedestrian_network import PlacedCrossing
 
-FloatArray = NDArray[np.float64]
 
 BUS_LENGTH = 12.0
 """Metres of the longest body that turns are made for."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.convert.building.findings import findings
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
 
-FloatArray = NDArray[np.float64]
 
 SIDEWAYS = 5.5
 """m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""

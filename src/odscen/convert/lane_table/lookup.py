@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import FloatArray
+
 
 SNAP = 0.65
 """Metres: a place this close beside the end of a piece is taken to be on it."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
+    from odscen.base.arrays import FloatArray
+
 
 SIMPLE_S = 0.005
 """Metres: knots that change s by less than this are left out."""

@@ -6,27 +6,24 @@ again. Made by :mod:`odscen.convert.lane_table.table_build`, stored as JSON.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from odscen.base.errors import GraphFormatError
 from odscen.convert.lane_table.lookup import Lookup
 from odscen.convert.lane_table.mapping_intervals import Piece, Span, answering
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import FloatArray, Int32Array
     from odscen.base.ids import JunctionId, LaneKey, Roadside, SumoEdgeId, SumoLaneId
     from odscen.convert.model.net import Phase
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 VERSION = 3
 
@@ -64,7 +61,7 @@ class SumoPlaces(NamedTuple):
         Metres; NaN where there is no SUMO lane.
     """
 
-    lane: IntArray
+    lane: Int32Array
     pos: FloatArray
     deviation: FloatArray
 
@@ -72,7 +69,7 @@ class SumoPlaces(NamedTuple):
 class XodrPlaces(NamedTuple):
     """Places on OpenDRIVE lanes, shape ``(N,)`` each; ``lane`` is a row of ``lane_keys`` or -1."""
 
-    lane: IntArray
+    lane: Int32Array
     s: FloatArray
     deviation: FloatArray
 
@@ -311,11 +308,11 @@ class LaneTable:
         return groups
 
     @cached_property
-    def _piece_sumo(self) -> IntArray:
+    def _piece_sumo(self) -> Int32Array:
         return np.array([piece.sumo for piece in self.pieces] or [-1], dtype=np.int32)
 
     @cached_property
-    def _piece_lane(self) -> IntArray:
+    def _piece_lane(self) -> Int32Array:
         return np.array([piece.lane for piece in self.pieces] or [-1], dtype=np.int32)
 
     @cached_property
@@ -338,28 +335,3 @@ class LaneTable:
             for index, piece in enumerate(self.pieces)
         )
         return Lookup.of(knots, spans)
-
-    # On disk
-
-    def to_json(self) -> str:
-        """One JSON document; the same table gives the same text."""
-        from odscen.convert.lane_table.table_json import to_data
-
-        return json.dumps(to_data(self), separators=(",", ":"), allow_nan=False)
-
-    @classmethod
-    def from_json(cls, text: str | bytes) -> LaneTable:
-        """Inverse of :meth:`to_json`.
-
-        Raises
-        ------
-        GraphFormatError
-            If the text is not a lane table of this version.
-        """
-        from odscen.convert.lane_table.table_json import from_data
-
-        try:
-            return from_data(json.loads(text))
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            msg = f"not a lane table: {type(error).__name__}: {error}"
-            raise GraphFormatError(msg) from error

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.ids import Roadside, SumoLaneId
 from odscen.convert.lane_table.mapping_intervals import Piece, monotone, simplified
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
     from odscen.convert.model.net import Net, NetLane
     from odscen.convert.pedestrian.pedestrian_network import WalkNet
     from odscen.opendrive.lanes import RoadTable
-
-FloatArray = NDArray[np.float64]
 
 
 def build_table(

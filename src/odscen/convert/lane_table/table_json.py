@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
 
+from odscen.base.errors import GraphFormatError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
 from odscen.convert.lane_table.mapping_intervals import Piece
 from odscen.convert.lane_table.table import (
@@ -21,7 +23,27 @@ from odscen.convert.model.net import Phase
 _DIGITS = 4
 
 
-def to_data(table: LaneTable) -> dict[str, Any]:
+def table_to_json(table: LaneTable) -> str:
+    """One JSON document; the same table gives the same text."""
+    return json.dumps(_to_data(table), separators=(",", ":"), allow_nan=False)
+
+
+def table_from_json(text: str | bytes) -> LaneTable:
+    """Inverse of :func:`table_to_json`.
+
+    Raises
+    ------
+    GraphFormatError
+        If the text is not a lane table of this version.
+    """
+    try:
+        return _from_data(json.loads(text))
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        msg = f"not a lane table: {type(error).__name__}: {error}"
+        raise GraphFormatError(msg) from error
+
+
+def _to_data(table: LaneTable) -> dict[str, Any]:
     """Columns of a table, ready for JSON."""
     classes = _Classes()
     lanes = table.lane_list
@@ -78,8 +100,8 @@ def to_data(table: LaneTable) -> dict[str, Any]:
     }
 
 
-def from_data(data: dict[str, Any]) -> LaneTable:
-    """Inverse of :func:`to_data`."""
+def _from_data(data: dict[str, Any]) -> LaneTable:
+    """Inverse of :func:`_to_data`."""
     if data["version"] != VERSION:
         msg = f"version {data['version']!r}, not {VERSION}"
         raise ValueError(msg)

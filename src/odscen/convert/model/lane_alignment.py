@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.opendrive.lanes import RoadTable
 
-FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
 CHORD_ERROR = 0.01

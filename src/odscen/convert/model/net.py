@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoEdgeId, SumoLaneId
 
-FloatArray = NDArray[np.float64]
 
 NORMAL = "normal"
 INTERNAL = "internal"

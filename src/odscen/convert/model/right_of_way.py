@@ -19,16 +19,15 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from odscen.convert.model.net import Request
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
+    from odscen.base.arrays import FloatArray
+
 
 MOST_WIDTH = 2.0
 """Metres between two courses on which vehicles are taken to touch; less for narrow lanes."""

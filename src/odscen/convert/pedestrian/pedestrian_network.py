@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.convert.model.access import PEDESTRIAN, WALKING_SPEED
@@ -37,11 +36,11 @@ from odscen.lanegraph.pedestrian_graph import ROADSIDE_OFFSET, ROADSIDE_WIDTH
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
 
-FloatArray = NDArray[np.float64]
 
 TRIM = 0.6
 """Metres that an edge keeps off the middle of a walking area."""

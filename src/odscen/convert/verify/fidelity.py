@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from odscen.base.arrays import offsets
 from odscen.convert.verify.fidelity_result import (
     CROSSWALK_SHARE,
     MAX_P99,
@@ -36,16 +37,15 @@ from odscen.convert.verify.net_reader import read_net
 from odscen.convert.verify.polyline_finder import STEP, Finder, Polylines
 from odscen.convert.verify.signal_safety import compare_signals, unsafe_pairs
 from odscen.opendrive.objects import crosswalks
-from odscen.opendrive.profiles import offsets
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.convert.verify.lane_relations import LanePair, RoadLane
     from odscen.convert.verify.net_reader import NetFile, NetFileLane
-    from odscen.convert.verify.polyline_finder import FloatArray, IntArray
-    from odscen.opendrive.lanes import BoolArray, RoadTable
+    from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
 
 REACH = 10.0

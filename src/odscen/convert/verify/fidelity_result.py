@@ -1,4 +1,4 @@
-"""What :func:`odscen.convert.verify.fidelity.verify` finds: figures, places, and a verdict per limit.
+"""Result of :func:`odscen.convert.verify.fidelity.verify`: figures, places, a verdict per limit.
 
 Places are in the OpenDRIVE frame, metres. Lanes of the map are written ``road.lane`` where the
 section does not matter, else ``road.section.lane``.

@@ -13,9 +13,10 @@ from odscen.opendrive.topology import lane_successors, side_links
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.base.ids import LaneKey, RoadId
     from odscen.convert.verify.net_reader import NetFileLane
-    from odscen.convert.verify.polyline_finder import Finder, FloatArray
+    from odscen.convert.verify.polyline_finder import Finder
     from odscen.opendrive.road_model import OpenDrive
 
 RoadLane = tuple["RoadId", int]

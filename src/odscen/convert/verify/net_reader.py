@@ -1,4 +1,4 @@
-"""A ``.net.xml`` read for :mod:`odscen.convert.verify.fidelity`: what the file says, nothing looked up.
+"""A ``.net.xml`` as its file says, for :mod:`odscen.convert.verify.fidelity`; nothing looked up.
 
 A reader of its own, so that the check shares nothing with what wrote the network. Ids serve only to
 follow references within the file. Source: sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html.
@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from lxml import etree
-from numpy.typing import NDArray
 
 from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-FloatArray = NDArray[np.float64]
+    from odscen.base.arrays import FloatArray
+
 
 MOTOR_CLASSES = ("passenger", "bus", "taxi", "hov")
 """A lane open to one of these is a driving lane."""

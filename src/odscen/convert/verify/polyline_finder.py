@@ -7,16 +7,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from odscen.opendrive.profiles import offsets
+from odscen.base.arrays import FloatArray, IntArray, offsets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+    from numpy.typing import NDArray
+
 
 STEP = 0.25
 """Length in metres of the pieces that places are compared with, at most."""

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-FloatArray = NDArray[np.float64]
+    from odscen.base.arrays import FloatArray
+
 
 CONFIDENCE = 0.95
 

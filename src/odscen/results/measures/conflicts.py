@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
     from odscen.results.records.run_records import PlannedActor
 
-FloatArray = NDArray[np.float64]
 
 SEEN_TTC, SEEN_DRAC, SEEN_PET = 3.0, 3.0, 3.0
 """What is recorded: seconds or less, m/s^2 or more, seconds or less."""

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.errors import InputError
 from odscen.lanegraph.graphs import Relation
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.lanegraph.graphs import BoolArray, IntArray, MapGraph
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
+    from odscen.lanegraph.graphs import MapGraph
 
-FloatArray = NDArray[np.float64]
 
 LONGEST = 10
 """Junctions of a corridor that is chosen by itself, at most."""
@@ -57,7 +56,7 @@ class Corridor:
 
     segments: tuple[str, ...]
     starts: FloatArray
-    nodes: IntArray
+    nodes: Int32Array
     along: FloatArray
 
     @property
@@ -169,7 +168,7 @@ def way_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
     return _passed(graph, path)
 
 
-def _passed(graph: MapGraph, path: IntArray) -> tuple[str, ...]:
+def _passed(graph: MapGraph, path: Int32Array) -> tuple[str, ...]:
     """Segments in the order in which a path leads over them."""
     rows = graph.lanes.segment[path].tolist()
     return tuple(graph.segments.ids[row] for row, _ in itertools.groupby(rows))
@@ -213,7 +212,7 @@ def _with_junctions(graph: MapGraph, names: Sequence[str]) -> list[str]:
     return whole
 
 
-def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) -> IntArray | None:
+def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) -> Int32Array | None:
     """Nodes of the shortest way from where one enters ``first`` to where one leaves ``last``."""
     lanes = graph.lanes
     start, end = (int(segment_rows(graph.segments, [name])[0]) for name in (first, last))
@@ -230,7 +229,7 @@ def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) ->
     return None if best is None else router.path(best[1], best[2])
 
 
-def _measured(graph: MapGraph, names: Sequence[str], path: IntArray) -> Corridor:
+def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corridor:
     from scipy.spatial import cKDTree
 
     lanes = graph.lanes

@@ -8,7 +8,6 @@ import numpy as np
 
 from odscen.results.records.traces import (
     ActorCounts,
-    FloatArray,
     SpeedCurve,
     bin_width,
     counts_over_time,
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.arrays import FloatArray
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.records.run_records import Plan
 

@@ -1,7 +1,7 @@
 """Which segment, junction and movement each SUMO lane belongs to, for sums over lanes.
 
-Made from a map by :mod:`odscen.sumo.realize.sumo_lane_places` and kept in the run folder, so that figures can be
-had from a run alone.
+Made from a map by :mod:`odscen.sumo.realize.sumo_lane_places` and kept in the run folder, so that
+figures can be had from a run alone.
 """
 
 from __future__ import annotations

@@ -15,11 +15,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from odscen.base.arrays import FloatArray
     from odscen.results.records.run_records import Plan, PlannedActor
 
 FORMAT = "odscen-parity"
@@ -27,8 +27,6 @@ VERSION = 1
 WORST = 25
 """Road users listed, each at its worst moment."""
 PERCENTILES = (50, 95, 99, 100)
-
-FloatArray = NDArray[np.float64]
 
 
 def with_errors(states: pl.DataFrame) -> pl.DataFrame:

@@ -27,8 +27,8 @@ delay and waiting of a movement
     last edge by lane, that of the edges before it all together.
 
 A junction or movement that nobody got into, though somebody stood all the time, has no delay per
-vehicle and level F. Places are defined in :mod:`odscen.results.measures.lane_places`, levels of service in
-:mod:`odscen.results.measures.level_of_service`.
+vehicle and level F. Places are defined in :mod:`odscen.results.measures.lane_places`, levels of
+service in :mod:`odscen.results.measures.level_of_service`.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def traffic_figures(
     end
         When the run ended, s.
     queues
-        From :func:`odscen.results.measures.queues.queue_lengths`; of trajectories, if there are any.
+        From :func:`odscen.results.measures.queues.queue_lengths`; if there are trajectories.
     """
     clock = intervals(lanes, end)
     lanes = summable(lanes)

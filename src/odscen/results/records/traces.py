@@ -10,15 +10,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import polars as pl
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+    from odscen.base.arrays import FloatArray, IntArray
+
 
 OTHER = "other"
 """Category of whoever is in the trajectories but not among the actors."""

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.drawing.map_drawing import Lines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.base.arrays import FloatArray
     from odscen.lanegraph.graphs import MapGraph
 
-FloatArray = NDArray[np.float64]
 
 _TOLERANCE = 0.5
 """Metres by which a drawn lane may leave its centre."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.durations import clock
 from odscen.base.markup import Markup, element, join, number
@@ -19,7 +18,10 @@ from odscen.base.markup import Markup, element, join, number
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import FloatArray
+
 
 _WIDTH, _HEIGHT = 760.0, 270.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52.0, 20.0, 30.0, 40.0

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from odscen.base.arrays import FloatArray, IntArray, offsets, ranges
 from odscen.base.markup import Markup, element, number, path_data
-from odscen.drawing.map_drawing import offsets, ranges
 from odscen.results.report.plots import ChartFrame, chart, clock_axis, legend, text_at, value_axis
 from odscen.results.report.report_tables import report_section
 from odscen.results.report.report_words import stretch
@@ -17,8 +16,6 @@ from odscen.results.report.report_words import stretch
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 CRAWLS = 5.0 / 3.6
 """m/s; slower is drawn as standing, as a queue that creeps is one."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.report.plots import Dots, Series, dot_chart, line_chart
@@ -17,7 +16,8 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-FloatArray = NDArray[np.float64]
+    from odscen.base.arrays import FloatArray
+
 
 TIMES = 6
 """Parts of the run that have a colour of their own."""

@@ -6,7 +6,6 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from odscen.base.markup import Markup, element, number, path_data
 from odscen.drawing.map_sheet import length_text, round_length
@@ -20,13 +19,13 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.drawing.map_drawing import Bounds, MapDrawing
+    from odscen.base.arrays import Bounds, FloatArray
+    from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.measures.gridlock import Trouble
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.records.traces import Paths, SpeedCells
 
-FloatArray = NDArray[np.float64]
 
 CATEGORIES = {
     "car": "Cars",

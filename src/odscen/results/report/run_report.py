@@ -11,9 +11,6 @@ import hashlib
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from odscen.base.markup import Markup, element, join, number
 from odscen.results.measures.curves import presence
 from odscen.results.measures.gridlock import find_trouble
@@ -49,8 +46,6 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
-
-FloatArray = NDArray[np.float64]
 
 
 def render_report(

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import zlib
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.problems import Problem, refuse_errors
 from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import IntArray, MapGraph
+    from odscen.base.arrays import Int32Array
+    from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import Scenario
-
-
-def stream(seed: int, *names: str) -> np.random.Generator:
-    """Random numbers of one thing by name, independent of what else is drawn, and of the order."""
-    words = [zlib.crc32(name.encode()) for name in names]
-    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
 
 
 def resolve_goals(
@@ -66,7 +61,7 @@ def resolve_goals(
 
 def flow_goals(
     scenario: Scenario, graph: MapGraph, *, region: Region | None = None
-) -> dict[str, IntArray]:
+) -> dict[str, Int32Array]:
     """Goals that the actors of each flow draw from: the one given, or all candidates.
 
     Node indices, of the pedestrian graph for flows of pedestrians, ascending.
@@ -77,7 +72,7 @@ def flow_goals(
         With every flow whose spawn or goal is not usable.
     """
     region = Region.of(graph, scenario.roi) if region is None else region
-    goals: dict[str, IntArray] = {}
+    goals: dict[str, Int32Array] = {}
     problems: list[Problem] = []
     for index, flow in enumerate(scenario.flows):
         subject = Subject.flow(scenario, region, index)

@@ -9,7 +9,7 @@ import numpy as np
 from odscen.base.errors import NotFoundError
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import FloatArray
+    from odscen.base.arrays import FloatArray
     from odscen.scenario.document.scenario_document import Demand
 
 DAY = 86_400.0

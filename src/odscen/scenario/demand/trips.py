@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.scenario.checks.goals import stream
 from odscen.scenario.demand.day_profiles import curve
 from odscen.scenario.demand.zones import segments_of
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.sampling_config import PlacingRules
 from odscen.scenario.placing.bodies import Crowd, box_at
 from odscen.scenario.placing.random_places import place_at_random
@@ -23,8 +23,8 @@ from odscen.scenario.placing.supply import vehicle_supply
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray, Int32Array
     from odscen.base.categories import Category
-    from odscen.lanegraph.graphs import FloatArray, IntArray
     from odscen.scenario.demand.zones import TripEnds
     from odscen.scenario.document.scenario_document import Background, Matrix, Scenario, Window
     from odscen.scenario.placing.region import Region
@@ -63,8 +63,8 @@ class Trips:
     name: str
     part: str
     categories: Sequence[Category]
-    starts: IntArray
-    goals: IntArray
+    starts: Int32Array
+    goals: Int32Array
     departs: FloatArray
     unmet: int = 0
     why: str = ""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from odscen.lanegraph.graphs import BoolArray, FloatArray, IntArray
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.scenario.document.scenario_document import Demand
     from odscen.scenario.placing.region import NodePlace, Region
     from odscen.scenario.placing.supply import Usable
@@ -50,14 +50,14 @@ class ReachableEnds(NamedTuple):
         Rows of the segments that starts and ends lie in.
     """
 
-    starts: IntArray
-    ends: IntArray
-    row: IntArray
+    starts: Int32Array
+    ends: Int32Array
+    row: Int32Array
     table: BoolArray
-    from_segment: IntArray
-    to_segment: IntArray
+    from_segment: Int32Array
+    to_segment: Int32Array
 
-    def goals(self, picked: NDArray[np.integer], uniform: FloatArray) -> IntArray:
+    def goals(self, picked: NDArray[np.integer], uniform: FloatArray) -> Int32Array:
         """Choose an end for each of some starts; -1 where none but the start itself can be reached.
 
         Ends in the segment of the start are chosen only where there are no others.
@@ -103,8 +103,8 @@ class TripEnds:
         self.region = region
         self._usable = usable
         self._taken = set(taken)
-        self._known: dict[tuple[str, Category, tuple[str, ...] | None], IntArray] = {}
-        self._reach: dict[Category, tuple[IntArray, BoolArray]] = {}
+        self._known: dict[tuple[str, Category, tuple[str, ...] | None], Int32Array] = {}
+        self._reach: dict[Category, tuple[Int32Array, BoolArray]] = {}
 
     @cached_property
     def router(self) -> Router:
@@ -122,11 +122,11 @@ class TripEnds:
         """Ways of a category."""
         return self.walk_router if category is Category.PEDESTRIAN else self.router
 
-    def starts(self, category: Category, segments: tuple[str, ...] | None = None) -> IntArray:
+    def starts(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
         """Nodes on which somebody can start, ascending; of the whole region without segments."""
         return self._nodes("start", category, segments)
 
-    def ends(self, category: Category, segments: tuple[str, ...] | None = None) -> IntArray:
+    def ends(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
         """Nodes at which a way can end, ascending; of the whole region without segments."""
         return self._nodes("end", category, segments)
 
@@ -149,7 +149,7 @@ class TripEnds:
         segment = self._segments(category)
         return ReachableEnds(starts, ends, row, table, segment[starts], segment[ends])
 
-    def _nodes(self, what: str, category: Category, segments: tuple[str, ...] | None) -> IntArray:
+    def _nodes(self, what: str, category: Category, segments: tuple[str, ...] | None) -> Int32Array:
         key = what, category, segments
         if key not in self._known:
             if segments is not None:
@@ -163,7 +163,7 @@ class TripEnds:
     def _end(self, category: Category) -> BoolArray:
         return self._walkable if category is Category.PEDESTRIAN else self._stretch_ends
 
-    def _segments(self, category: Category) -> IntArray:
+    def _segments(self, category: Category) -> Int32Array:
         graph = self.region.graph
         return (graph.walks if category is Category.PEDESTRIAN else graph.lanes).segment
 

@@ -58,8 +58,8 @@ def set_matrix(
     Parameters
     ----------
     fields
-        Fields of a :class:`~odscen.scenario.document.scenario_document.Matrix`, such as ``trips``; those not given
-        stay as they are.
+        Fields of a :class:`~odscen.scenario.document.scenario_document.Matrix`,
+        such as ``trips``; those not given stay as they are.
 
     Raises
     ------
@@ -76,13 +76,14 @@ def set_counts(
 ) -> Scenario:
     """Add counts that traffic is to reproduce, or change those of that name.
 
-    Counts that contradict each other are accepted; :func:`odscen.scenario.checks.scenario_checks.check` names them.
+    Counts that contradict each other are accepted;
+    :func:`odscen.scenario.checks.scenario_checks.check` names them.
 
     Parameters
     ----------
     fields
-        Fields of :class:`~odscen.scenario.document.scenario_document.Counts`, such as ``rows``; those not given stay
-        as they are.
+        Fields of :class:`~odscen.scenario.document.scenario_document.Counts`,
+        such as ``rows``; those not given stay as they are.
 
     Raises
     ------
@@ -102,8 +103,9 @@ def set_background(
     Parameters
     ----------
     fields
-        Fields of :class:`~odscen.scenario.document.scenario_document.Background`, such as ``per_km``; those not given
-        stay as they are, except that one amount takes the place of another.
+        Fields of :class:`~odscen.scenario.document.scenario_document.Background`,
+        such as ``per_km``; those not given stay as they are, except that one amount takes the place
+        of another.
     """
     old = scenario.demand.background
     amounts = {"fill", "per_km", "trips"}

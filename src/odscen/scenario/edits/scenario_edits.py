@@ -126,8 +126,8 @@ def set_timing(
     lights
         Traffic lights of the map.
     fields
-        Fields of a :class:`~odscen.scenario.document.scenario_document.JunctionTiming`, such as ``green``; those not
-        given stay as they are.
+        Fields of a :class:`~odscen.scenario.document.scenario_document.JunctionTiming`,
+        such as ``green``; those not given stay as they are.
 
     Raises
     ------
@@ -248,7 +248,8 @@ def add_actor(
     id
         Its name; ``car-1``, ``car-2``, ... if not given.
     fields
-        Further fields of an :class:`~odscen.scenario.document.scenario_document.Actor`, such as ``goal``.
+        Further fields of an :class:`~odscen.scenario.document.scenario_document.Actor`, such as
+        ``goal``.
 
     Raises
     ------

@@ -24,7 +24,8 @@ from odscen.lanegraph.shortest_paths import Router, WalkRouter
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from odscen.lanegraph.graphs import BoolArray, IntArray, LaneGraph, MapGraph, PedestrianGraph
+    from odscen.base.arrays import BoolArray, Int32Array
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
 
 
 class NodePlace(NamedTuple):
@@ -87,7 +88,7 @@ class Region:
         """Return the ways on the graph that a place is on."""
         return self.walk_router if place.walk else self.router
 
-    def candidates(self, spawn: NodePlace) -> IntArray:
+    def candidates(self, spawn: NodePlace) -> Int32Array:
         """Goal candidates of a spawn (R38), as indices of nodes of the same graph."""
         return self.router_of(spawn).goal_candidates(spawn.node)
 

@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.lanegraph.graphs import (
-    CHANGE_LEFT,
-    CHANGE_RIGHT,
-    BoolArray,
-    FloatArray,
-    LaneGraph,
-    PedestrianGraph,
-    Relation,
-)
+from odscen.lanegraph.graphs import CHANGE_LEFT, CHANGE_RIGHT, LaneGraph, PedestrianGraph, Relation
 from odscen.lanegraph.shortest_paths import MIN_EDGE_LENGTH
 from odscen.scenario.placing.bodies import SIDE_GAP, Crowd, box_at
 
@@ -25,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from odscen.base.arrays import BoolArray, FloatArray
     from odscen.base.categories import Body, Category
 
 LANE_MARGIN = 0.05

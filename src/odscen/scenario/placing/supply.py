@@ -13,8 +13,9 @@ from odscen.scenario.placing.spawn_room import MaximalCrowd, distance_to_end, ma
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.base.arrays import BoolArray
     from odscen.base.categories import Body
-    from odscen.lanegraph.graphs import BoolArray, LaneGraph, PedestrianGraph
+    from odscen.lanegraph.graphs import LaneGraph, PedestrianGraph
     from odscen.scenario.document.sampling_config import PlacingRules
     from odscen.scenario.placing.region import Region
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.goals import stream
 from odscen.scenario.document.distributions import draw_key, draw_place
 from odscen.scenario.document.json_form import validated
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import (
     Actor,
     Environment,
@@ -36,8 +36,9 @@ from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from odscen.base.arrays import Int32Array
     from odscen.base.ids import SegmentId
-    from odscen.lanegraph.graphs import IntArray, MapGraph
+    from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.sampling_config import (
         EnvironmentShares,
         MapFilter,
@@ -295,7 +296,7 @@ def _drafts(
         reach = Reach(region.graph.lanes, region.lanes & usable.drivable)
     drafts = []
     for spot in spots:
-        goals: IntArray = region.candidates(NodePlace(walk, spot.node))
+        goals: Int32Array = region.candidates(NodePlace(walk, spot.node))
         if reach is not None:
             goals = goals[reach.of(spot.node)[goals]]
         elif walk and usable.walkable is not None:

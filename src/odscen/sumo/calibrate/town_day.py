@@ -23,7 +23,7 @@ from odscen.sumo.realize.program_files import scenario_lights
 from odscen.sumo.realize.realization import everybody
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import FloatArray
+    from odscen.base.arrays import FloatArray
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
 

@@ -111,7 +111,7 @@ def clear_parts(run: Path) -> None:
 
 
 def recorded_part(run: Path, file: str, number: int) -> Path:
-    """Where the part of a complete slice is, of one of :data:`odscen.sumo.folder.layout.RECORDED`."""
+    """Where a complete slice's part is, of one of :data:`odscen.sumo.folder.layout.RECORDED`."""
     return run / RECORDED[file] / f"part-{number:04d}.parquet"
 
 

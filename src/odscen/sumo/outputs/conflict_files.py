@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.results.measures.conflicts import conflict_table, walking_conflicts
 from odscen.sumo.folder.layout import CONFLICTS_FILE, SSM_FILE, TRAJECTORIES_FILE
-from odscen.sumo.outputs.ssm import logged_conflicts
+from odscen.sumo.outputs.ssm_log import logged_conflicts
 
 if TYPE_CHECKING:
     from pathlib import Path

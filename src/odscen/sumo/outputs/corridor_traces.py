@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.lanegraph.graphs import FloatArray, IntArray
+    from odscen.base.arrays import FloatArray, Int32Array
     from odscen.results.measures.corridors import Corridor
     from odscen.sumo.realize.sumo_map import SumoMap
 
@@ -124,7 +124,7 @@ def _busiest(on_way: pl.LazyFrame) -> tuple[float, float] | None:
 
 
 def _placed(
-    rows: pl.DataFrame, sumo_map: SumoMap, nodes: IntArray, along: FloatArray
+    rows: pl.DataFrame, sumo_map: SumoMap, nodes: Int32Array, along: FloatArray
 ) -> pl.DataFrame:
     """Add ``along``; records on the same lanes beside the corridor are left out."""
     import polars as pl

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from lxml import etree
 
-from odscen.scenario.checks.goals import stream
 from odscen.scenario.demand.count_stations import Passing
 from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories
+from odscen.scenario.document.named_random import stream
 from odscen.sumo.realize.sumo_tools import run_tool
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from odscen.lanegraph.graphs import IntArray
+    from odscen.base.arrays import Int32Array
     from odscen.scenario.demand.zones import TripEnds
     from odscen.scenario.document.scenario_document import Counts, Scenario
 
@@ -203,7 +203,7 @@ def _counts_xml(passing: Passing, wanted: Sequence[tuple[str, float, float, floa
     return "\n".join([*lines, "</data>", ""])
 
 
-def _stretch_starts(ground: TripEnds, starts: IntArray) -> IntArray:
+def _stretch_starts(ground: TripEnds, starts: Int32Array) -> Int32Array:
     """First start of each lane in each segment."""
     lanes = ground.region.graph.lanes
     pairs = np.stack([lanes.lane[starts], lanes.segment[starts]], axis=1)
@@ -213,7 +213,7 @@ def _stretch_starts(ground: TripEnds, starts: IntArray) -> IntArray:
 
 def _starts(
     ground: TripEnds, counts: Counts, ways: Sequence[StationRoute], uniform: np.ndarray
-) -> IntArray:
+) -> Int32Array:
     """Draw a start for each way: on its stretch of lane, where the way through segments is same."""
     lanes = ground.region.graph.lanes
     usual = max(counts.mix, key=lambda one: counts.mix[one])
@@ -221,7 +221,7 @@ def _starts(
     of_goal: dict[int, set[StationRoute]] = defaultdict(set)
     for way in ways:
         of_goal[way.goal].add(way)
-    possible: dict[StationRoute, IntArray] = {}
+    possible: dict[StationRoute, Int32Array] = {}
     for goal, mine in sorted(of_goal.items()):
         to_goal = ground.router.ways_to(goal)
         for way in sorted(mine):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
-from odscen.scenario.checks.goals import stream
+from odscen.scenario.document.named_random import stream
 
 if TYPE_CHECKING:
     from odscen.base.categories import Body

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.shortest_paths import Router
     from odscen.scenario.demand.count_stations import Observation
     from odscen.scenario.placing.region import Region
-    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.sumo_map import SumoMap
 
 Passages = Counter[tuple[str, float, float]]

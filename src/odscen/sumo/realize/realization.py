@@ -29,15 +29,15 @@ from odscen.sumo.folder.layout import (
     ROUTES_FILE,
     SIGNALS_FILE,
 )
-from odscen.sumo.outputs.ssm import VEHICLE_PARAMETER
+from odscen.sumo.realize.departures import demand_users, road_users
 from odscen.sumo.realize.driving import KINDS, draw_factor, driver
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.program_files import scenario_lights, signals_xml
 from odscen.sumo.realize.recording import Recording, region_xml
-from odscen.sumo.realize.road_users import RoadUser, demand_users, road_users
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
+from odscen.sumo.realize.ssm_device import VEHICLE_PARAMETER
 from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.realize.walk_planner import Walk, WalkPlanner
@@ -46,9 +46,10 @@ from odscen.sumo.realize.weather_effects import NO_EFFECT, weather_effect
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.lanegraph.graphs import IntArray
+    from odscen.base.arrays import Int32Array
     from odscen.scenario.document.scenario_document import Environment, Scenario
     from odscen.sumo.realize.driving import Driver
+    from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.realize.weather_effects import WeatherEffect
 
@@ -259,7 +260,7 @@ class _Writer:
             for index, (user, body, manner) in enumerate(zip(users, bodies, manners, strict=True))
         )
 
-    def _way(self, user: RoadUser, body: Body, manner: Driver, path: IntArray) -> _PlannedRoute:
+    def _way(self, user: RoadUser, body: Body, manner: Driver, path: Int32Array) -> _PlannedRoute:
         steps = self._steps(user, path)
         length = float(np.sum(steps))
         duration = self._free_flow_time(user, manner, path, steps)
@@ -268,7 +269,7 @@ class _Writer:
         except NoRouteError as error:
             return _PlannedRoute(None, str(error), length, duration)
 
-    def _route(self, user: RoadUser, body: Body, path: IntArray) -> Route | Walk:
+    def _route(self, user: RoadUser, body: Body, path: Int32Array) -> Route | Walk:
         offset = user.lateral_offset
         if user.person:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
@@ -341,13 +342,13 @@ class _Writer:
             problem=way.problem,
         )
 
-    def _steps(self, user: RoadUser, path: IntArray) -> np.ndarray:
+    def _steps(self, user: RoadUser, path: Int32Array) -> np.ndarray:
         """Distances between the nodes of a path, shape ``(len(path) - 1,)``, metres."""
         graph = self._graph.walks if user.person else self._graph.lanes
         return np.hypot(np.diff(graph.x[path]), np.diff(graph.y[path]))
 
     def _free_flow_time(
-        self, user: RoadUser, manner: Driver, path: IntArray, steps: np.ndarray
+        self, user: RoadUser, manner: Driver, path: Int32Array, steps: np.ndarray
     ) -> float | None:
         """Seconds along the path at the speed the actor wants, from standing.
 

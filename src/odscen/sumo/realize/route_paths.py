@@ -23,11 +23,12 @@ from odscen.scenario.placing.spawn_room import LANE_CHANGE
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from odscen.base.arrays import BoolArray, Int32Array
     from odscen.base.categories import Body
-    from odscen.lanegraph.graphs import BoolArray, IntArray, LaneGraph
+    from odscen.lanegraph.graphs import LaneGraph
     from odscen.lanegraph.shortest_paths import Router, WaysTo
     from odscen.scenario.placing.region import Region
-    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.road_user import RoadUser
 
 TOGETHER = 500
 """Ways to one goal that are in memory at a time."""
@@ -40,7 +41,7 @@ def each_path(
     region: Region,
     drivable: Router,
     bodies: Sequence[Body] | None = None,
-) -> Iterator[tuple[int, IntArray]]:
+) -> Iterator[tuple[int, Int32Array]]:
     """Yield the position of each user and the nodes of its way inside the region.
 
     It is the shortest one, of vehicles among those that do not change lanes at their very start, if
@@ -64,7 +65,7 @@ def each_path(
     leads = _Leads(region.graph.lanes)
     for (person, spawn), group in by_spawn.items():
         goals = {index: users[index].goal for index in group}
-        ways: dict[int, IntArray] = {}
+        ways: dict[int, Int32Array] = {}
         if person:
             ways = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
         else:
@@ -125,7 +126,7 @@ def _from_spawn(
     bodies: Sequence[Body],
     router: Router,
     leads: _Leads,
-) -> dict[int, IntArray]:
+) -> dict[int, Int32Array]:
     """Ways of the members of a flow, or of one actor, as far as there are any."""
     if not goals or not router.mask[spawn]:
         return {}
@@ -146,7 +147,7 @@ def _from_spawn(
     return {index: way for index, way in ways.items() if len(way)}
 
 
-def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: WaysTo) -> list[IntArray]:
+def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: WaysTo) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
     ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
     metres = iter(there.distance(ends).tolist())
@@ -164,6 +165,6 @@ def _best(goal: int, leads: Sequence[tuple[_Lead, float]]) -> _Lead:
     return min(fit, key=lambda pair: pair[1])[0] if fit else none
 
 
-def _joined(lead: _Lead, path: IntArray) -> IntArray:
+def _joined(lead: _Lead, path: Int32Array) -> Int32Array:
     before = np.array(lead.nodes[:-1], dtype=np.int32)
     return np.concatenate([before, path]) if len(path) else path

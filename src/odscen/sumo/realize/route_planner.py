@@ -14,13 +14,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import IntArray, LaneGraph
+    from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.lanegraph.graphs import LaneGraph
     from odscen.sumo.realize.road_net import RoadNet, RoadNetLane
 
-FloatArray = NDArray[np.float64]
 
 DETOUR = 60.0
 """Metres of road that a repair of a route may put between two of its edges."""
@@ -53,7 +52,7 @@ class NodePositions:
     """
 
     lanes: tuple[str, ...]
-    lane: IntArray
+    lane: Int32Array
     pos: FloatArray
     deviation: FloatArray
     scale: FloatArray
@@ -101,7 +100,7 @@ class RoutePlanner:
         self._places = places
 
     def plan(
-        self, path: IntArray, *, length: float, vclass: str, lateral_offset: float = 0.0
+        self, path: Int32Array, *, length: float, vclass: str, lateral_offset: float = 0.0
     ) -> Route:
         """Route of a vehicle of this length along a path of the lane graph.
 
@@ -138,7 +137,7 @@ class RoutePlanner:
         lateral = self._net.pos_lat(lateral_offset)
         return Route(edges, lane.index, front, lateral, arrival_lane, arrival_pos, repairs)
 
-    def _edges(self, path: IntArray, vclass: str) -> list[str]:
+    def _edges(self, path: Int32Array, vclass: str) -> list[str]:
         """Return normal edges that the path runs over, in order, each run of equal ones once."""
         rows = self._places.lane[path]
         rows = rows[rows >= 0]
@@ -160,7 +159,7 @@ class RoutePlanner:
         return any(other.allows(vclass) for other in self._net.edge_lanes[lane.edge])
 
     def _anchor(
-        self, path: IntArray, edges: tuple[str, ...], vclass: str
+        self, path: Int32Array, edges: tuple[str, ...], vclass: str
     ) -> tuple[tuple[str, ...], RoadNetLane, float]:
         """Edges, lane and position of the spawn; the position may lie beyond the lane's end.
 
@@ -251,7 +250,7 @@ class RoutePlanner:
         return (self._net.passage(lane.id, edges[1]) if len(edges) > 1 else None) or ()
 
     def _arrival(
-        self, edges: tuple[str, ...], path: IntArray, vclass: str, length: float
+        self, edges: tuple[str, ...], path: Int32Array, vclass: str, length: float
     ) -> tuple[tuple[str, ...], int | None, float]:
         """Edges, lane and position of the arrival: body centre on the goal as far as the edge goes.
 

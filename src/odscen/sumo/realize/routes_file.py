@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.sumo.realize.driving import Driver
-    from odscen.sumo.realize.road_users import RoadUser
+    from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.route_planner import Route
     from odscen.sumo.realize.walk_planner import Walk
 

@@ -16,9 +16,10 @@ from odscen.sumo.realize.route_planner import NodePositions
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.base.ids import LaneKey
     from odscen.convert.lane_table.table import LaneTable, SumoLight
-    from odscen.lanegraph.graphs import BoolArray, FloatArray, IntArray, LaneGraph, MapGraph
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph
 
 NORMAL = "normal"
 INTERNAL = "internal"
@@ -92,7 +93,7 @@ class SumoMap:
 def _places(
     table: LaneTable,
     keys: Sequence[LaneKey | Roadside],
-    lane: IntArray,
+    lane: Int32Array,
     s: FloatArray,
     x: FloatArray,
     y: FloatArray,
@@ -103,7 +104,7 @@ def _places(
 
 
 def pos_per_metre(
-    lane: IntArray, pos: FloatArray, x: FloatArray, y: FloatArray, *, lanes: int
+    lane: Int32Array, pos: FloatArray, x: FloatArray, y: FloatArray, *, lanes: int
 ) -> FloatArray:
     """How many metres of position one metre of ground is, per SUMO lane; shape ``(lanes,)``.
 

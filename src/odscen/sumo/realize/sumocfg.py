@@ -18,8 +18,8 @@ from odscen.sumo.folder.layout import (
     TRAJECTORIES_FILE,
     TRIPINFO_FILE,
 )
-from odscen.sumo.outputs.ssm import OPTIONS
 from odscen.sumo.realize.recording import REGION_ID, Recording
+from odscen.sumo.realize.ssm_device import OPTIONS
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.

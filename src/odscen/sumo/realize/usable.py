@@ -12,7 +12,8 @@ from odscen.scenario.placing.supply import Usable
 from odscen.sumo.realize.road_net import PEDESTRIAN
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import BoolArray, LaneGraph
+    from odscen.base.arrays import BoolArray
+    from odscen.lanegraph.graphs import LaneGraph
     from odscen.sumo.realize.road_net import RoadNetLane
     from odscen.sumo.realize.route_planner import NodePositions
     from odscen.sumo.realize.sumo_map import SumoMap

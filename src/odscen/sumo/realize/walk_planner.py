@@ -11,7 +11,8 @@ from odscen.sumo.realize.road_net import PEDESTRIAN
 from odscen.sumo.realize.route_planner import NoRouteError, connected
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.graphs import IntArray, PedestrianGraph
+    from odscen.base.arrays import Int32Array
+    from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.sumo.realize.road_net import RoadNet, RoadNetLane
     from odscen.sumo.realize.route_planner import NodePositions
 
@@ -36,14 +37,14 @@ class Walk:
 
 
 class WalkPlanner:
-    """Walks on one map; like :class:`odscen.sumo.realize.route_planner.RoutePlanner`, for the pedestrian graph."""
+    """Walks on one map; :mod:`odscen.sumo.realize.route_planner` does the same for vehicles."""
 
     def __init__(self, graph: PedestrianGraph, net: RoadNet, places: NodePositions) -> None:
         self._graph = graph
         self._net = net
         self._places = places
 
-    def plan(self, path: IntArray, *, length: float, lateral_offset: float) -> Walk:
+    def plan(self, path: Int32Array, *, length: float, lateral_offset: float) -> Walk:
         """Walk along a path of the pedestrian graph.
 
         Parameters
@@ -86,7 +87,7 @@ class WalkPlanner:
             raise NoRouteError(msg)
         return lane, place[1]
 
-    def _edges(self, path: IntArray) -> list[str]:
+    def _edges(self, path: Int32Array) -> list[str]:
         """Return the edges that the path walks along, in order.
 
         An edge that is only touched, at a corner between two crosswalks, is left out: SUMO would

@@ -56,7 +56,8 @@ def prepare(
     Parameters
     ----------
     sumo_map
-        Of the scenario's map; made once by :meth:`odscen.sumo.realize.sumo_map.SumoMap.of` for many runs.
+        Of the scenario's map; made once by :meth:`odscen.sumo.realize.sumo_map.SumoMap.of` for many
+        runs.
     net
         The map's ``net.net.xml``.
     assets, seed, until, step_length, weather, recording, meso, slice_length

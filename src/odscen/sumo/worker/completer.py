@@ -1,4 +1,4 @@
-"""The process that completes slices beside the worker: ``python -m odscen.sumo.worker.completer RUN FD``.
+"""Completes slices beside the worker: ``python -m odscen.sumo.worker.completer RUN FD``.
 
 A process and not a thread: libsumo holds Python's lock while it steps, so that a thread of the
 worker would slow down the simulation and be slow itself. What became of each actor is kept here

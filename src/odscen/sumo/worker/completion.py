@@ -1,4 +1,4 @@
-"""The worker's side of the process that completes slices, see :mod:`odscen.sumo.worker.completer`."""
+"""The worker's side of the process that completes slices: :mod:`odscen.sumo.worker.completer`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A run in step with another simulator: a step when told to, and all that is to know after it.
 
-A :class:`~odscen.sumo.worker.protocol.State` is followed by little-endian float64 rows, one for each
-vehicle and person of the plan that is on the road:
+A :class:`~odscen.sumo.worker.protocol.State` is followed by little-endian float64 rows, one for
+each vehicle and person of the plan that is on the road:
 
 ====== =====================================================================================
 row    index, x, y, angle_deg, speed, signals, lane, pos

@@ -1,8 +1,9 @@
 """Messages between the runner and the worker: JSON, one object per line, either way.
 
-A run that can be watched (see :mod:`odscen.sumo.runner.live_run`) also sends frames: a line :class:`FrameMessage` and
-then so many bytes. A run in lockstep (see :mod:`odscen.sumo.worker.lockstep`) sends a :class:`State` and
-its bytes after each step. A run that nobody can watch sends :class:`Progress` and its end only.
+A run that can be watched (see :mod:`odscen.sumo.runner.live_run`) also sends frames: a line
+:class:`FrameMessage` and then so many bytes. A run in lockstep (see
+:mod:`odscen.sumo.worker.lockstep`) sends a :class:`State` and its bytes after each step. A run that
+nobody can watch sends :class:`Progress` and its end only.
 """
 
 from __future__ import annotations

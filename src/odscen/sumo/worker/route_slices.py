@@ -1,7 +1,7 @@
 """The routes file of a long run, cut by departure, so that each slice reads its own part only.
 
-Works on what :mod:`odscen.sumo.realize.routes_file` writes: vTypes first, then vehicles and persons by
-departure, each beginning on a line of its own. Nothing is parsed but that line.
+Works on what :mod:`odscen.sumo.realize.routes_file` writes: vTypes first, then vehicles and persons
+by departure, each beginning on a line of its own. Nothing is parsed but that line.
 """
 
 from __future__ import annotations

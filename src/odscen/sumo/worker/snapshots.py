@@ -107,7 +107,7 @@ def frame_rows(
     *,
     origin: tuple[float, float],
 ) -> np.ndarray:
-    """Rows of a frame, shape ``(N, COLUMNS)``; ``signals`` are SUMO's bits, see :class:`VehicleSignal`."""
+    """Rows of a frame, shape ``(N, COLUMNS)``; ``signals`` are bits of :class:`VehicleSignal`."""
     rows = np.empty((len(index), COLUMNS), dtype="<f4")
     rows[:, 0] = index
     rows[:, 1] = x - origin[0]

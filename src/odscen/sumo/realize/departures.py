@@ -7,59 +7,32 @@ independent of what else is in the scenario.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.categories import Category
-from odscen.scenario.checks.goals import flow_goals, resolve_goals, stream
+from odscen.scenario.checks.goals import flow_goals, resolve_goals
 from odscen.scenario.demand.count_stations import observations
 from odscen.scenario.demand.day_profiles import curve
 from odscen.scenario.demand.trips import background_trips, matrix_trips
 from odscen.scenario.demand.zones import TripEnds
+from odscen.scenario.document.named_random import stream
 from odscen.scenario.placing.region import place_of
 from odscen.sumo.realize.counted_traffic import counted_trips
 from odscen.sumo.realize.passages import planned_passages
+from odscen.sumo.realize.road_user import RoadUser
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from odscen.lanegraph.graphs import IntArray, MapGraph
+    from odscen.base.arrays import Int32Array
+    from odscen.base.categories import Category
+    from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.demand.day_profiles import Curve
     from odscen.scenario.demand.trips import Trips
-    from odscen.scenario.document.scenario_document import DrivingStyle, Flow, Scenario
+    from odscen.scenario.document.scenario_document import Flow, Scenario
     from odscen.scenario.placing.region import Region
     from odscen.scenario.placing.supply import Usable
-
-
-@dataclass(frozen=True, slots=True)
-class RoadUser:
-    """One vehicle or person with everything decided; ``spawn`` and ``goal`` are node indices.
-
-    They count on the pedestrian graph for pedestrians and on the lane graph for everybody else.
-    ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
-    of the demand: many share a goal, so their ways are found from there.
-    """
-
-    id: str
-    category: Category
-    spawn: int
-    goal: int
-    depart: float
-    model: str | None = None
-    speed: float | None = None
-    lateral_offset: float = 0.0
-    style: DrivingStyle = "normal"
-    flow: str | None = None
-    ego: bool = False
-    ignores_red: bool = False
-    trip: bool = False
-
-    @property
-    def person(self) -> bool:
-        """Whether it moves on the pedestrian graph."""
-        return self.category is Category.PEDESTRIAN
 
 
 def road_users(
@@ -105,7 +78,7 @@ def road_users(
 
 
 def flow_users(
-    flow: Flow, *, seed: int, spawn: int, goals: IntArray, until: float, day: Curve | None = None
+    flow: Flow, *, seed: int, spawn: int, goals: Int32Array, until: float, day: Curve | None = None
 ) -> list[RoadUser]:
     """Members of a flow: a Poisson stream, that is, headways are exponentially distributed.
 

@@ -1,8 +1,4 @@
-"""SUMO's SSM device: what it is told, and what it writes.
-
-Every vehicle has one, by a parameter of its vType: devices given by probability are gone from
-vehicles that come in with a saved state.
-"""
+"""The log of SUMO's SSM device; :mod:`odscen.sumo.realize.ssm_device` says what it logs."""
 
 from __future__ import annotations
 
@@ -11,22 +7,12 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.base.errors import SimulationError
-from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
 from odscen.sumo.outputs.xml_rows import elements
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-VEHICLE_PARAMETER = ("has.ssm.device", "true")
-
-OPTIONS = {
-    "device.ssm.measures": "TTC DRAC PET",
-    "device.ssm.thresholds": f"{SEEN_TTC:g} {SEEN_DRAC:g} {SEEN_PET:g}",
-    "device.ssm.range": "50",
-    "device.ssm.extratime": f"{WATCHED_ON:g}",
-}
-"""Of the sumocfg; range in metres."""
 
 _KINDS = {
     **dict.fromkeys((1, 2, 3, 18), "following"),
