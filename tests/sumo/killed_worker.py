@@ -2,8 +2,8 @@
 
 Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it is the first time
 after that slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that
-completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many bytes fail as
-on a full disk.
+completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many
+bytes fail as on a full disk.
 """
 
 from __future__ import annotations
