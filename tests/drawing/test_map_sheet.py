@@ -16,8 +16,9 @@ from odscen.drawing.map_sheet import (
     round_length,
     svg_to_png,
 )
+from odscen.drawing.palette import RELATION_COLORS
 from odscen.drawing.sheet_options import RenderOptions
-from odscen.drawing.svg_layers import RELATION_COLORS, PlaceMarks
+from odscen.drawing.svg_layers import PlaceMarks
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse

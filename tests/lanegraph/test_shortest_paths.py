@@ -155,7 +155,7 @@ def test_ways_to_a_node_are_as_long_as_those_from_each_source() -> None:
     router = Router(graph)
     nodes = np.arange(len(graph.lanes.x))
     goal = int(nodes[-1])
-    ways = router.ways_to(goal)
+    ways = router.paths_to(goal)
     for source, path, metres in zip(
         nodes.tolist(), ways.paths(nodes), ways.distance(nodes).tolist(), strict=True
     ):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, join, number
-from odscen.drawing.svg_layers import (
+from odscen.drawing.palette import (
     AREA_COLORS,
     AREA_NAMES,
     CROSSWALK_COLOR,
@@ -14,9 +14,8 @@ from odscen.drawing.svg_layers import (
     SEGMENT_COLORS,
     SYMBOL_NAMES,
     VEHICLE_NODE_COLOR,
-    symbol_shapes,
-    symbol_text,
 )
+from odscen.drawing.svg_layers import symbol_shapes, symbol_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

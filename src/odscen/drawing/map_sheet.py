@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from odscen.base.errors import MissingDependencyError
 from odscen.base.markup import Markup, element, join, number
 from odscen.drawing.legend import INK, legend, legend_entries, place_entries
+from odscen.drawing.palette import FONT
 from odscen.drawing.sheet_options import RenderOptions
 from odscen.drawing.svg_layers import (
-    FONT,
     LayerOptions,
     graph_layers,
     map_layers,

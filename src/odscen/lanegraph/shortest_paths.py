@@ -15,18 +15,15 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from odscen.base.errors import InputError
+from odscen.lanegraph.paths_to_goal import NO_PREDECESSOR, PathsTo
 from odscen.lanegraph.query import node_id, walk_node_id
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.lanegraph.graphs import MapGraph
 
 MIN_EDGE_LENGTH = 1e-6
 """Metres; scipy's sparse graphs drop edges of weight zero."""
-
-_NO_PREDECESSOR = -9999
 
 
 class _PathFinder:
@@ -78,11 +75,11 @@ class _PathFinder:
         if not self.mask[target] or not np.isfinite(distances[self._local[target]]):
             return np.empty(0, dtype=np.int32)
         steps = [int(self._local[target])]
-        while (before := int(predecessors[steps[-1]])) != _NO_PREDECESSOR:
+        while (before := int(predecessors[steps[-1]])) != NO_PREDECESSOR:
             steps.append(before)
         return self.nodes[steps[::-1]].astype(np.int32)
 
-    def ways_to(self, target: int) -> WaysTo:
+    def paths_to(self, target: int) -> PathsTo:
         """Shortest ways from everywhere to one node, for many sources with the same target."""
         distances, nexts = csgraph.dijkstra(
             self._reversed,
@@ -90,7 +87,7 @@ class _PathFinder:
             indices=np.asarray(self._local[target]),
             return_predecessors=True,
         )
-        return WaysTo(self.nodes, self._local, distances, nexts)
+        return PathsTo(self.nodes, self._local, distances, nexts)
 
     @cached_property
     def _reversed(self) -> sparse.csr_matrix[np.float64]:
@@ -236,77 +233,6 @@ class _PathFinder:
         hits = np.flatnonzero((away == np.repeat(farthest, sizes)) & (away >= 0))
         _, first = np.unique(self._lane[hits], return_index=True)
         return np.sort(self.nodes[hits[first]]).astype(np.int32)
-
-
-class WaysTo:
-    """Shortest ways to one node, found at once; nodes are numbered as the whole map's.
-
-    Attributes
-    ----------
-    distances
-        Metres from each node of ``nodes``; inf where no way leads.
-    """
-
-    def __init__(
-        self,
-        nodes: NDArray[np.integer],
-        local: NDArray[np.integer],
-        distances: FloatArray,
-        nexts: Int32Array,
-    ) -> None:
-        self.nodes = nodes
-        self.distances = distances
-        self._local = local
-        self._next = nexts
-
-    def distance(self, sources: Int32Array) -> FloatArray:
-        """Metres from each source, which lies in the region."""
-        return np.asarray(self.distances[self._local[sources]], dtype=np.float64)
-
-    def paths(self, sources: Int32Array) -> list[Int32Array]:
-        """Nodes of the way from each source, both ends included; empty where there is none."""
-        current = self._local[sources]
-        steps = [current]
-        counts = np.ones(len(sources), dtype=np.intp)
-        while (going := self._next[current] != _NO_PREDECESSOR).any():
-            current = np.where(going, self._next[current], current)
-            counts += going
-            steps.append(current)
-        counts[~np.isfinite(self.distances[steps[0]])] = 0
-        table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
-        return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
-
-    def stretches(
-        self, sources: NDArray[np.integer], marks: Int32Array
-    ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-        """Follow the marks of the nodes along each way, each run of equal ones once.
-
-        Parameters
-        ----------
-        marks
-            A number from 0 on for each node of the map, such as the row of its segment.
-
-        Returns
-        -------
-        Marks in the order in which they are met, and the first node with each: two arrays of shape
-        ``(len(sources), most)``, with -1 behind the end of a way.
-        """
-        after = self._after(marks)
-        steps = [self._local[sources]]
-        while (steps[-1] >= 0).any():
-            steps.append(np.where(steps[-1] >= 0, after[steps[-1]], -1))
-        table = np.stack(steps[:-1], axis=1)
-        nodes = np.where(table >= 0, self.nodes[table], -1)
-        return np.where(table >= 0, marks[nodes], -1), nodes
-
-    def _after(self, marks: Int32Array) -> NDArray[np.integer]:
-        """First node on the way from each node of the region that has another mark, or -1."""
-        mark = marks[self.nodes]
-        jump = np.where(self._next == _NO_PREDECESSOR, np.arange(len(mark)), self._next)
-        # Pointers are doubled: as many rounds as the logarithm of the longest stretch.
-        while (going := (mark[jump] == mark) & (jump[jump] != jump)).any():
-            jump = np.where(going, jump[jump], jump)
-        return np.where(mark[jump] != mark, jump, -1)
 
 
 class Router(_PathFinder):

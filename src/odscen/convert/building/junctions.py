@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
     from odscen.convert.model.net import Request
     from odscen.convert.model.right_of_way import Conflicts, Movement
-    from odscen.convert.pedestrian.pedestrian_network import PlacedCrossing
+    from odscen.convert.model.walk_net import PlacedCrossing
 
 
 BUS_LENGTH = 12.0

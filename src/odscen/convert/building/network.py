@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.model.connections import PlannedConnection, PlannedConnections
     from odscen.convert.model.lane_alignment import Course, Line
-    from odscen.convert.pedestrian.pedestrian_network import WalkNet
+    from odscen.convert.model.walk_net import WalkNet
     from odscen.convert.signals.map_signals import Ruled
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable

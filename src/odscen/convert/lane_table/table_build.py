@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.base.ids import JunctionId, LaneKey
     from odscen.convert.model.lane_alignment import Course, Line
     from odscen.convert.model.net import Net, NetLane
-    from odscen.convert.pedestrian.pedestrian_network import WalkNet
+    from odscen.convert.model.walk_net import WalkNet
     from odscen.opendrive.lanes import RoadTable
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
 
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.convert.model.access import PEDESTRIAN, WALKING_SPEED
@@ -30,6 +29,14 @@ from odscen.convert.model.net import (
     NetLink,
 )
 from odscen.convert.model.right_of_way import Walkway
+from odscen.convert.model.walk_net import PlacedCrossing, WalkLane, WalkNet
+from odscen.convert.pedestrian.walk_geometry import (
+    area_outline,
+    line_across,
+    thirds,
+    trimmed,
+    triple,
+)
 from odscen.lanegraph.graphs import WalkKind
 from odscen.lanegraph.pedestrian_graph import ROADSIDE_OFFSET, ROADSIDE_WIDTH
 
@@ -42,47 +49,11 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
 
 
-TRIM = 0.6
-"""Metres that an edge keeps off the middle of a walking area."""
-
 APART = 1.0
 """Metres between places of one walk where crosswalks begin, unless they are the same place."""
 
 TOGETHER = 2.5
 """Metres between the ends of crosswalks of one junction that share a walking area."""
-
-
-class WalkLane(NamedTuple):
-    """A pedestrian edge and what it lies on."""
-
-    edge: NetEdge
-    line: Line
-    course: Course
-
-
-class PlacedCrossing(NamedTuple):
-    """A crossing of a junction and the walking area at which it starts."""
-
-    edge: NetEdge
-    walkway: Walkway
-    start: SumoLaneId
-    link: NetLink
-
-
-@dataclass(frozen=True, slots=True)
-class WalkNet:
-    """All that persons walk on.
-
-    ``crossings`` are those of each junction, in the order in which the junction counts them;
-    ``junctions`` those that exist for persons only.
-    """
-
-    lanes: tuple[WalkLane, ...]
-    areas: tuple[NetEdge, ...]
-    crossings: dict[str, tuple[PlacedCrossing, ...]]
-    links: tuple[NetLink, ...]
-    walk_links: tuple[tuple[SumoEdgeId, SumoEdgeId], ...]
-    junctions: tuple[NetJunction, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -343,7 +314,7 @@ class _WalkNetBuilder:
                 # Of two parts both would join the same junctions, and SUMO could not tell
                 # whether a walk from one to the other goes over the middle or round the ends.
                 keys = [("part", len(courses)), ("part", len(courses) + 1)]
-                courses += _thirds(course)
+                courses += thirds(course)
                 ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
             else:
                 courses.append(course)
@@ -354,7 +325,7 @@ class _WalkNetBuilder:
             return meetings[key] + self._hub(key).crossings > 1
 
         trimmed = [
-            _trimmed(course, start=meets(pair[0]), end=meets(pair[1]))
+            trimmed(course, start=meets(pair[0]), end=meets(pair[1]))
             for course, pair in zip(courses, ends, strict=True)
         ]
         for line, course, pair in zip(evaluate(trimmed, self._table), trimmed, ends, strict=True):
@@ -374,12 +345,12 @@ class _WalkNetBuilder:
             hub = self._hub(key)
             if not hub.junction:
                 hub.junction = f"walk{len(self._own)}"
-                ends_at = _across(line.shape, which, width)
+                ends_at = line_across(line.shape, which, width)
                 self._own.append(
-                    NetJunction(hub.junction, "dead_end", _triple(line.shape[which]), ends_at)
+                    NetJunction(hub.junction, "dead_end", triple(line.shape[which]), ends_at)
                 )
             junctions.append(hub.junction)
-            hub.arms.append((_across(line.shape, which, width), width))
+            hub.arms.append((line_across(line.shape, which, width), width))
             hub.edges.append((edge, which == -1))
         walk = NetLane(
             lane,
@@ -435,7 +406,7 @@ class _WalkNetBuilder:
                 xodr=(f"{thing.road}:{thing.object_id}",),
             )
             for which in (0, 1):
-                across = _across(axis, 0 if which == 0 else -1, width)
+                across = line_across(axis, 0 if which == 0 else -1, width)
                 self._hubs[self._ends[number, which]].arms.append((across, width))
             link = NetLink(edge, end)
             crossing = NetEdge(edge, CROSSING, (lane,))
@@ -460,7 +431,7 @@ class _WalkNetBuilder:
         for hub in self._hubs.values():
             if hub.area is None:
                 continue
-            outline = _outline([arm for arm, _ in hub.arms])
+            outline = area_outline([arm for arm, _ in hub.arms])
             size = float(np.ptp(outline[:, :2], axis=0).max())
             lane = NetLane(
                 SumoLaneId(f"{hub.area}_0"),
@@ -481,62 +452,3 @@ class _WalkNetBuilder:
                 pair(start, crossing.edge.id)
                 pair(crossing.edge.id, crossing.link.target)
         return areas, links, pairs
-
-
-def _triple(place: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in place)
-    return x, y, z
-
-
-def _across(shape: FloatArray, which: int, width: float) -> FloatArray:
-    """Line across the start (0) or the end (-1) of a shape, shape ``(2, 3)``."""
-    step = shape[1] - shape[0] if which == 0 else shape[-1] - shape[-2]
-    length = max(float(np.hypot(step[0], step[1])), 1e-9)
-    normal = np.array([-step[1], step[0], 0.0]) / length * (width / 2.0)
-    result: FloatArray = np.stack([shape[which] - normal, shape[which] + normal])
-    return result
-
-
-def _outline(arms: Sequence[FloatArray]) -> FloatArray:
-    points = np.concatenate(list(arms))
-    z = float(points[:, 2].mean())
-    hull = shapely.MultiPoint(points[:, :2]).convex_hull
-    if hull.geom_type != "Polygon" or hull.area < 0.05:
-        hull = hull.buffer(TRIM, quad_segs=1)
-    outline = np.array(hull.exterior.coords)[:-1]
-    return np.column_stack((outline, np.full(len(outline), z)))
-
-
-def _thirds(course: Course) -> list[Course]:
-    """Divide a course into three parts of about the same extent."""
-    third = sum(stretch.extent for stretch in course) / 3.0
-    head, rest = _divided(course, third)
-    return [head, *_divided(rest, third)]
-
-
-def _divided(course: Course, extent: float) -> tuple[Course, Course]:
-    """Divide a course after ``extent`` metres of s."""
-    for index, stretch in enumerate(course):
-        if extent < stretch.extent or index == len(course) - 1:
-            share = min(max(extent / stretch.extent, 0.1), 0.9)
-            middle = stretch.start + share * (stretch.end - stretch.start)
-            head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
-            return (*course[:index], head), (tail, *course[index + 1 :])
-        extent -= stretch.extent
-    raise AssertionError
-
-
-def _trimmed(course: Course, *, start: bool, end: bool) -> Course:
-    """Take :data:`TRIM` off the ends that meet others, at most a quarter of the last stretch."""
-    result = list(course)
-    if start:
-        old = result[0]
-        result[0] = old._replace(start=old.start + _cut(old))
-    if end:
-        old = result[-1]
-        result[-1] = old._replace(end=old.end - _cut(old))
-    return tuple(result)
-
-
-def _cut(stretch: Stretch) -> float:
-    return min(TRIM, stretch.extent / 4.0) * (1.0 if stretch.end > stretch.start else -1.0)

@@ -124,7 +124,7 @@ def usual_duration(ground: TripEnds, mix: Mapping[Category, float]) -> float:
     found: list[float] = []
     if len(starts):
         for goal in rng.choice(ends, size=min(len(ends), 20), replace=False).tolist():
-            ways = router.ways_to(goal).distance(rng.choice(starts, size=SAMPLE // 20))
+            ways = router.paths_to(goal).distance(rng.choice(starts, size=SAMPLE // 20))
             found += ways[np.isfinite(ways)].tolist()
     limits = ground.region.graph.lanes.speed_limit
     limit = float(np.nanmean(limits)) if np.isfinite(limits).any() else 13.89

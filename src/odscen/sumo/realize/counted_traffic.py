@@ -116,7 +116,7 @@ def ways_past(
         return {}
     per_goal = max(10, WAYS // len(ends))
     for goal in ends.tolist():
-        ways = ground.router.ways_to(goal)
+        ways = ground.router.paths_to(goal)
         metres = ways.distance(first)
         near = np.flatnonzero(np.isfinite(metres) & (metres > 0))
         near = near[np.argsort(metres[near], kind="stable")]
@@ -223,7 +223,7 @@ def _starts(
         of_goal[way.goal].add(way)
     possible: dict[StationRoute, Int32Array] = {}
     for goal, mine in sorted(of_goal.items()):
-        to_goal = ground.router.ways_to(goal)
+        to_goal = ground.router.paths_to(goal)
         for way in sorted(mine):
             beside = lanes.lane[starts] == lanes.lane[way.start]
             beside &= lanes.segment[starts] == lanes.segment[way.start]

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, Int32Array
     from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph
-    from odscen.lanegraph.shortest_paths import Router, WaysTo
+    from odscen.lanegraph.paths_to_goal import PathsTo
+    from odscen.lanegraph.shortest_paths import Router
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
 
@@ -75,7 +76,7 @@ def each_path(
         for index in group:
             yield index, ways.get(index, _NOWHERE)
     for (person, goal), group in by_goal.items():
-        there = (region.walk_router if person else drivable).ways_to(goal)
+        there = (region.walk_router if person else drivable).paths_to(goal)
         for first in range(0, len(group), TOGETHER):
             part = group[first : first + TOGETHER]
             spawns = [users[index].spawn for index in part]
@@ -147,7 +148,7 @@ def _from_spawn(
     return {index: way for index, way in ways.items() if len(way)}
 
 
-def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: WaysTo) -> list[Int32Array]:
+def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
     ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
     metres = iter(there.distance(ends).tolist())
