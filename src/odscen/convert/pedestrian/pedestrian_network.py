@@ -324,11 +324,11 @@ class _WalkNetBuilder:
         def meets(key: NodeKey) -> bool:
             return meetings[key] + self._hub(key).crossings > 1
 
-        trimmed = [
+        cut_back = [
             trimmed(course, start=meets(pair[0]), end=meets(pair[1]))
             for course, pair in zip(courses, ends, strict=True)
         ]
-        for line, course, pair in zip(evaluate(trimmed, self._table), trimmed, ends, strict=True):
+        for line, course, pair in zip(evaluate(cut_back, self._table), cut_back, ends, strict=True):
             self._edge(line, course, pair)
 
     def _hub(self, key: NodeKey) -> _WalkingArea:
