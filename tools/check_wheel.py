@@ -67,10 +67,19 @@ def faults(wheel: zipfile.ZipFile) -> list[str]:
         list(ROOT.glob("maps/*.xodr"))
     ):
         wrong.append("shipped maps are missing")
+    wrong += [f"{name} is missing" for name in sorted(_beside_the_code() - names)]
     wrong += [
         f"{name} does not belong here" for name in names if re.search(r"node_modules|\.tsx?$", name)
     ]
     return wrong
+
+
+def _beside_the_code() -> set[str]:
+    """Data, styles and templates that the modules read, by their name in the wheel."""
+    sources = ROOT / "src"
+    found = (path.relative_to(sources) for path in sources.rglob("*") if path.is_file())
+    names = {path.as_posix() for path in found if path.suffix not in (".py", ".pyc")}
+    return {name for name in names if not name.startswith(STATIC)}
 
 
 if __name__ == "__main__":

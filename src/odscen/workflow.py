@@ -20,9 +20,10 @@ from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_fil
 from odscen.results.measures.corridors import corridor_along, way_between
 from odscen.results.measures.expectations import needs_criticality
 from odscen.scenario.checks.scenario_checks import check
-from odscen.scenario.document.json_form import dumps, read_any
+from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config, overridden
+from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
 from odscen.sumo.folder.ended import read_summary
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from odscen.scenario.checks.signal_timing import Light
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.placing.supply import Usable
+    from odscen.scenario.placing.usable_nodes import Usable
     from odscen.sumo.realize.realization import SliceLength
     from odscen.sumo.runner.run_jobs import RunResult
     from odscen.sumo.runner.worker_process import Companion

@@ -14,7 +14,7 @@ NAMES = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
 def test_text_is_escaped_and_markup_is_not():
     inner = element("b", "<i>")
     assert element("p", inner, " & ", title='"x"') == (
-        '<p title="&quot;x&quot;"><b>&lt;i&gt;</b> &amp; </p>'
+        '<p title="&#34;x&#34;"><b>&lt;i&gt;</b> &amp; </p>'
     )
 
 

@@ -11,8 +11,9 @@ from starlette.testclient import TestClient
 from odscen import workflow
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
-from odscen.scenario.document.json_form import dumps, loads, read_any
+from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.edits import demand_edits, scenario_edits
+from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
 from odscen.scenario.placing.spawn_room import late_for_changes
 from odscen.web.application import create_app

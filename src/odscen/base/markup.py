@@ -1,15 +1,16 @@
 """SVG and HTML text, escaped by construction.
 
 Map names, actor ids and messages come from files that nobody has vetted. Everything that becomes
-text goes through :func:`element`, which escapes whatever is not already :class:`Markup`.
+text goes through :func:`element`, which escapes whatever is not already :class:`Markup`; pages are
+put together by templates (:mod:`odscen.results.report.page_templates`) by the same rule.
 """
 
 from __future__ import annotations
 
 import itertools
-from html import escape
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+import markupsafe
 import numpy as np
 
 if TYPE_CHECKING:
@@ -20,13 +21,15 @@ _VOID = frozenset({"meta", "input", "br"})
 _FORBIDDEN = dict.fromkeys([*(c for c in range(32) if chr(c) not in "\t\n"), 0xFFFE, 0xFFFF])
 
 
-class Markup(str):
-    """Text that is markup already and is not escaped again."""
+class Markup(markupsafe.Markup):
+    """Text that is markup already; what is put together with it is escaped by :func:`escaped`."""
 
     __slots__ = ()
 
-    def __add__(self, other: str) -> Markup:
-        return Markup(str.__add__(self, escaped(other)))
+    @classmethod
+    def escape(cls, s: Any, /) -> Markup:
+        """As :func:`escaped`."""
+        return escaped(s)
 
 
 Attribute: TypeAlias = str | float | int | None
@@ -42,12 +45,16 @@ def number(value: float, digits: int = 2) -> str:
 
 def escaped(content: object) -> Markup:
     """``content`` as text, escaped for elements and attributes, without control characters."""
-    if isinstance(content, Markup):
+    return Markup(_escaped(content))
+
+
+def _escaped(content: object) -> str:
+    if isinstance(content, markupsafe.Markup):
         return content
     text = str(content).translate(_FORBIDDEN)
     if not text.isascii():
         text = text.encode("utf-8", "replace").decode("utf-8")  # lone surrogates cannot be written
-    return Markup(escape(text, quote=True))
+    return markupsafe.escape(text)
 
 
 def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
@@ -68,11 +75,11 @@ def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
         if value is None:
             continue
         text = number(value) if isinstance(value, float) else str(value)
-        opened.append(f'{key.rstrip("_").replace("_", "-")}="{escaped(text)}"')
+        opened.append(f'{key.rstrip("_").replace("_", "-")}="{_escaped(text)}"')
     head = " ".join(opened)
     if name in _VOID:
         return Markup(f"<{head}>")
-    inner = "".join(escaped(child) for child in children if child is not None)
+    inner = "".join(_escaped(child) for child in children if child is not None)
     return Markup(f"<{head}>{inner}</{name}>" if inner else f"<{head}></{name}>")
 
 

@@ -9,12 +9,11 @@ import numpy as np
 from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.regression.figure_words import in_words
 from odscen.results.measures.units import with_unit
+from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.results.report.plots import Dots, dot_chart, legend
 from odscen.results.report.report_flow import DENSITY, FLOW, column
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box
-from odscen.results.report.report_tables import html_table, report_section
 from odscen.results.report.report_words import stretch
-from odscen.results.report.run_report import html_page
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -39,10 +38,9 @@ def comparison_page(result: RunComparison) -> str:
     a, b = result.a, result.b
     title = a.scenario if a.scenario == b.scenario else f"{a.scenario} and {b.scenario}"
     figures = [row for row in result.rows if row.key.kind == "run"]
-    head = element(
-        "header",
-        element("p", "Comparison of runs", class_="kind"),
-        element("h1", title),
+    head = page_head(
+        "Comparison of runs",
+        title,
         element("p", element("b", "A "), _side(a.name, a.runs)),
         element("p", element("b", "B "), _side(b.name, b.runs)),
         *(element("p", note, class_="soft") for note in result.notes),

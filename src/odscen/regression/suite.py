@@ -11,8 +11,8 @@ from pydantic import AfterValidator, Field, ValidationError
 from odscen.base.errors import InputError, ScenarioError
 from odscen.regression.tolerance import PLACE_FIGURES, Tolerances, parse_tolerance
 from odscen.results.measures.expectations import NAMES, parse_expectation
-from odscen.scenario.document.json_form import validation_problems
 from odscen.scenario.document.scenario_document import Label, Part
+from odscen.scenario.document.validation import validation_problems
 from odscen.workflow import folder_name
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, join
 from odscen.regression.suite_words import lines, reason, where
-from odscen.results.report.report_tables import html_table, report_section
-from odscen.results.report.run_report import html_page
+from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 
 if TYPE_CHECKING:
     from odscen.regression.gates import CaseResult, SuiteResult
@@ -23,12 +22,12 @@ def suite_page(result: SuiteResult) -> str:
     whole = passed == total
     verdict = "All as it should be" if whole else f"{total - passed} of {total} scenarios failed"
     runs = sum(len(case.runs) for case in result.cases)
-    head = element(
-        "header",
-        element("p", "Regression test", class_="kind"),
-        element("h1", result.suite.name),
-        element("p", verdict, class_=f"verdict {'good' if whole else 'bad'}"),
+    head = page_head(
+        "Regression test",
+        result.suite.name,
         element("p", f"{passed} of {total} scenarios passed, in {runs} runs."),
+        verdict=verdict,
+        style="good" if whole else "bad",
     )
     rows = [_case_row(case) for case in result.cases]
     heads = ("Scenario", "Map", "Verdict", "Seeds", "Computed in, s")

@@ -31,7 +31,7 @@ from odscen.scenario.document.scenario_document import (
     Simulation,
 )
 from odscen.scenario.edits import demand_edits, scenario_edits
-from odscen.scenario.placing.supply import Usable
+from odscen.scenario.placing.usable_nodes import Usable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

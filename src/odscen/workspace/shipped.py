@@ -12,6 +12,11 @@ def shipped_maps() -> list[Path]:
     """Paths of the .xodr files that ship, sorted by name.
 
     An installed package holds them inside; a checkout has them in ``maps/``.
+
+    Raises
+    ------
+    WorkspaceError
+        If they are in neither place.
     """
     inside = Path(str(files("odscen"))) / "shipped_maps"
     folder = inside if inside.is_dir() else Path(__file__).parents[3] / "maps"

@@ -201,7 +201,7 @@ class Workspace:
         return entry
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
-        """Map that a scenario refers to: same name and same content.
+        """Map that a scenario refers to: of the same content, and of the same name if it can be.
 
         Raises
         ------
@@ -246,12 +246,16 @@ class Workspace:
         name
             Name in the catalogue; the file's stem if not given.
         spacing
-            Metres between the nodes of the lane graph.
+            Metres between the nodes of the lane graph, from 0.1 to 100.
+        progress
+            Called with what comes next and the share done.
 
         Raises
         ------
         InputError
-            If the file cannot be used; names file, element and value.
+            If the name, the spacing or the file cannot be used; names file, element and value.
+        WorkspaceError
+            If the workspace cannot be written.
         """
         name = check_name(name_from_file(source) if name is None else name)
         if not 0.1 <= spacing <= 100.0:
@@ -288,7 +292,15 @@ class Workspace:
         return MapEntry(name, final, info)
 
     def remove_map(self, name: str) -> None:
-        """Remove a map; scenarios made on it stay, and say that the map is missing."""
+        """Remove a map; scenarios made on it stay, and say that the map is missing.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        WorkspaceError
+            If its folder cannot be removed.
+        """
         names = self.map_names()
         if name not in names:
             raise NotFoundError("map", name, names)

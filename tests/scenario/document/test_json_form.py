@@ -7,7 +7,7 @@ from hypothesis import given
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.json_form import dumps, loads, read_any, schema
+from odscen.scenario.document.json_form import dumps, loads, schema
 from odscen.scenario.document.scenario_document import (
     Actor,
     JunctionTiming,
@@ -15,6 +15,7 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Signals,
 )
+from odscen.scenario.forms.any_form import read_any
 from tests.scenario.strategies import scenarios
 
 SCHEMA = Path(__file__).parents[3] / "docs" / "scenario.schema.json"

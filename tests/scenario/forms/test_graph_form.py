@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_ids, walk_node_ids
-from odscen.scenario.document.json_form import read_any
 from odscen.scenario.document.scenario_document import Actor, Flow, MapReference, Scenario
 from odscen.scenario.edits import scenario_edits
+from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import from_graph, from_graphml, to_graph, to_graphml
 from tests.graphs import SHA256, fork
 from tests.scenario.strategies import actors, environments, flows, labels, names, signals

@@ -23,7 +23,8 @@ from odscen.scenario.document.sampling_config import (
     overridden,
 )
 from odscen.scenario.placing.region import Region
-from odscen.scenario.placing.supply import Usable, vehicle_supply
+from odscen.scenario.placing.supply import vehicle_supply
+from odscen.scenario.placing.usable_nodes import Usable
 from odscen.scenario.sampling.sampler import (
     choose_map,
     numbers_to_place,

@@ -82,16 +82,18 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     folder = tmp_path_factory.mktemp("plain")
     sumo_map = built(MAP).sumo
     net_file(MAP, folder)
-    lanes = {
-        lane.id: lane.length for lane in sumo_map.net.lanes.values() if lane.allows("passenger")
-    }
+    lanes: dict[str, dict[str, float]] = {}
+    for lane in sumo_map.net.lanes.values():
+        if lane.allows("passenger"):
+            lanes.setdefault(lane.edge, {})[lane.id] = lane.length
     (folder / "routes.rou.xml").write_text(routes())
     (folder / "measures.add.xml").write_text(measures_xml(60.0, emissions=True))
     loops = [
         f'<inductionLoop id="{lane}" lane="{lane}" pos="-{LOOP}" period="{UNTIL:g}"'
         ' file="loops.xml"/>'
-        for lane in lanes
-        if not lane.startswith(":")
+        for edge, own in lanes.items()
+        if not edge.startswith(":")
+        for lane in own
     ]
     (folder / "loops.add.xml").write_text("\n".join(["<additional>", *loops, "</additional>"]))
     subprocess.run(

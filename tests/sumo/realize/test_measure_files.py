@@ -9,6 +9,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from lxml import etree
 
 from odscen.results.measures.summary import actors_from_json
 from odscen.sumo.folder.recorded import read_lanes, read_trajectories, read_trips
@@ -173,8 +174,11 @@ def test_plain_sumo_measures_the_same(prepare: Prepare, tmp_path: Path) -> None:
     subprocess.run([BIN / "sumo", "-c", sumo / "scenario.sumocfg"], check=True, capture_output=True)
     mine = read_lanes(run)
     assert mine is not None
-    net = (sumo / "net.net.xml").read_text().split("<lane ")[1:]
-    lengths = {part.split('"')[1]: float(part.split('length="')[1].split('"')[0]) for part in net}
+    edges = etree.parse(sumo / "net.net.xml").getroot().iterfind("edge")
+    lengths = {
+        edge.get("id"): {lane.get("id"): float(lane.get("length")) for lane in edge.iter("lane")}
+        for edge in edges
+    }
     theirs = lane_table(sumo / "lanes.parquet", sumo / "emissions.parquet", lengths)
     assert mine.equals(theirs)
     raw = pl.read_parquet(sumo / "emissions.parquet")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import sumo
+from lxml import etree
 
 # libsumo is one global simulation, so each of these runs in a process of its own.
 PRELUDE = """
@@ -197,3 +198,29 @@ with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) a
     )
     assert result.stdout, result.stderr
     assert json.loads(result.stdout) == [True, "foe", True]
+
+
+def test_lanes_for_vehicles_are_told_by_edge_and_those_inside_junctions_are_known(
+    grid: Path,
+) -> None:
+    result = run_script(
+        """
+with open_session(["-n", net, "--xml-validation", "never"]) as session:
+    print(json.dumps([session.lane_lengths(), sorted(session._internal_lanes)]))
+""",
+        str(grid),
+    )
+    lengths, inside = json.loads(result.stdout)
+    edges = list(etree.parse(grid).getroot().iterfind("edge"))
+    driven = {
+        edge.get("id"): {
+            lane.get("id"): float(lane.get("length"))
+            for lane in edge.iterfind("lane")
+            if lane.get("allow") != "pedestrian"
+        }
+        for edge in edges
+    }
+    assert lengths == {edge: lanes for edge, lanes in driven.items() if lanes}
+    internal = [edge for edge in edges if edge.get("function") == "internal"]
+    assert inside == sorted(lane for edge in internal for lane in driven[edge.get("id")])
+    assert len(inside) > 4

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import shapely
 
-from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.base.ids import SumoEdgeId
 from odscen.convert.model.net import (
     INTERNAL,
     LEAST_LENGTH,
@@ -19,6 +19,7 @@ from odscen.convert.model.net import (
     NetLink,
     TrafficLight,
 )
+from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, requests
 from odscen.convert.signals.signal_programs import SignalGroup, plan_stages, program
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
+    from odscen.base.ids import SumoLaneId
     from odscen.convert.model.net import Request
     from odscen.convert.model.right_of_way import Conflicts, Movement
     from odscen.convert.model.walk_net import PlacedCrossing
@@ -134,7 +136,7 @@ def build_junction(
     ]
     lanes, inner, links = _passages(name, passages, states, rows)
     walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
-    starts = [crossing.start for crossing in crossings]
+    starts = [lane_id(crossing.start) for crossing in crossings]
     kind = "traffic_light" if signalled else "allway_stop" if all_stop else ""
     if not kind:
         yielding = Sign.STOP in signs.values()
@@ -156,7 +158,7 @@ def build_junction(
 
 
 def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
-    return [SumoLaneId(f"{edge}_{index}") for edge, index in (p.movement.source for p in passages)]
+    return [lane_id(*passage.movement.source) for passage in passages]
 
 
 def _obeying(passages: Sequence[Passage]) -> list[Passage]:
@@ -215,9 +217,9 @@ def _passages(
     links: list[NetLink] = []
     for number, (passage, state) in enumerate(zip(passages, states, strict=True)):
         movement = passage.movement
-        edge = SumoEdgeId(f":{name}_{number}")
+        edge = internal_edge_id(name, number)
         lane = NetLane(
-            SumoLaneId(f"{edge}_0"),
+            lane_id(edge),
             0,
             round(max(passage.length, LEAST_LENGTH), 4),
             passage.speed,
@@ -263,9 +265,8 @@ def _crossings(
         row = rows.get(first + index, -1)
         over = dict.fromkeys(_nearer_edge(passages[n].movement, crossing) for n in crossed)
         edges.append(replace(crossing.edge, crosses=tuple(over)))
-        start = SumoEdgeId(crossing.start.removesuffix("_0"))
         light = name if row >= 0 else ""
-        links.append(NetLink(start, crossing.edge.id, light=light, light_index=row))
+        links.append(NetLink(crossing.start, crossing.edge.id, light=light, light_index=row))
         links.append(crossing.link)
     return edges, links
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.base.ids import SumoEdgeId
 from odscen.convert.building.findings import findings
 from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.building.nodes import find_nodes, plain_ids
@@ -24,6 +24,7 @@ from odscen.convert.model.conversion_report import ConversionReport, ElementOutc
 from odscen.convert.model.edge_plan import plan_edges
 from odscen.convert.model.lane_alignment import evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
+from odscen.convert.model.net_ids import lane_id
 from odscen.convert.model.right_of_way import Movement, wrapped
 from odscen.convert.model.road_gaps import merge_gaps, side_gaps
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
@@ -34,6 +35,7 @@ from odscen.opendrive.topology import lane_successors, side_links
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.base.ids import SumoLaneId
     from odscen.convert.building.junctions import BuiltJunction
     from odscen.convert.building.nodes import Nodes
     from odscen.convert.lane_table.table import LaneTable
@@ -294,7 +296,7 @@ class _NetworkBuilder:
         edge = self._ids[number]
         lanes = tuple(
             NetLane(
-                SumoLaneId(f"{edge}_{index}"),
+                lane_id(edge, index),
                 index,
                 round(length, 4),
                 lane.speed,

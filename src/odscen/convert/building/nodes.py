@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
+from scipy.cluster.hierarchy import DisjointSet
+
 from odscen.base.ids import RoadId
-from odscen.convert.model.connections import Groups, NodeKey
+from odscen.convert.model.connections import NodeKey, first_members, join_groups
 from odscen.convert.model.edge_plan import LEAST_EDGE
 
 if TYPE_CHECKING:
@@ -65,23 +67,24 @@ def find_nodes(
         junction = odr.roads[side.other.road].junction
         for gap in gaps[main.id]:
             if gap.start <= side.s <= gap.end:
-                groups.join(("junction", junction), _port(main, gap.start))
+                join_groups(groups, ("junction", junction), _port(main, gap.start))
     walked = [_join_crosswalk(odr, groups, gaps, n, c) for n, c in enumerate(crosswalks)]
     roads = [odr.roads[table.road_ids[edge.road]] for edge in found.edges]
     heads = [_port(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]
     tails = [_port(road, edge.start) for road, edge in zip(roads, found.edges, strict=True)]
     for way in found.ways:
-        groups.join(heads[way.source], tails[way.target])
+        join_groups(groups, heads[way.source], tails[way.target])
         for stretch in way.course:
             junction_of = odr.roads[table.road_ids[table.lane_road[stretch.row]]].junction
             if junction_of is not None:
-                groups.join(("junction", junction_of), heads[way.source])
-    ports = [groups.find(port) for port in (*tails, *heads, *walked)]
+                join_groups(groups, ("junction", junction_of), heads[way.source])
+    first = first_members(groups)
+    ports = [first.get(port, port) for port in (*tails, *heads, *walked)]
     names = plain_ids(_name(port) for port in dict.fromkeys(ports))
     own_names = [names[_name(port)] for port in ports]
     xodr: dict[str, list[JunctionId]] = {}
     for junction in odr.junctions:
-        root = _name(groups.find(("junction", junction)))
+        root = _name(first[("junction", junction)])
         if root in names:
             xodr.setdefault(names[root], []).append(junction)
     count = len(found.edges)
@@ -93,34 +96,34 @@ def find_nodes(
     )
 
 
-def _joined(odr: OpenDrive, gaps: Mapping[RoadId, Sequence[RoadGap]]) -> Groups:
+def _joined(odr: OpenDrive, gaps: Mapping[RoadId, Sequence[RoadGap]]) -> DisjointSet[NodeKey]:
     """Ends of roads joined as the roads' links say, and over crosswalks."""
-    groups = Groups()
+    groups: DisjointSet[NodeKey] = DisjointSet()
     for junction in odr.junctions:
-        groups.find(("junction", junction))
+        groups.add(("junction", junction))
     for road in odr.roads.values():
         for end, link in (("start", road.predecessor), ("end", road.successor)):
             _join_link(odr, groups, road, end, link)
         for gap in gaps.get(road.id, ()):
-            groups.join(_port(road, gap.start), _port(road, gap.end))
+            join_groups(groups, _port(road, gap.start), _port(road, gap.end))
     return groups
 
 
 def _join_crosswalk(
     odr: OpenDrive,
-    groups: Groups,
+    groups: DisjointSet[NodeKey],
     gaps: Mapping[RoadId, Sequence[RoadGap]],
     number: int,
     placed: PlacedCrosswalk,
 ) -> NodeKey:
     own: NodeKey = ("crosswalk", number)
-    groups.find(own)
+    groups.add(own)
     for road_id in placed.connecting:
-        groups.join(("junction", odr.roads[road_id].junction), own)
+        join_groups(groups, ("junction", odr.roads[road_id].junction), own)
     for road_id, s in placed.roads:
         for gap in gaps[road_id]:
             if gap.start <= s <= gap.end:
-                groups.join(_port(odr.roads[road_id], gap.start), own)
+                join_groups(groups, _port(odr.roads[road_id], gap.start), own)
     return own
 
 
@@ -134,7 +137,9 @@ def _name(port: NodeKey) -> str:
     return "N" + ".".join(str(part) for part in rest)
 
 
-def _join_link(odr: OpenDrive, groups: Groups, road: Road, end: str, link: RoadLink | None) -> None:
+def _join_link(
+    odr: OpenDrive, groups: DisjointSet[NodeKey], road: Road, end: str, link: RoadLink | None
+) -> None:
     if link is None:
         return
     here: NodeKey = ("road", road.id, end)
@@ -142,15 +147,15 @@ def _join_link(odr: OpenDrive, groups: Groups, road: Road, end: str, link: RoadL
         here = ("junction", road.junction)
     if link.element_type == "junction":
         if link.element_id in odr.junctions:
-            groups.join(("junction", link.element_id), here)
+            join_groups(groups, ("junction", link.element_id), here)
         return
     other = odr.roads.get(RoadId(link.element_id))
     if other is None or link.contact_point is None:
         return
     if other.junction is not None:
-        groups.join(("junction", other.junction), here)
+        join_groups(groups, ("junction", other.junction), here)
     else:
-        groups.join(here, ("road", other.id, link.contact_point))
+        join_groups(groups, here, ("road", other.id, link.contact_point))
 
 
 def _port(road: Road, s: float) -> NodeKey:

@@ -1,7 +1,8 @@
 """The table between OpenDRIVE lanes and SUMO lanes: the one way to cross over.
 
 It also keeps what else is needed to know of the network, so that ``net.net.xml`` is not parsed
-again. Made by :mod:`odscen.convert.lane_table.table_build`, stored as JSON.
+again. Made by :mod:`odscen.convert.lane_table.table_build`, stored as JSON by
+:mod:`odscen.convert.lane_table.table_json`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from odscen.convert.lane_table.lookup import Lookup
 from odscen.convert.lane_table.mapping_intervals import Piece, Span, answering
@@ -294,18 +298,13 @@ class LaneTable:
         return answering(self.pieces)
 
     @cached_property
-    def _walk_groups(self) -> dict[SumoEdgeId, SumoEdgeId]:
-        groups: dict[SumoEdgeId, SumoEdgeId] = {}
-        for start in self.walk_neighbours:
-            if start in groups:
-                continue
-            todo = [start]
-            while todo:
-                edge = todo.pop()
-                if edge not in groups:
-                    groups[edge] = start
-                    todo += self.walk_neighbours[edge]
-        return groups
+    def _walk_groups(self) -> dict[SumoEdgeId, int]:
+        """Number of the connected part of the walking network that each edge is in."""
+        row = {edge: number for number, edge in enumerate(self.walk_neighbours)}
+        pairs = np.array([(row[a], row[b]) for a, b in self.walk_links]).reshape(-1, 2).T
+        links = coo_array((np.ones(pairs.shape[1]), pairs.astype(int)), shape=(len(row), len(row)))
+        _, group = connected_components(links, directed=False)
+        return dict(zip(row, group.tolist(), strict=True))
 
     @cached_property
     def _piece_sumo(self) -> Int32Array:

@@ -1,4 +1,4 @@
-"""Ways: how one leaves an edge and enters the next, and the nodes in which that happens.
+"""Ways: how one leaves an edge and enters the next.
 
 A way runs over the connecting lanes of a junction, over what crosswalks take from a road, and over
 stretches too short for an edge; SUMO gets one internal lane for each.
@@ -17,13 +17,15 @@ from odscen.convert.model.lane_alignment import Course, Stretch
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from scipy.cluster.hierarchy import DisjointSet
+
     from odscen.base.ids import LaneKey
     from odscen.convert.model.edge_plan import EdgePlan
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.topology import SideLink
 
 NodeKey = tuple[object, ...]
-"""What :class:`Groups` joins: a kind and what tells things of a kind apart."""
+"""What is joined in groups: a kind and what tells things of a kind apart."""
 
 LONGEST_WAY = 400
 """Lanes in one way; more is a circle in a file that links a junction to itself."""
@@ -226,30 +228,14 @@ def _joined(first: Stretch, course: Course) -> Course:
     return (first, *course)
 
 
-class Groups:
-    """Things that belong together (union-find); the first one seen stands for its group."""
+def join_groups(groups: DisjointSet[NodeKey], one: NodeKey, other: NodeKey) -> None:
+    """Make the groups of two things one; things not seen before are groups of their own."""
+    groups.add(one)
+    groups.add(other)
+    groups.merge(one, other)
 
-    def __init__(self) -> None:
-        self._parent: dict[NodeKey, NodeKey] = {}
-        self._order: dict[NodeKey, int] = {}
 
-    def find(self, item: NodeKey) -> NodeKey:
-        """Representative of an item's group; new items are groups of their own."""
-        if item not in self._parent:
-            self._parent[item] = item
-            self._order[item] = len(self._order)
-        root = item
-        while self._parent[root] != root:
-            root = self._parent[root]
-        while self._parent[item] != root:
-            self._parent[item], item = root, self._parent[item]
-        return root
-
-    def join(self, one: NodeKey, other: NodeKey) -> None:
-        """Make two groups one."""
-        first, second = self.find(one), self.find(other)
-        if first == second:
-            return
-        if self._order[second] < self._order[first]:
-            first, second = second, first
-        self._parent[second] = first
+def first_members(groups: DisjointSet[NodeKey]) -> dict[NodeKey, NodeKey]:
+    """Of each thing the one of its group that was seen first, which stands for the group."""
+    first: dict[NodeKey, NodeKey] = {}
+    return {item: first.setdefault(groups[item], item) for item in groups}

@@ -34,7 +34,7 @@ class ConversionReport:
     Attributes
     ----------
     entries
-        In order of work: reading, preparing, netconvert, lanes, connections, furniture.
+        Reading, then what was kept, lanes, connections, crosswalks, signals.
     figures
         Counts and lengths (metres), see ``docs/sumo-network.md``.
     """

@@ -10,6 +10,8 @@ meet, the first of these rules that tells them apart decides:
 5. where lanes only merge, the faster road goes first, and then the straighter way;
 6. one who turns across gives way to oncoming traffic that does not;
 7. right before left (left before right where traffic keeps left).
+
+Where all approaches have to stop, everybody waits for everybody else instead.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from odscen.base.ids import SumoEdgeId, SumoLaneId
+    from odscen.base.ids import SumoEdgeId
     from odscen.convert.model.lane_alignment import Course, Line
     from odscen.convert.model.net import (
         NetEdge,
@@ -29,7 +29,7 @@ class PlacedCrossing(NamedTuple):
 
     edge: NetEdge
     walkway: Walkway
-    start: SumoLaneId
+    start: SumoEdgeId
     link: NetLink
 
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.cluster.hierarchy import DisjointSet
 
-from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.base.ids import SumoEdgeId
 from odscen.convert.model.access import PEDESTRIAN, WALKING_SPEED
-from odscen.convert.model.connections import Groups, NodeKey
+from odscen.convert.model.connections import NodeKey, first_members, join_groups
 from odscen.convert.model.lane_alignment import Course, Line, Stretch, evaluate
 from odscen.convert.model.net import (
     CROSSING,
@@ -28,6 +29,7 @@ from odscen.convert.model.net import (
     NetLane,
     NetLink,
 )
+from odscen.convert.model.net_ids import crossing_id, lane_id, walking_area_id
 from odscen.convert.model.right_of_way import Walkway
 from odscen.convert.model.walk_net import PlacedCrossing, WalkLane, WalkNet
 from odscen.convert.pedestrian.walk_geometry import (
@@ -41,7 +43,7 @@ from odscen.lanegraph.graphs import WalkKind
 from odscen.lanegraph.pedestrian_graph import ROADSIDE_OFFSET, ROADSIDE_WIDTH
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
@@ -143,19 +145,21 @@ class _WalkNetBuilder:
 
     # Topology
 
-    def _clusters(self) -> Groups:
-        """Ends ``(walk, 0 or 1)`` of walks, joined where the graph joins them."""
-        graph, groups = self._graph, Groups()
+    def _clusters(self) -> dict[NodeKey, NodeKey]:
+        """Ends ``(walk, 0 or 1)`` of walks, each with the first of those the graph joins it to."""
+        graph = self._graph
+        groups: DisjointSet[NodeKey] = DisjointSet()
         for walk in range(len(graph.lane_keys)):
-            groups.find((walk, 0))
-            groups.find((walk, 1))
+            groups.add((walk, 0))
+            groups.add((walk, 1))
         joints = np.flatnonzero(graph.kind == WalkKind.JOINT)
         if len(joints):
             places = self._end_places()
             for edge in joints.tolist():
                 one, other = int(graph.source[edge]), int(graph.target[edge])
-                groups.join(self._end_of(one, other, places), self._end_of(other, one, places))
-        return groups
+                ends = self._end_of(one, other, places), self._end_of(other, one, places)
+                join_groups(groups, *ends)
+        return first_members(groups)
 
     def _end_places(self) -> FloatArray:
         """Places of both ends of all walks, shape ``(W, 2, 3)``."""
@@ -203,14 +207,14 @@ class _WalkNetBuilder:
                 found.setdefault(int(graph.lane[node]), []).append(end)
         return {walk: sorted(ends) for walk, ends in found.items()}
 
-    def _arcs(self, clusters: Groups) -> list[_Arc]:
+    def _arcs(self, clusters: Mapping[NodeKey, NodeKey]) -> list[_Arc]:
         """Divide the walks at the ends of crosswalks."""
         ends = self._crosswalk_ends()
         arcs: list[_Arc] = []
         for walk in range(len(self._rows)):
             low, high = self._bounds(walk)
-            before: tuple[float, NodeKey] = (low, clusters.find((walk, 0)))
-            last: NodeKey = clusters.find((walk, 1))
+            before: tuple[float, NodeKey] = (low, clusters[walk, 0])
+            last: NodeKey = clusters[walk, 1]
             for end in ends.get(walk, ()):
                 junction = self._junctions[end.crosswalk]
                 hub = self._hubs.get(before[1])
@@ -338,7 +342,7 @@ class _WalkNetBuilder:
         roadside = course[0].at == 1.0
         name = f"w{self._number}"
         self._number += 1
-        edge, lane = SumoEdgeId(name), SumoLaneId(f"{name}_0")
+        edge, lane = SumoEdgeId(name), lane_id(name)
         width = ROADSIDE_WIDTH if roadside else max(line.widths[1], 0.5)
         junctions: list[str] = []
         for key, which in ((ends[0], 0), (ends[1], -1)):
@@ -377,7 +381,7 @@ class _WalkNetBuilder:
         def area(key: NodeKey) -> SumoEdgeId:
             hub = self._hubs[key]
             if hub.area is None:
-                hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")
+                hub.area = walking_area_id(hub.junction, counts[hub.junction])
                 counts[hub.junction] += 1
             return hub.area
 
@@ -390,13 +394,13 @@ class _WalkNetBuilder:
             placed, junction = self._crosswalks[number], self._junctions[number]
             start, end = area(self._ends[number, 0]), area(self._ends[number, 1])
             own = found.setdefault(junction, [])
-            edge = SumoEdgeId(f":{junction}_c{len(own)}")
+            edge = crossing_id(junction, len(own))
             thing = placed.crosswalk
             axis = np.column_stack((thing.axis, np.full(2, thing.z)))
             length = float(np.linalg.norm(axis[1] - axis[0]))
             width = max(thing.width, 0.5)
             lane = NetLane(
-                SumoLaneId(f"{edge}_0"),
+                lane_id(edge),
                 0,
                 round(max(length, LEAST_LENGTH), 4),
                 WALKING_SPEED,
@@ -411,11 +415,10 @@ class _WalkNetBuilder:
             link = NetLink(edge, end)
             crossing = NetEdge(edge, CROSSING, (lane,))
             walkway = Walkway(axis, width)
-            own.append(PlacedCrossing(crossing, walkway, SumoLaneId(f"{start}_0"), link))
-        for hub in self._hubs.values():
-            if hub.area is None and len(hub.edges) > 1:
-                hub.area = SumoEdgeId(f":{hub.junction}_w{counts[hub.junction]}")
-                counts[hub.junction] += 1
+            own.append(PlacedCrossing(crossing, walkway, start, link))
+        for key, hub in self._hubs.items():
+            if len(hub.edges) > 1:
+                area(key)
         return found
 
     def _areas(
@@ -434,7 +437,7 @@ class _WalkNetBuilder:
             outline = area_outline([arm for arm, _ in hub.arms])
             size = float(np.ptp(outline[:, :2], axis=0).max())
             lane = NetLane(
-                SumoLaneId(f"{hub.area}_0"),
+                lane_id(hub.area),
                 0,
                 round(max(size, 0.5), 4),
                 WALKING_SPEED,
@@ -448,7 +451,6 @@ class _WalkNetBuilder:
                 pair(hub.area, edge)
         for own in crossings.values():
             for crossing in own:
-                start = SumoEdgeId(crossing.start.removesuffix("_0"))
-                pair(start, crossing.edge.id)
+                pair(crossing.start, crossing.edge.id)
                 pair(crossing.edge.id, crossing.link.target)
         return areas, links, pairs

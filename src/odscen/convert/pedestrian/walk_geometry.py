@@ -52,7 +52,13 @@ def thirds(course: Course) -> list[Course]:
 
 
 def divided(course: Course, extent: float) -> tuple[Course, Course]:
-    """Divide a course after ``extent`` metres of s."""
+    """Divide a course after ``extent`` metres of s.
+
+    Raises
+    ------
+    ValueError
+        If it has no stretch.
+    """
     for index, stretch in enumerate(course):
         if extent < stretch.extent or index == len(course) - 1:
             share = min(max(extent / stretch.extent, 0.1), 0.9)
@@ -60,7 +66,8 @@ def divided(course: Course, extent: float) -> tuple[Course, Course]:
             head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
             return (*course[:index], head), (tail, *course[index + 1 :])
         extent -= stretch.extent
-    raise AssertionError
+    msg = "nothing to divide"
+    raise ValueError(msg)
 
 
 def trimmed(course: Course, *, start: bool, end: bool) -> Course:

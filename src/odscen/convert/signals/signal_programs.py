@@ -7,7 +7,7 @@ common practice:
 
 - yellow by speed: 3 s up to 50 km/h, 4 s up to 60, 5 s above (RiLSA 2015, section 2.4);
 - all-red until the last vehicle has left, (way through the junction + 6 m) / speed, but for the
-  second that the next ones need to start;
+  second that the next ones need to start; whole seconds, from 1 to 8;
 - a crossing turns red so early that one who has just started walks over at 1.2 m/s.
 """
 

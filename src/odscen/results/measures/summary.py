@@ -13,9 +13,8 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-import orjson
+import numpy as np
 
-from odscen.base.errors import InputError
 from odscen.results.records.run_records import (
     ACTORS_FORMAT,
     VERSION,
@@ -25,6 +24,7 @@ from odscen.results.records.run_records import (
     PlannedActor,
     rounded,
     row_text,
+    rows_from_json,
     text_with_rows,
 )
 
@@ -246,15 +246,7 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
     InputError
         If it is not a list of actors of this version.
     """
-    try:
-        data = orjson.loads(text)
-        if (data["format"], data["version"]) != (ACTORS_FORMAT, VERSION):
-            msg = f"format {data['format']!r} version {data['version']!r} is not a list of actors"
-            raise InputError(msg)
-        return tuple(ActorOutcome(**actor) for actor in data["actors"])
-    except (KeyError, TypeError, ValueError) as error:
-        msg = f"not a list of actors: {error!r}"
-        raise InputError(msg) from error
+    return rows_from_json(text, "actors", ACTORS_FORMAT, lambda row: ActorOutcome(**row))
 
 
 def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
@@ -305,10 +297,11 @@ def _travel_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]
         if o.travel_time and o.route_length is not None
     ]
     seconds = sum(time for _, time in moved)
+    median, p95 = np.quantile(times, (0.5, 0.95)).tolist() if times else (None, None)
     return {
         "mean_travel_time": _mean(times),
-        "median_travel_time": _percentile(times, 0.5),
-        "p95_travel_time": _percentile(times, 0.95),
+        "median_travel_time": median,
+        "p95_travel_time": p95,
         "mean_speed": sum(length for length, _ in moved) / seconds if seconds else None,
         "mean_delay": _mean([o.delay for o in outcomes]),
         "mean_waiting_time": _mean([o.waiting_time for o in outcomes if o.status == "arrived"]),
@@ -322,16 +315,6 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def _largest(values: Sequence[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
-
-
-def _percentile(ordered: Sequence[float], share: float) -> float | None:
-    """Linear between the two nearest ranks, as ``numpy.percentile`` does."""
-    if not ordered:
-        return None
-    position = share * (len(ordered) - 1)
-    low = int(position)
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (position - low) * (ordered[high] - ordered[low])
 
 
 def summary_to_json(summary: Mapping[str, Any]) -> str:

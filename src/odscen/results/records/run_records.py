@@ -9,14 +9,16 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import orjson
 
 from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+_Row = TypeVar("_Row")
 
 PLAN_FORMAT = "odscen-plan"
 EVENTS_FORMAT = "odscen-events"
@@ -242,17 +244,11 @@ def events_from_json(text: str) -> tuple[Event, ...]:
     InputError
         If it is not a list of events of this version.
     """
-    try:
-        data = orjson.loads(text)
-        if (data["format"], data["version"]) != (EVENTS_FORMAT, VERSION):
-            msg = f"format {data['format']!r} version {data['version']!r} is not a list of events"
-            raise InputError(msg)
-        return tuple(
-            Event(**{**event, "kind": EventKind(event["kind"])}) for event in data["events"]
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        msg = f"not a list of events: {error!r}"
-        raise InputError(msg) from error
+    return rows_from_json(text, "events", EVENTS_FORMAT, _event)
+
+
+def _event(row: Mapping[str, Any]) -> Event:
+    return Event(**{**row, "kind": EventKind(row["kind"])})
 
 
 def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str, Any]]) -> str:
@@ -261,6 +257,36 @@ def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str
     Numbers are rounded to 1e-6: far below what is physical, and free of rounding noise.
     """
     return "".join(text_with_rows(head, key, map(row_text, rows)))
+
+
+def rows_from_json(
+    text: str, key: str, form: str, make: Callable[[Mapping[str, Any]], _Row]
+) -> tuple[_Row, ...]:
+    """Inverse of :func:`json_with_rows`.
+
+    Parameters
+    ----------
+    key
+        What the rows are.
+    form
+        The format that the text must name, with our version.
+    make
+        Makes of a row what it stands for.
+
+    Raises
+    ------
+    InputError
+        If the text has another format or version, or rows that ``make`` cannot take.
+    """
+    try:
+        data = orjson.loads(text)
+        if (data["format"], data["version"]) != (form, VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not a list of {key}"
+            raise InputError(msg)
+        return tuple(map(make, data[key]))
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not a list of {key}: {error!r}"
+        raise InputError(msg) from error
 
 
 def text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:

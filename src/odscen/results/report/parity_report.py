@@ -10,10 +10,9 @@ from odscen.base.markup import Markup, element, join, number
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.measures.parity import error_curve, errors_by_place
 from odscen.results.records.traces import bin_width
+from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.results.report.plots import Series, line_chart
 from odscen.results.report.report_map import CATEGORIES, fitted_view, scale_bar, swatch
-from odscen.results.report.report_tables import html_table, report_section
-from odscen.results.report.run_report import html_page
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,13 +79,8 @@ def _head(title: str, figures: Mapping[str, Any]) -> Markup:
         f"In {figures['steps']:,} steps CARLA showed {shown or 'nobody'}; whoever is beyond the "
         "radius that was asked for is left out on purpose."
     )
-    return element(
-        "header",
-        element("p", "SUMO and CARLA compared", class_="kind"),
-        element("h1", title),
-        element("p", words, class_=f"verdict {style}"),
-        element("p", sentence),
-    )
+    kind = "SUMO and CARLA compared"
+    return page_head(kind, title, element("p", sentence), verdict=words, style=style)
 
 
 def _errors(figures: Mapping[str, Any]) -> Markup:

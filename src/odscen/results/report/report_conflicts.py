@@ -15,8 +15,8 @@ from odscen.results.measures.conflicts import (
     conflict_figures,
     is_serious,
 )
+from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.report_figures import Card, card_grid
-from odscen.results.report.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
     import polars as pl

@@ -9,8 +9,8 @@ import numpy as np
 
 from odscen.base.arrays import FloatArray, IntArray, offsets, ranges
 from odscen.base.markup import Markup, element, number, path_data
+from odscen.results.report.page_templates import report_section
 from odscen.results.report.plots import ChartFrame, chart, clock_axis, legend, text_at, value_axis
-from odscen.results.report.report_tables import report_section
 from odscen.results.report.report_words import stretch
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.measures.traffic import over_run
+from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.plots import Series
 from odscen.results.report.report_figures import Card, card_grid
 from odscen.results.report.report_flow import column, network_chart
-from odscen.results.report.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
     import polars as pl

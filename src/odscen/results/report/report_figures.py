@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.measures.summary import actor_counts
-from odscen.results.report.report_tables import report_section
+from odscen.results.report.page_templates import report_section
 from odscen.results.report.report_words import duration
 
 if TYPE_CHECKING:

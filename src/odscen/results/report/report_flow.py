@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.markup import Markup, element, number
+from odscen.results.report.page_templates import report_section
 from odscen.results.report.plots import Dots, Series, dot_chart, line_chart
-from odscen.results.report.report_tables import report_section
 from odscen.results.report.report_words import stretch
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.results.measures.traffic import over_run
+from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.plots import legend
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box
-from odscen.results.report.report_tables import html_table, report_section
 from odscen.results.report.report_words import stretch
 
 if TYPE_CHECKING:

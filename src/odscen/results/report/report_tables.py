@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.records.run_records import EventKind
+from odscen.results.report.page_templates import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,23 +50,6 @@ STATUS_WORDS = {
     "running": "still on its way",
     "waiting": "never entered",
 }
-
-
-def report_section(heading: str, *children: Markup | None, explained: str, ident: str) -> Markup:
-    """Section with heading, content, and a sentence on how to read it."""
-    note = element("p", element("b", "How to read this: "), explained, class_="how")
-    return element("section", element("h2", heading), *children, note, id=ident)
-
-
-def html_table(
-    heads: Sequence[str], rows: list[Markup], *, label: str | None = None, **attributes: str
-) -> Markup:
-    """Table that scrolls where there is no room; ``rows`` are ``tr``, ``label`` names it."""
-    head = element("thead", element("tr", *(element("th", name, scope="col") for name in heads)))
-    content = element("table", head, element("tbody", *rows), **attributes)
-    return element(
-        "div", content, class_="scroll", tabindex="0", role="region", aria_label=label or heads[0]
-    )
 
 
 def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, join, number
-from odscen.results.report.report_tables import html_table, report_section
+from odscen.results.report.page_templates import html_table, report_section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,9 +8,9 @@ import numpy as np
 
 from odscen.base.markup import Markup, number
 from odscen.results.records.traces import bin_width, speed_over_time
+from odscen.results.report.page_templates import report_section
 from odscen.results.report.plots import Series, line_chart
 from odscen.results.report.report_figures import Card, card_grid
-from odscen.results.report.report_tables import report_section
 from odscen.results.report.report_words import duration
 
 if TYPE_CHECKING:

@@ -6,9 +6,6 @@ the page forbids itself every request and every script but its own, whose hash i
 
 from __future__ import annotations
 
-import base64
-import hashlib
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, join, number
@@ -16,6 +13,7 @@ from odscen.results.measures.curves import presence
 from odscen.results.measures.gridlock import find_trouble
 from odscen.results.measures.summary import actor_counts, key_figures
 from odscen.results.records.traces import bin_width, speed_over_time, tidy, travel
+from odscen.results.report.page_templates import html_page, page_head, report_section
 from odscen.results.report.plots import Series, line_chart
 from odscen.results.report.report_conflicts import conflict_section
 from odscen.results.report.report_corridor import corridor_section
@@ -24,12 +22,7 @@ from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_service import service_section
-from odscen.results.report.report_tables import (
-    actor_table,
-    event_list,
-    expectation_table,
-    report_section,
-)
+from odscen.results.report.report_tables import actor_table, event_list, expectation_table
 from odscen.results.report.report_trouble import trouble_section
 from odscen.results.report.report_walking import walking_section
 from odscen.results.report.report_words import duration
@@ -122,31 +115,6 @@ def render_report(
     return html_page(f"{title} - run report", join([part for part in body if part]))
 
 
-def html_page(title: str, body: Markup) -> str:
-    """Whole page with our style and script around ``body``; it forbids itself everything else."""
-    style, script = _asset("report.css"), _asset("report.js")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
-    head = [
-        element("meta", charset="utf-8"),
-        Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", name="color-scheme", content="light dark"),
-        element("title", title),
-        element("style", Markup(style)),
-    ]
-    script_element = element("script", Markup(script))
-    page = element(
-        "html", element("head", *head), element("body", element("main", body), script_element),
-        lang="en",
-    )  # fmt: skip
-    return f"<!DOCTYPE html>\n{page}\n"
-
-
-def _asset(name: str) -> str:
-    return (files("odscen.results.report") / "assets" / name).read_text(encoding="utf-8")
-
-
 def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
     last = traces["time"].max()
     recorded = float(last) if isinstance(last, int | float) else 0.0
@@ -204,14 +172,14 @@ def _head(title: str, plan: Plan, summary: Mapping[str, Any], sentence: str) -> 
         if value not in (None, "")
     ]
     reason = summary.get("error") or summary.get("reason")
-    return element(
-        "header",
-        element("p", "Run report", class_="kind"),
-        element("h1", title),
-        element("p", words, class_=f"verdict {style}"),
+    return page_head(
+        "Run report",
+        title,
         element("p", sentence) if sentence else None,
         element("pre", str(reason), class_="reason") if reason else None,
         element("p", *shown, class_="facts"),
+        verdict=words,
+        style=style,
     )
 
 

@@ -91,7 +91,13 @@ def flow_goals(
 
 
 def with_goals(scenario: Scenario, graph: MapGraph) -> Scenario:
-    """Write the goal that :func:`resolve_goals` draws into every actor that has none."""
+    """Write the goal that :func:`resolve_goals` draws into every actor that has none.
+
+    Raises
+    ------
+    ScenarioError
+        If two actors have the same id, or as :func:`resolve_goals`.
+    """
     goals = resolve_goals(scenario, graph)
     if len(goals) != len(scenario.actors):
         msg = "two actors have the same id"

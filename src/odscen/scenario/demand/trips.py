@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from odscen.scenario.demand.zones import TripEnds
     from odscen.scenario.document.scenario_document import Background, Matrix, Scenario, Window
     from odscen.scenario.placing.region import Region
-    from odscen.scenario.placing.supply import Usable
+    from odscen.scenario.placing.usable_nodes import Usable
 
 FIRST = 0.01
 """Seconds after the start at which trips begin at the earliest: at 0 the placed actors appear."""

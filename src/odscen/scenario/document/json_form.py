@@ -1,26 +1,19 @@
-"""Scenario documents as text: JSON in and out, its schema, and telling JSON from GraphML."""
+"""Scenario documents as text: JSON in and out, and its schema."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails, from_json
+from pydantic import ValidationError
+from pydantic_core import from_json
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-_Model = TypeVar("_Model", bound=BaseModel)
+from odscen.scenario.document.validation import validation_problems
 
 OPTIONAL = ("demand", "signals")
 """Fields of a scenario that are left out where they have their default value."""
-
-_SHOWN = 60
-"""Longest piece of a wrong value that is quoted in a message."""
 
 
 def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
@@ -71,46 +64,10 @@ def dumps(scenario: Scenario) -> str:
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
 
-def read_any(text: str | bytes, *, file: str | None = None) -> Scenario:
-    """Read a scenario from its JSON document or from its GraphML graph form, whichever it is.
-
-    Raises
-    ------
-    ScenarioError
-        If it is neither, or has problems.
-    """
-    try:
-        decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        msg = f"not a scenario: byte {error.start} is not UTF-8"
-        raise ScenarioError(msg, file=file) from error
-    start = decoded.removeprefix("\ufeff").lstrip()
-    if start.startswith("<"):
-        from odscen.scenario.forms.graph_form import from_graphml
-
-        return from_graphml(start, file=file)
-    return loads(start, file=file)
-
-
 def schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the document, as published in docs/scenario.schema.json."""
     described = Scenario.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
-
-
-def validation_problems(error: ValidationError) -> tuple[str, ...]:
-    """One line per problem of a pydantic error: the place, what is wrong, and the value."""
-    return tuple(_problem(details) for details in error.errors(include_url=False))
-
-
-def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
-    """Make a pydantic model, with :class:`ScenarioError` for pydantic's own error."""
-    try:
-        return model.model_validate(fields)
-    except ValidationError as error:
-        problems = validation_problems(error)
-        msg = f"{model.__name__.lower()}: {problems[0]}"
-        raise ScenarioError(msg, problems=problems[1:]) from error
 
 
 def _layout(key: str, value: object) -> str:
@@ -139,27 +96,6 @@ def _parts(value: object) -> str:
             line = line.replace(whole, f"[\n        {split}\n      ]")
         lines.append(line)
     return "[\n      " + ",\n      ".join(lines) + "\n    ]"
-
-
-def _problem(details: ErrorDetails) -> str:
-    place = _place(details["loc"])
-    message = details["msg"]
-    value = details["input"]
-    if details["type"] == "missing" or isinstance(value, (dict, list, bytes)):
-        shown = ""
-    else:
-        quoted = repr(value)
-        shown = f", not {quoted[:_SHOWN]}{'...' if len(quoted) > _SHOWN else ''}"
-    if details["type"] == "json_invalid":
-        return message
-    return f"{place}: {message}{shown}" if place else f"{message}{shown}"
-
-
-def _place(location: Iterable[str | int]) -> str:
-    place = ""
-    for step in location:
-        place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step
-    return place
 
 
 def _foreign(text: str | bytes) -> str | None:

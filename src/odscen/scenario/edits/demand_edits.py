@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
-from odscen.scenario.document.json_form import validated
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.scenario_document import (
     Background,
@@ -19,6 +18,7 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Zone,
 )
+from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:

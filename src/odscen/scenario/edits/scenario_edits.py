@@ -18,7 +18,6 @@ from odscen.lanegraph.query import neighbours, removable
 from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids, roi_problems, shared_nodes
 from odscen.scenario.checks.signal_timing import find_light, signal_problems
-from odscen.scenario.document.json_form import validated
 from odscen.scenario.document.problems import Problem, refuse_errors
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import (
@@ -30,6 +29,7 @@ from odscen.scenario.document.scenario_document import (
     Part,
     Scenario,
 )
+from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.region import Region, on_foot
 from odscen.scenario.sampling.sampler import sample_scenario
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.checks.signal_timing import Light
     from odscen.scenario.document.scenario_document import Control
-    from odscen.scenario.placing.supply import Usable
+    from odscen.scenario.placing.usable_nodes import Usable
 
 _One = TypeVar("_One", bound=Actor | Flow)
 _Document = TypeVar("_Document", bound=Part)
@@ -375,7 +375,15 @@ def fill_roi(
 
 
 def set_ego(scenario: Scenario, actor: str | None) -> Scenario:
-    """Make one vehicle the ego, and no other; ``None`` leaves none (R42)."""
+    """Make one vehicle the ego, and no other; ``None`` leaves none (R42).
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such actor.
+    ScenarioError
+        If it is a pedestrian.
+    """
     if actor is None:
         return _only_ego(scenario, None)
     chosen = scenario.actors[_index(scenario.actors, actor)]

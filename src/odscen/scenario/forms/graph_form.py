@@ -25,7 +25,7 @@ from odscen.scenario.checks.scenario_checks import (
     roi_problems,
     shared_nodes,
 )
-from odscen.scenario.document.json_form import OPTIONAL, validated
+from odscen.scenario.document.json_form import OPTIONAL
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.scenario_document import (
     FORMAT,
@@ -35,6 +35,7 @@ from odscen.scenario.document.scenario_document import (
     MapReference,
     Scenario,
 )
+from odscen.scenario.document.validation import validated
 from odscen.scenario.forms.graphml_text import read_graphml, write_graphml
 from odscen.scenario.placing.region import Region
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.categories import Category
 from odscen.scenario.placing.spawn_room import MaximalCrowd, distance_to_end, max_fit, standing_room
 
 if TYPE_CHECKING:
@@ -18,28 +18,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import LaneGraph, PedestrianGraph
     from odscen.scenario.document.sampling_config import PlacingRules
     from odscen.scenario.placing.region import Region
-
-
-@dataclass(frozen=True, slots=True)
-class Usable:
-    """What a simulator can use of a map; ``None`` stands for everything.
-
-    Attributes
-    ----------
-    spawnable
-        Shape ``(N,)``: lane-graph nodes on which a vehicle can be placed exactly.
-    drivable
-        Shape ``(N,)``: lane-graph nodes that a way can lead over.
-    walkable
-        Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
-    bodies
-        Size of each category.
-    """
-
-    spawnable: BoolArray | None = None
-    drivable: BoolArray | None = None
-    walkable: BoolArray | None = None
-    bodies: Mapping[Category, Body] = field(default_factory=lambda: DEFAULT_BODY)
+    from odscen.scenario.placing.usable_nodes import Usable
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.distributions import draw_key, draw_place
-from odscen.scenario.document.json_form import validated
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import (
     Actor,
@@ -26,11 +25,13 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
+from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.bodies import Box, Crowd, box_at
 from odscen.scenario.placing.random_places import place_at_random
 from odscen.scenario.placing.region import NodePlace, Region, name_of
 from odscen.scenario.placing.spawn_room import Reach
-from odscen.scenario.placing.supply import Usable, vehicle_supply, walker_supply
+from odscen.scenario.placing.supply import vehicle_supply, walker_supply
+from odscen.scenario.placing.usable_nodes import Usable
 from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
 
 if TYPE_CHECKING:

@@ -78,6 +78,11 @@ def town_day(
     Returns
     -------
     Origin, destination and number, sorted, and the load.
+
+    Raises
+    ------
+    InputError
+        If no trips are possible on the map.
     """
     region = Region.of(sumo_map.graph, scenario.roi)
     carried = ways_in(sumo_map)

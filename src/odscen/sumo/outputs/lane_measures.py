@@ -4,7 +4,7 @@
 column                              meaning
 =================================== ==============================================================
 begin, end                          interval, s
-edge, lane                          SUMO's ids; those of lanes inside a junction begin with ``:``
+edge, lane                          SUMO's ids
 seconds                             time that vehicles spent, vehicle-seconds
 distance                            that they drove, m
 entered, left                       vehicles that came from and went to another edge
@@ -48,7 +48,7 @@ _COUNTS = ("entered", "left", "departed", "arrived")
 def lane_table(
     lanes: Path,
     emissions: Path | None,
-    lengths: Mapping[str, float],
+    lengths: Mapping[str, Mapping[str, float]],
     present: Mapping[str, int] | None = None,
 ) -> pl.DataFrame:
     """Read what SUMO has written.
@@ -58,8 +58,8 @@ def lane_table(
     lanes, emissions
         SUMO's Parquet files; ``None`` if emissions were not recorded.
     lengths
-        Of lanes for vehicles, m. SUMO's mesoscopic model measures edges: what it tells of one is
-        given to the first of these lanes.
+        Of lanes for vehicles, m, by edge. SUMO's mesoscopic model measures edges: what it tells
+        of one is given to the first of these lanes.
     present
         How many vehicles were on each lane when a saved state was loaded. SUMO counts them as
         having entered.
@@ -81,6 +81,7 @@ def lane_table(
         {"lane": list((present or {}).keys()), "present": list((present or {}).values())},
         schema={"lane": pl.String, "present": pl.Int64},
     ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
+    by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
     # Where nearly nobody moved there is no travel time, and SUMO's density has an upper bound; all
     # stood for the whole interval then, a whole number of vehicles.
@@ -97,7 +98,7 @@ def lane_table(
     )
     return (
         rows.join(here, on=["begin", "lane"], how="left")
-        .with_columns(length=col("lane").replace_strict(dict(lengths), return_dtype=pl.Float64))
+        .with_columns(length=col("lane").replace_strict(by_lane, return_dtype=pl.Float64))
         .with_columns(seconds=fronts.fill_null(0.0))
         .with_columns(
             time_loss=loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds")),
@@ -116,7 +117,7 @@ def lane_table(
     )  # fmt: skip
 
 
-def _named(file: Path, lengths: Mapping[str, float]) -> pl.DataFrame:
+def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.DataFrame:
     """Rows of a file of lane data; columns lose their prefix, times become numbers."""
     import polars as pl
 
@@ -126,7 +127,9 @@ def _named(file: Path, lengths: Mapping[str, float]) -> pl.DataFrame:
     if "lane_id" not in rows.columns:
         rows = rows.with_columns(
             lane_id=pl.col("edge_id").replace_strict(
-                _first_lanes(lengths), default=None, return_dtype=pl.String
+                {edge: next(iter(own)) for edge, own in lengths.items()},
+                default=None,
+                return_dtype=pl.String,
             )
         )
     names = {
@@ -142,13 +145,6 @@ def _named(file: Path, lengths: Mapping[str, float]) -> pl.DataFrame:
             end=pl.col("interval_end").cast(pl.Float64),
         )
     )
-
-
-def _first_lanes(lengths: Mapping[str, float]) -> dict[str, str]:
-    lanes: dict[str, str] = {}
-    for lane in sorted(lengths, key=lambda name: int(name.rpartition("_")[2])):
-        lanes.setdefault(lane.rpartition("_")[0], lane)
-    return lanes
 
 
 def _nothing() -> pl.DataFrame:

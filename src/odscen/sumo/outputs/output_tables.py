@@ -39,7 +39,11 @@ def outputs_to(folder: Path, sumo: Path) -> list[str]:
 
 
 def tidy_outputs(
-    folder: Path, lengths: Mapping[str, float], *, present: Mapping[str, int], last: bool
+    folder: Path,
+    lengths: Mapping[str, Mapping[str, float]],
+    *,
+    present: Mapping[str, int],
+    last: bool,
 ) -> None:
     """Replace SUMO's lane data, emissions and tripinfo by ``lanes.parquet`` and ``trips.parquet``.
 

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from odscen.scenario.demand.trips import Trips
     from odscen.scenario.document.scenario_document import Flow, Scenario
     from odscen.scenario.placing.region import Region
-    from odscen.scenario.placing.supply import Usable
+    from odscen.scenario.placing.usable_nodes import Usable
 
 
 def road_users(
     scenario: Scenario, graph: MapGraph, region: Region, *, until: float
 ) -> tuple[RoadUser, ...]:
-    """Everybody that the scenario puts on the road before ``until``, by departure, then id.
+    """Actors and members of flows who depart before ``until``, by departure, then id.
 
     Raises
     ------

@@ -34,6 +34,7 @@ class RoutesFile:
         self._parameters = vehicle_parameters
         self._types: dict[tuple[tuple[str, str], ...], str] = {}
         self._counts: dict[str, int] = {}
+        self._on_foot: set[str] = set()
         self._lines: list[tuple[float, str, list[str]]] = []
 
     def add_vehicle(self, user: RoadUser, driver: Driver, route: Route) -> None:
@@ -89,7 +90,7 @@ class RoutesFile:
 
     def _type_lines(self, name: str, attributes: tuple[tuple[str, str], ...]) -> list[str]:
         start = f'    <vType id="{name}"{_xml(attributes)}'
-        if not self._parameters or name.startswith(f"{Category.PEDESTRIAN}."):
+        if not self._parameters or name in self._on_foot:
             return [f"{start}/>"]
         inside = [
             f"        <param{_xml([('key', key), ('value', value)])}/>"
@@ -104,6 +105,8 @@ class RoutesFile:
             count = self._counts.get(category, 0)
             self._counts[category] = count + 1
             name = self._types[driver.attributes] = f"{category}.{count}"
+            if category == Category.PEDESTRIAN:
+                self._on_foot.add(name)
         return name
 
 

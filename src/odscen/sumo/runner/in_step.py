@@ -39,7 +39,7 @@ class Step:
     speed
         m/s.
     signals
-        SUMO's bits, see :class:`~odscen.sumo.worker.snapshots.Signal`.
+        SUMO's bits, see :class:`~odscen.sumo.worker.snapshots.VehicleSignal`.
     lights
         State of every traffic light by SUMO id.
     departed, arrived

@@ -55,7 +55,7 @@ class Written:
     events
         What has happened in it.
     lengths
-        Of lanes, metres.
+        Of lanes for vehicles by edge, metres.
     lanes
         How many vehicles came in on each lane with the state.
     """
@@ -63,7 +63,7 @@ class Written:
     part: Path
     checkpoint: Checkpoint
     events: list[Event]
-    lengths: Mapping[str, float]
+    lengths: Mapping[str, Mapping[str, float]]
     lanes: Mapping[str, int]
 
     def complete(self, plan: Plan, run: Path) -> None:

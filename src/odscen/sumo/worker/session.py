@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from contextlib import contextmanager, suppress
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -165,16 +166,15 @@ class Session:
 
     def _lead_on(self, vehicle: str, route: Sequence[str]) -> None:
         edges = list(route)
-        if edges[0].startswith(":"):  # a route cannot be changed inside a junction
+        lanes = self._lanes_of_edge
+        if lanes[edges[0]][0] in self._internal_lanes:  # a route cannot be changed in a junction
             return
         links, lane_edge = self._sumo.lane.getLinks, self._sumo.lane.getEdgeID
-        count = self._sumo.edge.getLaneNumber
         kind = self._sumo.vehicle.getVehicleClass(vehicle)
         while len(edges) < _EDGES_AHEAD:
-            lanes = [f"{edges[-1]}_{index}" for index in range(count(edges[-1]))]
             onward = [
                 lane_edge(link[0])
-                for lane in lanes
+                for lane in lanes[edges[-1]]
                 for link in links(lane)
                 if self._admits(link[0], kind)
             ]
@@ -188,15 +188,34 @@ class Session:
         allowed = self._sumo.lane.getAllowed(lane)
         return not allowed or kind in allowed
 
-    def lane_lengths(self) -> dict[str, float]:
-        """Length of each lane that vehicles may use, also those inside junctions; metres."""
+    def lane_lengths(self) -> dict[str, dict[str, float]]:
+        """Lanes that vehicles may use, by edge, and their lengths in metres; junctions as well."""
         lane = self._sumo.lane
         on_foot = ("pedestrian",)
-        return {
-            name: lane.getLength(name)
-            for name in lane.getIDList()
-            if tuple(lane.getAllowed(name)) != on_foot
+        lengths = {
+            edge: {
+                name: lane.getLength(name)
+                for name in lanes
+                if tuple(lane.getAllowed(name)) != on_foot
+            }
+            for edge, lanes in self._lanes_of_edge.items()
         }
+        return {edge: own for edge, own in lengths.items() if own}
+
+    @cached_property
+    def _lanes_of_edge(self) -> dict[str, list[str]]:
+        """Lanes of each edge, as SUMO lists them."""
+        edge_of, lanes = self._sumo.lane.getEdgeID, defaultdict(list)
+        for name in self._sumo.lane.getIDList():
+            lanes[edge_of(name)].append(name)
+        return dict(lanes)
+
+    @cached_property
+    def _internal_lanes(self) -> frozenset[str]:
+        """Lanes for vehicles inside junctions: those that connections lead over."""
+        lane = self._sumo.lane
+        links = (link for name in lane.getIDList() for link in lane.getLinks(name))
+        return frozenset(link[4] for link in links if link[4])
 
     def vehicles_by_lane(self) -> dict[str, int]:
         """How many vehicles have their front on each lane, of those that have any."""
@@ -260,7 +279,7 @@ class Session:
             lane = str(vehicle.getLaneID(name))
             if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
                 return Ahead(False, "", False, None, people=False, beside=wrong)
-            inside = lane.startswith(":")
+            inside = lane in self._internal_lanes
             goes = bool(links) and links[0][5] not in _RED  # else that is the reason
             through = lane if inside else str(links[0][4]) if goes else ""
             if leader is None and through:
@@ -279,12 +298,13 @@ class Session:
         """Whether another lane leads on along a vehicle's way; ``None`` if its own lane does."""
         vehicle, lanes = self._sumo.vehicle, self._sumo.lane
         lane, index = vehicle.getLaneID(name), vehicle.getRouteIndex(name)
-        if not lane or lane.startswith(":"):
+        if not lane or lane in self._internal_lanes:
             return None
-        edge, following = lanes.getEdgeID(lane), vehicle.getRoute(name)[index + 1]
+        own = self._lanes_of_edge[lanes.getEdgeID(lane)]
+        following = vehicle.getRoute(name)[index + 1]
         leading = {
             one
-            for one in (f"{edge}_{k}" for k in range(self._sumo.edge.getLaneNumber(edge)))
+            for one in own
             if any(lanes.getEdgeID(link[0]) == following for link in lanes.getLinks(one))
         }
         if lane not in leading:
