@@ -7,10 +7,11 @@ QC := build/qc/ready
 PAGE := src/odscen/web/static/index.html
 PAGE_SOURCES := $(shell find frontend/src frontend/public -type f) \
 	$(wildcard frontend/*.json frontend/*.ts frontend/*.cjs frontend/*.html)
+DOCS := .venv/docs-ready
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test regression test-page chromium allocator page check format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test regression test-page chromium allocator page check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -46,6 +47,14 @@ check: $(READY) $(MODULES)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation as a site in build/site; a broken link or anchor is an error.
+docs: $(DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+
+# The quick checks before each commit.
+hooks: $(READY)
+	$(BIN)/pre-commit install
 
 format: $(READY)
 	$(BIN)/ruff check --fix .
@@ -89,6 +98,10 @@ $(READY): pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --editable '.[png]' --group dev
+	touch $@
+
+$(DOCS): pyproject.toml | $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group docs
 	touch $@
 
 $(MODULES): frontend/package-lock.json frontend/package.json | $(READY)

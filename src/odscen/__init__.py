@@ -1,3 +1,3 @@
 """odscen: traffic scenarios on OpenDRIVE maps, run headlessly in SUMO."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

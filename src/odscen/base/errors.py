@@ -1,8 +1,6 @@
 """The whole error tree.
 
-::
-
-    OdscenError                     everything raised on purpose; has an ``exit_code``
+    OdscenError                     everything raised on purpose; has an exit_code
     |-- InputError (2)              what the user gave cannot be used; names file, place and value
     |   |-- OpenDriveError          an .xodr file, with the element path and the value at fault
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours

@@ -1,14 +1,10 @@
 """Poses and the only conversions between frames.
 
-========== ======================================= ================================ ==============
-pose       position                                heading                          reference point
-========== ======================================= ================================ ==============
-XodrPose   x east, y north, z up                   ``hdg`` rad, counter-clockwise   body centre
-                                                   from +x
-SumoPose   xodr + netOffset                        ``angle_deg`` clockwise from     front bumper
-                                                   north                            centre
-CarlaPose  x east, y south, z up (left-handed)     ``yaw_deg`` clockwise from +x    body centre
-========== ======================================= ================================ ==============
+| pose | position | heading | reference point |
+|---|---|---|---|
+| `XodrPose` | x east, y north, z up | `hdg` rad, counter-clockwise from +x | body centre |
+| `SumoPose` | xodr + netOffset | `angle_deg` clockwise from north | front bumper centre |
+| `CarlaPose` | x east, y south, z up (left-handed) | `yaw_deg` clockwise from +x | body centre |
 
 Pitch is positive nose up in all three; the distance bumper to centre is measured along the slope.
 z of a :class:`SumoPose` is that of the front bumper. The functions are pure and take numpy arrays

@@ -31,10 +31,7 @@ def test_the_example_configuration_can_be_read_and_states_the_defaults() -> None
 
 
 def test_every_code_of_the_checks_is_listed_in_the_guide() -> None:
-    sources = [
-        ROOT / "src/odscen/scenario" / name
-        for name in ("checks.py", "actor_checks.py", "demand_checks.py", "signals.py")
-    ]
+    sources = sorted((ROOT / "src/odscen/scenario/checks").glob("*.py"))
     code = re.compile(r"(?:error|warning)\(\s*\"([a-z_]+)\"")
     used = {name for path in sources for name in code.findall(path.read_text(encoding="utf-8"))}
     guide = (DOCS / "scenario-format.md").read_text(encoding="utf-8")
