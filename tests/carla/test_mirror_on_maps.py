@@ -45,9 +45,9 @@ class Oracle:
         road = np.array([name for _, name in points])
         table = entry.lane_table()
         roads: dict[str, set[str]] = {}
-        for piece in table.pieces:
-            key = str(table.lane_keys[piece.lane].road)
-            roads.setdefault(table.lane_list[piece.sumo].id, set()).add(key)
+        for interval in table.intervals:
+            key = str(table.lane_keys[interval.lane].road)
+            roads.setdefault(table.lane_list[interval.sumo].id, set()).add(key)
         self.own = {lane: np.isin(road, sorted(names)) for lane, names in roads.items()}
 
     def nearest(self, points: np.ndarray, x: float, y: float) -> int:

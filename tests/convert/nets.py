@@ -1,6 +1,6 @@
 """A fork of three roads with sidewalk, crosswalk and lights, and SUMO networks of it by hand.
 
-Road 1 leads from x = 0 to the junction at x = 40; road 2 goes on straight from x = 60, road 3 turns
+Road 1 leads from x = 0 to the junction at x = 40, road 2 straight on from x = 60, road 3 turns
 off to the right. Lanes for cars are 3.5 m wide right of y = 0, the sidewalk 2 m right of them.
 """
 
@@ -131,8 +131,8 @@ class HandNet:
     def _link(self, k: int, source: str, target: str, via: str) -> str:
         (a, i), (b, j) = source.rsplit("_", 1), target.rsplit("_", 1)
         light = f' tl="t" linkIndex="{k}"' if self.states else ""
-        way = f' via="{via}"' if via else ""
-        return f'<connection from="{a}" to="{b}" fromLane="{i}" toLane="{j}"{way}{light}/>'
+        internal = f' via="{via}"' if via else ""
+        return f'<connection from="{a}" to="{b}" fromLane="{i}" toLane="{j}"{internal}{light}/>'
 
 
 def _function(edge: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from odscen.base.ids import JunctionId, LaneKey, RoadId, SumoEdgeId, SumoLaneId
-from odscen.convert.lane_table.mapping_intervals import Piece
+from odscen.convert.lane_table.mapping_intervals import MappingInterval
 from odscen.convert.lane_table.table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
 from odscen.convert.model.net import Phase
 
@@ -27,8 +27,10 @@ def lane(name: str, of: str, allowed: frozenset[str] | None = CARS) -> SumoLane:
     return SumoLane(SumoLaneId(name), SumoEdgeId(of), 0, 50.0, 13.9, 3.5, allowed)
 
 
-def piece(key: int, sumo: int, pos: list[float], s: list[float], off: float = 0.0) -> Piece:
-    return Piece(key, sumo, np.array(pos), np.array(s), np.full(len(pos), off))
+def interval(
+    key: int, sumo: int, pos: list[float], s: list[float], off: float = 0.0
+) -> MappingInterval:
+    return MappingInterval(key, sumo, np.array(pos), np.array(s), np.full(len(pos), off))
 
 
 def table() -> LaneTable:
@@ -61,12 +63,12 @@ def table() -> LaneTable:
             (SumoEdgeId(":k_w"), SumoEdgeId("v")),
             (SumoEdgeId(":k_w"), SumoEdgeId("w")),
         ),
-        pieces=(
-            piece(0, 0, [0.0, 50.0], [1.0, 52.0], 0.01),
-            piece(0, 1, [0.0, 20.0, 50.0], [52.0, 75.0, 99.0], 0.02),
-            piece(1, 2, [0.0, 50.0], [100.0, 2.5], 0.0),
-            piece(2, 3, [0.0, 12.0], [0.0, 12.5], 0.4),
-            piece(3, 4, [2.0, 49.0], [90.0, 10.0], 0.05),
+        intervals=(
+            interval(0, 0, [0.0, 50.0], [1.0, 52.0], 0.01),
+            interval(0, 1, [0.0, 20.0, 50.0], [52.0, 75.0, 99.0], 0.02),
+            interval(1, 2, [0.0, 50.0], [100.0, 2.5], 0.0),
+            interval(2, 3, [0.0, 12.0], [0.0, 12.5], 0.4),
+            interval(3, 4, [2.0, 49.0], [90.0, 10.0], 0.05),
         ),
         net_offset=(10.0, -3.25),
         boundary=(0.0, 0.0, 100.0, 50.0),

@@ -133,7 +133,7 @@ def test_roads_that_cross_on_the_ground_stay_there():
     assert {area.level for area in draw(text).areas} == {0}
 
 
-def test_a_crosswalk_has_bars_across_the_walkers_way():
+def test_a_crosswalk_has_bars_across_the_walkers_path():
     drawing = draw(maps.STREET)
     assert ring_areas(drawing.crosswalks) == pytest.approx([28.0])
     areas = ring_areas(drawing.bars)
@@ -153,7 +153,7 @@ def test_repeated_parking_spaces_are_drawn_one_by_one():
     assert centres.tolist() == [[10.0, -5.0], [20.0, -6.0], [30.0, -7.0]]
 
 
-def test_signs_and_lights_stand_where_the_map_puts_them():
+def test_signs_and_lights_are_where_the_map_puts_them():
     symbols = draw(maps.STREET).symbols
     assert [(symbol.kind, symbol.x, symbol.y, symbol.text) for symbol in symbols] == [
         ("speed_limit", 40.0, -5.0, "30"),
@@ -179,12 +179,12 @@ def test_a_very_short_road_is_drawn():
 
 def test_small_gaps_in_a_junction_are_carriageway_and_islands_are_not():
     def square(side):
-        ways = ((-4, 0, 0), (side, -4, 90), (side + 4, side, 180), (0, side + 4, 270))
+        legs = ((-4, 0, 0), (side, -4, 90), (side + 4, side, 180), (0, side + 4, 270))
         parts = [
             maps.road(str(k), x=x, y=y, hdg=np.radians(turn), length=side + 8).replace(
                 'junction="-1"', 'junction="9"'
             )
-            for k, (x, y, turn) in enumerate(ways)
+            for k, (x, y, turn) in enumerate(legs)
         ]
         incoming = maps.road("in", x=-54.0, length=50.0)
         links = '<connection id="0" incomingRoad="in" connectingRoad="0" contactPoint="start"/>'

@@ -20,7 +20,7 @@ def lane(
     before: int | None = None,
     after: int | None = None,
 ) -> str:
-    """A lane of width ``width + slope * ds``; ``change`` rules the mark on its outer border."""
+    """A lane of width ``width + slope * ds``; ``change`` is of the mark on its outer border."""
     links = "".join(
         f'<{word} id="{other}"/>'
         for word, other in (("predecessor", before), ("successor", after))

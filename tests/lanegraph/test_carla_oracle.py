@@ -82,10 +82,10 @@ class Comparison:
             waypoint = self.waypoint(node)
             for target in targets:
                 if self.nodes.lane[node] == self.nodes.lane[target]:
-                    way = abs(self.nodes.s[target] - self.nodes.s[node])
+                    metres = abs(self.nodes.s[target] - self.nodes.s[node])
                 else:
-                    way = self.rest(node, ahead=True) + self.rest(target, ahead=False)
-                found = waypoint.next(float(way))
+                    metres = self.rest(node, ahead=True) + self.rest(target, ahead=False)
+                found = waypoint.next(float(metres))
                 confirmed = any(self.gap(target, other) < 0.05 for other in found)
                 counts["confirmed" if confirmed else "not confirmed"] += 1
         return counts

@@ -57,7 +57,7 @@ def test_a_map_without_limits_or_drivable_lanes_has_none():
     assert statistics.driving_lane_length == 0.0
 
 
-def test_left_hand_traffic_is_told():
+def test_left_hand_traffic_is_reported():
     assert map_statistics(*model(maps.document(maps.road(rule="LHT")))).rule == "LHT"
 
 

@@ -33,7 +33,7 @@ def row_of_roads(lengths: list[float], *, ring: bool = False) -> OpenDrive:
 
 
 def crossing() -> OpenDrive:
-    """Roads 1 and 2 into junction 9 over 90, which goes on to road 3; road 4 lies beyond road 3."""
+    """Roads 1 and 2 into junction 9 over 90, and on to road 3; road 4 lies beyond road 3."""
     return network(
         road("1", ONE, length=250.0, after="junction 9"),
         road(
@@ -99,14 +99,14 @@ def test_roads_that_only_one_side_links_are_neighbours_but_not_joined() -> None:
     assert segments.adjacency.tolist() == [[0, 1]]
 
 
-def test_ids_stay_distinct_when_a_road_is_called_like_a_piece() -> None:
+def test_ids_stay_distinct_when_a_road_is_called_like_a_segment_of_a_chain() -> None:
     odr = network(road("1", ONE, length=200.0), road("1-0", ONE, y=50.0, length=50.0))
     assert build_segments(odr).segments.ids == ("r1-0", "r1-1", "r1-0_")
 
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.floats(1.0, 400.0), min_size=1, max_size=6), st.booleans())
-def test_pieces_are_equal_and_cover_all_roads_once(lengths: list[float], ring: bool) -> None:
+def test_segments_are_equal_and_cover_all_roads_once(lengths: list[float], ring: bool) -> None:
     odr = row_of_roads(lengths, ring=ring and len(lengths) > 2)
     found = build_segments(odr)
     segments = found.segments

@@ -67,7 +67,7 @@ def test_a_path_outside_the_region_is_empty() -> None:
     assert len(shortest_path(FORK, 0, node_index(FORK, "2.0.-1.0"), mask)) == 0
 
 
-def test_the_way_back_is_no_way() -> None:
+def test_the_path_back_is_no_path() -> None:
     assert not reachable(FORK, node_index(FORK, "2.0.-1.0"))[0]
 
 
@@ -131,7 +131,7 @@ def test_a_walk_router_knows_distances() -> None:
 
 @pytest.mark.parametrize("kind", [Router, WalkRouter])
 @pytest.mark.parametrize("graph", [FORK, ring(), two_lane_road(), line_of_segments(4)])
-def test_many_ways_at_once_are_those_found_one_by_one(kind: type, graph: MapGraph) -> None:
+def test_many_paths_at_once_are_those_found_one_by_one(kind: type, graph: MapGraph) -> None:
     router = kind(graph)
     count = len(router.mask)
     sources, targets = np.divmod(np.arange(0, count * count, 7), count)
@@ -150,18 +150,18 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
         assert {goal for goal in reached if router.is_candidate(spawn, goal)} == candidates
 
 
-def test_ways_to_a_node_are_as_long_as_those_from_each_source() -> None:
+def test_paths_to_a_node_are_as_long_as_those_from_each_source() -> None:
     graph = fork()
     router = Router(graph)
     nodes = np.arange(len(graph.lanes.x))
     goal = int(nodes[-1])
-    ways = router.paths_to(goal)
+    there = router.paths_to(goal)
     for source, path, metres in zip(
-        nodes.tolist(), ways.paths(nodes), ways.distance(nodes).tolist(), strict=True
+        nodes.tolist(), there.paths(nodes), there.distance(nodes).tolist(), strict=True
     ):
         assert metres == pytest.approx(float(router.distances(source)[goal]))
         assert len(path) == len(router.path(source, goal))
-        marks, first = ways.stretches(np.array([source]), graph.lanes.segment)
+        marks, first = there.stretches(np.array([source]), graph.lanes.segment)
         if len(path):
             segments = graph.lanes.segment[path]
             changes = np.flatnonzero(np.diff(segments, prepend=-1))

@@ -192,7 +192,7 @@ REFUSED = {
     ),
     "a lane on the wrong side": (
         document(road(lanes=LANES.replace('id="1"', 'id="-2"'))),
-        "lane -2: lane -2 stands in <left>",
+        "lane -2: lane -2 is in <left>",
     ),
     "widths backwards": (
         document(

@@ -34,7 +34,7 @@ const TITLES: [fate: string, title: string][] = [
 const PLAIN: [RegExp, string][] = [
   [/of a connecting road have no SUMO lane: nothing leads there/, "Short pieces of lanes inside junctions are left out, as no lane leads there"],
   [/have no SUMO lane: nothing leads there/, "Short pieces of lanes are left out, as no lane leads there"],
-  [/lanes of type (\w+) are open to nobody and left out/, "Lanes of the kind “$1” are not driven on and are left out"],
+  [/lanes of type (\w+) are open to (?:nobody|no road user) and left out/, "Lanes of the kind “$1” are not driven on and are left out"],
   [/every crossing of a junction with lights has a light/, "Every crosswalk of a junction with traffic lights got a light for pedestrians"],
   [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
   [/traffic lights? have programs of odscen's own/, "The map does not say when its lights turn green: they got a timing of their own, in which no two ways that meet have green"],

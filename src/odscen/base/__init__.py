@@ -1,1 +1,1 @@
-"""What every room stands on: errors, ids, frames, units of time, arrays, whole files and markup."""
+"""What every room builds on: errors, ids, frames, units of time, arrays, whole files and markup."""

@@ -1,6 +1,6 @@
 """SVG and HTML text, escaped by construction.
 
-Map names, actor ids and messages come from files that nobody has vetted. Everything that becomes
+Map names, actor ids and messages come from files that are not vetted. Everything that becomes
 text goes through :func:`element`, which escapes whatever is not already :class:`Markup`; pages are
 put together by templates (:mod:`odscen.results.report.page_templates`) by the same rule.
 """
@@ -84,7 +84,7 @@ def element(name: str, /, *children: object, **attributes: Attribute) -> Markup:
 
 
 def join(parts: list[Markup]) -> Markup:
-    """Pieces of markup, one after the other."""
+    """Parts of markup, one after the other."""
     return Markup("".join(parts))
 
 

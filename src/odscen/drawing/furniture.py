@@ -1,4 +1,4 @@
-"""What stands or is painted on the roads: crosswalks, stop lines, signs, lights, parking spaces."""
+"""What is placed or painted on the roads: crosswalks, stop lines, signs, lights, parking spaces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 BAR, GAP = 0.5, 0.5
-"""Metres painted and left out along the way across a crosswalk."""
+"""Metres painted and left out along the path across a crosswalk."""
 
 _MOST_BARS = 200
 """Per crosswalk: one of hundreds of metres is a mistake in the map, not a reason to stall."""
@@ -74,7 +74,7 @@ def _strokes(ends: Sequence[FloatArray]) -> Lines:
 
 
 def _bars(walks: Sequence[tuple[FloatArray, FloatArray]]) -> Lines:
-    """Bars of all zebra stripes: across the walker's way, cut to the crosswalk's outline."""
+    """Bars of all zebra stripes: across the walker's path, cut to the crosswalk's outline."""
     import shapely
 
     boxes, owners = [], []

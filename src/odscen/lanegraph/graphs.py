@@ -154,12 +154,12 @@ class SegmentPart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """Pieces of the map that a region of interest is made of (requirements R25 to R27).
+    """Parts of the map that a region of interest is made of (requirements R25 to R27).
 
     Attributes
     ----------
     ids
-        ``j<junction>`` for a junction, ``r<road>`` or ``r<road>-<k>`` for the k-th piece of the
+        ``j<junction>`` for a junction, ``r<road>`` or ``r<road>-<k>`` for the k-th part of the
         chain of roads that starts with that road.
     kinds
         ``junction`` or ``road``.

@@ -171,7 +171,7 @@ def _ahead(
 ) -> tuple[IntArray, IntArray]:
     """Planned node nearest to one spacing ahead of s on each lane, as lane (or -1) and k on it.
 
-    Behind the end of a lane the only one that follows it goes on; short lanes are passed.
+    Behind the end of a lane the only one that follows it continues it; short lanes are passed.
     """
     lengths, planned = nodes.lines.lengths, np.diff(nodes.planned)
     gap = np.maximum(lengths / planned, 1e-6)

@@ -16,12 +16,12 @@ NO_PREDECESSOR = -9999
 
 
 class PathsTo:
-    """Shortest ways to one node, found at once; nodes are numbered as the whole map's.
+    """Shortest paths to one node, found at once; nodes are numbered as the whole map's.
 
     Attributes
     ----------
     distances
-        Metres from each node of ``nodes``; inf where no way leads.
+        Metres from each node of ``nodes``; inf where no path leads.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class PathsTo:
         return np.asarray(self.distances[self._local[sources]], dtype=np.float64)
 
     def paths(self, sources: Int32Array) -> list[Int32Array]:
-        """Nodes of the way from each source, both ends included; empty where there is none."""
+        """Nodes of the path from each source, both ends included; empty where there is none."""
         current = self._local[sources]
         steps = [current]
         counts = np.ones(len(sources), dtype=np.intp)
@@ -56,7 +56,7 @@ class PathsTo:
     def stretches(
         self, sources: NDArray[np.integer], marks: Int32Array
     ) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-        """Follow the marks of the nodes along each way, each run of equal ones once.
+        """Follow the marks of the nodes along each path, each run of equal ones once.
 
         Parameters
         ----------
@@ -66,7 +66,7 @@ class PathsTo:
         Returns
         -------
         Marks in the order in which they are met, and the first node with each: two arrays of shape
-        ``(len(sources), most)``, with -1 behind the end of a way.
+        ``(len(sources), most)``, with -1 behind the end of a path.
         """
         after = self._after(marks)
         steps = [self._local[sources]]
@@ -77,7 +77,7 @@ class PathsTo:
         return np.where(table >= 0, marks[nodes], -1), nodes
 
     def _after(self, marks: Int32Array) -> NDArray[np.integer]:
-        """First node on the way from each node of the region that has another mark, or -1."""
+        """First node on the path from each node of the region that has another mark, or -1."""
         mark = marks[self.nodes]
         jump = np.where(self._next == NO_PREDECESSOR, np.arange(len(mark)), self._next)
         # Pointers are doubled: as many rounds as the logarithm of the longest stretch.

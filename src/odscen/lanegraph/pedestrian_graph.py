@@ -1,4 +1,4 @@
-"""The pedestrian graph: places to walk along roads, and the ways between them (requirement R32).
+"""The pedestrian graph: places to walk along roads, and the paths between them (requirement R32).
 
 Walks are the walkable lanes of the map and, where a road with drivable lanes has none on a side,
 a roadside walk beside the outermost lane of that side. Roadside walks are not made along motorways

@@ -1,7 +1,7 @@
-"""Segments: the pieces of a map that a region of interest is made of (requirements R25 to R27).
+"""Segments: the parts of a map that a region of interest is made of (requirements R25 to R27).
 
 Each junction with roads of its own is one segment. Roads that follow each other without a junction
-between them are joined to a chain, and each chain is divided into equal pieces of about
+between them are joined to a chain, and each chain is divided into equal segments of about
 :data:`TARGET_LENGTH`. A junction that owns no roads (direct, or a virtual one without connecting
 roads) has nothing that could be placed in it: the chains that meet there are neighbours directly.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from odscen.opendrive.road_model import ContactPoint, OpenDrive, Road, RoadLink
 
 TARGET_LENGTH = 100.0
-"""Metres; a chain of length L has ``max(1, round(L / TARGET_LENGTH))`` pieces."""
+"""Metres; a chain of length L has ``max(1, round(L / TARGET_LENGTH))`` segments."""
 
 MIN_PART = 1e-3
 """Metres; a shorter stretch of a road is not listed as a part of a segment."""
@@ -44,16 +44,16 @@ class _RoadStep(NamedTuple):
 
 
 class _SegmentSpan(NamedTuple):
-    """Which segments a road lies in: row ``base + floor((start + sign * s) / piece)``."""
+    """Which segments a road lies in: row ``base + floor((start + sign * s) / length)``."""
 
     base: int
     start: float
     sign: float
-    piece: float
+    length: float
     last: int
 
     def row(self, s: float) -> int:
-        return self.base + min(max(int((self.start + self.sign * s) // self.piece), 0), self.last)
+        return self.base + min(max(int((self.start + self.sign * s) // self.length), 0), self.last)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,11 @@ class _RoadChain:
     steps: tuple[_RoadStep, ...]
     closed: bool
     length: float
-    pieces: int
+    count: int
 
     @property
-    def piece_length(self) -> float:
-        return self.length / self.pieces
+    def segment_length(self) -> float:
+        return self.length / self.count
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,21 +73,21 @@ class SegmentMap:
     """The segments, and which of them each place of a road belongs to.
 
     The arrays have one row per road, in the order of the file: place s of that road lies in segment
-    ``base + clip(floor((start + sign * s) / piece), 0, last)``.
+    ``base + clip(floor((start + sign * s) / length), 0, last)``.
     """
 
     segments: Segments
     base: IntArray
     start: FloatArray
     sign: FloatArray
-    piece: FloatArray
+    length: FloatArray
     last: IntArray
 
     def at(self, road: IntArray, s: FloatArray) -> IntArray:
         """Rows of the segments at road coordinates s of the roads in rows ``road``."""
-        position = (self.start[road] + self.sign[road] * s) / self.piece[road]
-        piece = np.clip(np.floor(position), 0, self.last[road]).astype(np.int64)
-        rows: IntArray = self.base[road] + piece
+        position = (self.start[road] + self.sign[road] * s) / self.length[road]
+        segment = np.clip(np.floor(position), 0, self.last[road]).astype(np.int64)
+        rows: IntArray = self.base[road] + segment
         return rows
 
 
@@ -123,7 +123,7 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
         base=np.array([place.base for place in table], dtype=np.int64),
         start=np.array([place.start for place in table], dtype=np.float64),
         sign=np.array([place.sign for place in table], dtype=np.float64),
-        piece=np.array([place.piece for place in table], dtype=np.float64),
+        length=np.array([place.length for place in table], dtype=np.float64),
         last=np.array([place.last for place in table], dtype=np.int64),
     )
 
@@ -141,9 +141,9 @@ class _SegmentRows:
     def add_chain(self, chain: _RoadChain, odr: OpenDrive) -> None:
         self.places.update(_places(chain, odr, base=len(self.ids)))
         name = f"r{chain.steps[0].road}"
-        self.ids += [name] if chain.pieces == 1 else [f"{name}-{k}" for k in range(chain.pieces)]
+        self.ids += [name] if chain.count == 1 else [f"{name}-{k}" for k in range(chain.count)]
         self.parts += _parts(chain, odr)
-        self.lengths += [chain.piece_length] * chain.pieces
+        self.lengths += [chain.segment_length] * chain.count
 
     def add_junction(self, junction: JunctionId, roads: list[Road]) -> None:
         row = len(self.ids)
@@ -199,27 +199,27 @@ def _joints(odr: OpenDrive) -> dict[_RoadEnd, _RoadEnd]:
 
 
 def _chains(odr: OpenDrive, target_length: float) -> list[_RoadChain]:
-    """Maximal chains of ordinary roads: open ones first, then rings, each in file order."""
+    """Maximal chains of ordinary roads: open ones first, then loops, each in file order."""
     joints = _joints(odr)
     ordinary = [road.id for road in odr.roads.values() if road.junction is None]
     seen: set[RoadId] = set()
     chains: list[_RoadChain] = []
-    for rings in (False, True):
+    for closed in (False, True):
         for road in ordinary:
             starts = [_RoadEnd(road, "start"), _RoadEnd(road, "end")]
-            start = next((end for end in starts if rings or end not in joints), None)
+            start = next((end for end in starts if closed or end not in joints), None)
             if road in seen or start is None:
                 continue
             steps = _walk(start, joints)
             seen.update(step.road for step in steps)
             length = sum(odr.roads[step.road].length for step in steps)
-            pieces = max(1, round(length / target_length))
-            chains.append(_RoadChain(tuple(steps), rings, max(length, MIN_PART), pieces))
+            count = max(1, round(length / target_length))
+            chains.append(_RoadChain(tuple(steps), closed, max(length, MIN_PART), count))
     return chains
 
 
 def _walk(start: _RoadEnd, joints: Mapping[_RoadEnd, _RoadEnd]) -> list[_RoadStep]:
-    """Roads met when one enters at ``start`` and goes on to the end or once round the ring."""
+    """Roads met when one enters at ``start`` and continues to the end or once round the loop."""
     steps: list[_RoadStep] = []
     seen: set[RoadId] = set()
     entry: _RoadEnd | None = start
@@ -237,27 +237,27 @@ def _places(
     for step in chain.steps:
         length = odr.roads[step.road].length
         start, sign = (done, 1.0) if step.forward else (done + length, -1.0)
-        yield step.road, _SegmentSpan(base, start, sign, chain.piece_length, chain.pieces - 1)
+        yield step.road, _SegmentSpan(base, start, sign, chain.segment_length, chain.count - 1)
         done += length
 
 
 def _parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
-    """List the stretches of roads in each piece of the chain."""
-    pieces: list[list[SegmentPart]] = [[] for _ in range(chain.pieces)]
+    """List the stretches of roads in each segment of the chain."""
+    found: list[list[SegmentPart]] = [[] for _ in range(chain.count)]
     done = 0.0
     for step in chain.steps:
         length = odr.roads[step.road].length
-        first = min(int(done // chain.piece_length), chain.pieces - 1)
-        last = min(int((done + length) // chain.piece_length), chain.pieces - 1)
-        for piece in range(first, last + 1):
-            low = max(0.0, piece * chain.piece_length - done)
-            high = min(length, (piece + 1) * chain.piece_length - done)
+        first = min(int(done // chain.segment_length), chain.count - 1)
+        last = min(int((done + length) // chain.segment_length), chain.count - 1)
+        for segment in range(first, last + 1):
+            low = max(0.0, segment * chain.segment_length - done)
+            high = min(length, (segment + 1) * chain.segment_length - done)
             if high - low < min(MIN_PART, length / 2):
                 continue
             s_from, s_to = (low, high) if step.forward else (length - high, length - low)
-            pieces[piece].append(SegmentPart(step.road, s_from, s_to))
+            found[segment].append(SegmentPart(step.road, s_from, s_to))
         done += length
-    return [tuple(parts) for parts in pieces]
+    return [tuple(parts) for parts in found]
 
 
 def _inside_chains(
@@ -265,10 +265,10 @@ def _inside_chains(
 ) -> Iterator[tuple[int, int]]:
     for chain in chains:
         base = places[chain.steps[0].road].base
-        for piece in range(chain.pieces - 1):
-            yield base + piece, base + piece + 1
+        for segment in range(chain.count - 1):
+            yield base + segment, base + segment + 1
         if chain.closed:
-            yield base, base + chain.pieces - 1
+            yield base, base + chain.count - 1
 
 
 def _across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int]]:

@@ -80,7 +80,7 @@ class _PathFinder:
         return self.nodes[steps[::-1]].astype(np.int32)
 
     def paths_to(self, target: int) -> PathsTo:
-        """Shortest ways from everywhere to one node, for many sources with the same target."""
+        """Shortest paths from everywhere to one node, for many sources with the same target."""
         distances, nexts = csgraph.dijkstra(
             self._reversed,
             directed=self._directed,
@@ -94,7 +94,7 @@ class _PathFinder:
         return self._matrix.T.tocsr()
 
     def leads(self, sources: Int32Array, targets: Int32Array) -> BoolArray:
-        """Whether a way leads from each source to the target in the same place; shape ``(K,)``.
+        """Whether a path leads from each source to the target in the same place; shape ``(K,)``.
 
         One pass for all, whatever their number. Sources and targets lie in the region.
         """
@@ -111,7 +111,7 @@ class _PathFinder:
         Returns
         -------
         For each source, shape ``(S,)``, a row of the table, shape ``(R, T)``: sources from which
-        the same can be reached share one. Nobody needs a way from a node to itself: it counts.
+        the same can be reached share one. A node counts as reached from itself.
         """
         starts, ends = self._parts[self._local[sources]], self._parts[self._local[targets]]
         parts, rows = np.unique(starts, return_inverse=True)

@@ -86,7 +86,7 @@ class PlanView:
         )
 
     def at(self, road: IntArray, s: FloatArray) -> PlanPoints:
-        """Points at ``s`` of each road; beyond its ends a road goes on straight."""
+        """Points at ``s`` of each road; beyond its ends a road continues straight."""
         row = locate(self.s, self.first, road, s)
         return self.at_rows(row, s - self.s[row])
 

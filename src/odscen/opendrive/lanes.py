@@ -162,7 +162,7 @@ class RoadTable:
     def reference(self, road: IntArray, s: FloatArray) -> ReferencePoints:
         """Points of the reference line of each road (row) at s.
 
-        Beyond the ends of a road it goes on straight, with the height and roll of its end.
+        Beyond the ends of a road it continues straight, with the height and roll of its end.
         """
         road, s = np.asarray(road), np.asarray(s, dtype=np.float64)
         plan = self.plan.at(road, s)

@@ -31,7 +31,7 @@ class Crosswalk:
     Attributes
     ----------
     road, object_id
-        Where it stands in the file; ``object_id`` is unique within the road only.
+        Where it is in the file; ``object_id`` is unique within the road only.
     polygon
         Corners, shape ``(K, 2)``, not closed, counter-clockwise.
     z

@@ -79,7 +79,7 @@ def _connection(element: Element, kind: str, notes: Notes) -> Connection | None:
 
 
 def parse_controller(element: Element, notes: Notes) -> Controller:
-    """One controller with the signals it rules."""
+    """One controller with the signals it controls."""
     controls = [child for child in element if child.tag == "control"]
     return Controller(
         id=required(element, "id"),

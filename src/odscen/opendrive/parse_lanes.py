@@ -124,7 +124,7 @@ _SIDES: Final = {"left": 1, "center": 0, "right": -1}
 def _lane(element: Element, side: str, s0: float, notes: Notes) -> Lane:
     lane_id = integer(element, "id", limit=MAX_LANE_ID)
     if (lane_id > 0) - (lane_id < 0) != _SIDES[side]:
-        raise refusal(element, f"lane {lane_id} stands in <{side}>")
+        raise refusal(element, f"lane {lane_id} is in <{side}>")
     groups = children(element)
     if not READ.issuperset(groups):
         for tag, count in unread(groups, READ).items():

@@ -119,12 +119,12 @@ def _note_lane_links(road: Road, roads: Roads, notes: Notes) -> None:
 
 
 def _note_places(road: Road, notes: Notes) -> None:
-    things: Iterable[tuple[str, str, float]] = (
+    placed: Iterable[tuple[str, str, float]] = (
         *(("object", item.id, item.s) for item in road.objects),
         *(("signal", item.id, item.s) for item in road.signals),
         *(("signalReference", item.id, item.s) for item in road.signal_references),
     )
-    for tag, item_id, s in things:
+    for tag, item_id, s in placed:
         if not -S_TOLERANCE <= s <= road.length + S_TOLERANCE:
             place = f"road {road.id} > {tag} {item_id}"
             detail = f"s={s:.6g} is outside the road of {road.length:.6g} m"

@@ -296,7 +296,7 @@ class Junction:
 
 @dataclass(frozen=True, slots=True)
 class Controller:
-    """One ``<controller>``: the signals it rules, as ``(signal id, control type)``."""
+    """One ``<controller>``: the signals it controls, as ``(signal id, control type)``."""
 
     id: str
     name: str

@@ -171,7 +171,7 @@ class SideLink(NamedTuple):
     Attributes
     ----------
     main, s
-        The lane that goes on, and where; metres.
+        The lane that continues, and where; metres.
     other
         Lane of a connecting road of a virtual junction.
     leaves

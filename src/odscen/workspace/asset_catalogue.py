@@ -41,7 +41,7 @@ class Blueprint:
     body
         Bounding box, metres.
     dimensions_source
-        Key of the file's ``sources`` where the body comes from; ``typical`` if nobody measured it.
+        Key of the file's ``sources`` where the body comes from; ``typical`` if it was not measured.
     """
 
     id: str

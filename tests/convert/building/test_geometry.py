@@ -36,7 +36,7 @@ class Tried:
         self.made = made
         lane, s = made.nodes(types, inside=inside, spacing=1.0)
         places = made.places(lane, s)
-        # A place beside the end of a piece is taken to that end, and says how far that is.
+        # A place beside the end of an interval is taken to that end, and says how far that is.
         on = (places.lane >= 0) & (places.deviation < 1e-6)
         self.share = float(on.mean()) if len(on) else 1.0
         self.lane, self.s = lane[on], s[on]
@@ -108,9 +108,9 @@ def test_lanes_meet_where_they_are_connected(path: Path) -> None:
             continue
         before = made.shapes[f"{link.get('from')}_{link.get('fromLane')}"][-1]
         after = made.shapes[f"{link.get('to')}_{link.get('toLane')}"][0]
-        way = made.shapes[via]
-        assert np.linalg.norm(way[0] - before) < 0.1, via
-        assert np.linalg.norm(way[-1] - after) < 0.1, via
+        shape = made.shapes[via]
+        assert np.linalg.norm(shape[0] - before) < 0.1, via
+        assert np.linalg.norm(shape[-1] - after) < 0.1, via
 
 
 @st.composite

@@ -117,18 +117,18 @@ def test_traffic_keeps_to_the_side_of_the_map(name: str, lefthand: bool) -> None
     made = converted(named(name))
     table = made.network.table
     assert table.lefthand is lefthand
-    for piece in table.pieces:
-        key = table.lane_keys[piece.lane]
+    for interval in table.intervals:
+        key = table.lane_keys[interval.lane]
         if isinstance(key, LaneKey) and kind(made, key) in DRIVABLE_TYPES:
-            assert (piece.s[-1] > piece.s[0]) == ((key.lane > 0) == lefthand)
+            assert (interval.s[-1] > interval.s[0]) == ((key.lane > 0) == lefthand)
 
 
 def test_cars_never_get_onto_sidewalks_or_shoulders() -> None:
     for name in ("carla-2019/Town03", "carla-2020/Town04"):
         made = converted(named(name))
-        for piece in made.network.table.pieces:
-            key = made.network.table.lane_keys[piece.lane]
-            if made.network.table.lane_list[piece.sumo].allows("passenger"):
+        for interval in made.network.table.intervals:
+            key = made.network.table.lane_keys[interval.lane]
+            if made.network.table.lane_list[interval.sumo].allows("passenger"):
                 assert isinstance(key, LaneKey)
                 assert kind(made, key) in DRIVABLE_TYPES
 
@@ -145,9 +145,9 @@ def test_limits_of_the_map_are_those_of_the_network() -> None:
 
 def test_roundabouts_are_known_as_such() -> None:
     made = converted(named("roundabout"))
-    [ring] = made.xml.iter("roundabout")
-    assert ring.get("edges").split() == ["5.0.f", "6.0.f", "7.0.f", "8.0.f"]
-    assert len(ring.get("nodes").split()) == 4
+    [roundabout] = made.xml.iter("roundabout")
+    assert roundabout.get("edges").split() == ["5.0.f", "6.0.f", "7.0.f", "8.0.f"]
+    assert len(roundabout.get("nodes").split()) == 4
     assert made.network.report.figures["roundabouts"] == 1
 
 
@@ -166,8 +166,10 @@ def test_a_map_without_roads_for_cars_has_a_network_for_persons() -> None:
 
 def test_what_has_no_place_in_sumo_is_in_the_report() -> None:
     report = converted(named("carla-2020/Town01")).network.report
-    assert any(e.fate is ElementOutcome.LOST and "shoulder" in e.reason for e in report.entries)
-    assert any(e.fate is ElementOutcome.GUESSED and "no timing" in e.reason for e in report.entries)
+    assert any(e.outcome is ElementOutcome.LOST and "shoulder" in e.reason for e in report.entries)
+    assert any(
+        e.outcome is ElementOutcome.GUESSED and "no timing" in e.reason for e in report.entries
+    )
     assert report.figures["traffic_lights"] == 12
     assert report.figures["connections"] >= 88
     assert report.figures["connections_lost"] == 0
@@ -175,7 +177,7 @@ def test_what_has_no_place_in_sumo_is_in_the_report() -> None:
 
 def test_what_the_parser_repaired_is_in_the_report() -> None:
     report = converted(named("esmini/soderleden")).network.report
-    assert ElementOutcome.REPAIRED in {entry.fate for entry in report.entries}
+    assert ElementOutcome.REPAIRED in {entry.outcome for entry in report.entries}
 
 
 def test_build_network_needs_nothing_but_the_model() -> None:

@@ -25,10 +25,10 @@ def stripped(*what: re.Pattern[str]) -> Converted:
 
 
 def waits(made: Converted, one: tuple[str, str], other: tuple[str, str]) -> bool:
-    """Whether the way between two roads waits for another one; one of both does."""
+    """Whether the connection between two roads waits for another one; one of both does."""
     links = [link for link in made.xml.iter("connection") if link.get("via")]
     roads = [(link.get("from").split(".")[0], link.get("to").split(".")[0]) for link in links]
-    via, via2 = (links[roads.index(way)].get("via") for way in (one, other))
+    via, via2 = (links[roads.index(pair)].get("via") for pair in (one, other))
     for junction in made.xml.iter("junction"):
         inner = junction.get("intLanes").split()
         if via in inner:
@@ -48,7 +48,7 @@ YIELDS = [
     (("3", "2"), ("1", "3")),
     (("3", "1"), ("2", "1")),
 ]
-"""Ways from the side streets, and those on the main road that they let pass."""
+"""Connections from the side streets, and those on the main road that they let pass."""
 
 
 @pytest.mark.parametrize(("side", "main"), YIELDS)

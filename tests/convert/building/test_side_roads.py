@@ -1,4 +1,4 @@
-"""Virtual junctions: side roads that turn off a road which goes on (section 12.6)."""
+"""Virtual junctions: side roads that turn off a road which continues (section 12.6)."""
 
 import hashlib
 import math

@@ -47,7 +47,7 @@ def test_traffic_against_s_has_falling_s_on_growing_positions() -> None:
     assert near.pos < far.pos
 
 
-def test_a_place_just_beside_a_piece_is_taken_to_its_end_and_says_how_far_that_is() -> None:
+def test_a_place_just_beside_an_interval_is_taken_to_its_end_and_says_how_far_that_is() -> None:
     place = TABLE.to_sumo(DRIVE, 99.2)
     assert place is not None
     assert (place.lane, place.pos) == ("b_0", 50.0)
@@ -71,7 +71,7 @@ def test_where_there_is_no_sumo_lane_there_is_no_place(key: LaneKey, s: float) -
 def test_where_there_is_no_opendrive_lane_there_is_no_place() -> None:
     assert TABLE.to_xodr(SumoLaneId(":k_w_0"), 1.0) is None
     assert TABLE.to_xodr(SumoLaneId("w_0"), 1.0) is None
-    assert TABLE.to_xodr(SumoLaneId("nobody"), 1.0) is None
+    assert TABLE.to_xodr(SumoLaneId("nowhere"), 1.0) is None
 
 
 def test_many_places_are_what_single_ones_are() -> None:
@@ -105,7 +105,7 @@ def test_the_json_form_gives_the_table_back() -> None:
     assert back.lights == TABLE.lights
     assert (back.net_offset, back.boundary) == (TABLE.net_offset, TABLE.boundary)
     assert (back.lefthand, back.elevation, back.counts) == (False, True, TABLE.counts)
-    for one, other in zip(back.pieces, TABLE.pieces, strict=True):
+    for one, other in zip(back.intervals, TABLE.intervals, strict=True):
         np.testing.assert_array_equal(one.s, other.s)
         np.testing.assert_array_equal(one.pos, other.pos)
 

@@ -18,7 +18,7 @@ def test_an_entry_is_listed_once() -> None:
     assert [entry.element for entry in REPORT.entries] == ["road 1", "map"]
 
 
-def test_counts_name_every_fate() -> None:
+def test_counts_name_every_outcome() -> None:
     assert REPORT.counts() == {"kept": 0, "repaired": 0, "guessed": 1, "lost": 1}
 
 

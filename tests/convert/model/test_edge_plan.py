@@ -213,7 +213,7 @@ def connecting(name: str, *, length: float = 20.0, curvature: float = 0.0, hdg: 
     )  # fmt: skip
 
 
-def test_of_two_ways_between_the_same_lanes_the_shorter_is_taken_and_the_other_told() -> None:
+def test_of_two_connections_between_two_lanes_the_shorter_is_taken_the_other_reported() -> None:
     # An arc of the same chord: radius 20 m, 60 degrees.
     detour = connecting("10", length=20.944, curvature=0.05, hdg=-np.pi / 6)
     found = fork(detour, connecting("11"))
@@ -222,7 +222,7 @@ def test_of_two_ways_between_the_same_lanes_the_shorter_is_taken_and_the_other_t
     assert float(inner[0].get("length")) == pytest.approx(20.0)
     entries = found.network.report.entries
     assert any(
-        entry.fate is ElementOutcome.LOST and "shortest" in entry.reason for entry in entries
+        entry.outcome is ElementOutcome.LOST and "shortest" in entry.reason for entry in entries
     )
     assert found.network.report.figures["connections_lost"] == 1
 
@@ -258,8 +258,8 @@ def test_junctions_with_nothing_but_connecting_roads_between_are_one() -> None:
         junction("9", ("10", "11", "start")),
     )
     assert links(found) == {("1.0.f_0", "2.0.f_0")}
-    [way] = found.edges("internal").values()
-    assert float(way[0].get("length")) == pytest.approx(40.0)
+    [internal] = found.edges("internal").values()
+    assert float(internal[0].get("length")) == pytest.approx(40.0)
     [shared] = [j for j in found.xml.iter("junction") if j.findall("request")]
     assert shared.find("param[@key='opendrive']").get("value") == "8 9"
 

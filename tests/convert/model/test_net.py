@@ -33,7 +33,7 @@ def lane(name: str, *points: tuple[float, float, float], **more: object) -> NetL
 
 
 STREET = lane("a_0", (0.0, 0.0, 0.0), (10.0, 0.0, 0.0), change_left=False, xodr=("7_-1", "8_-1"))
-WAY = lane(":j_0_0", (10.0, 0.0, 0.0), (12.0, 0.0, 0.0))
+INNER = lane(":j_0_0", (10.0, 0.0, 0.0), (12.0, 0.0, 0.0))
 
 
 def net(
@@ -45,12 +45,12 @@ def net(
     lefthand: bool = False,
 ) -> Net:
     street = NetEdge(SumoEdgeId("a"), NORMAL, (STREET,), "i", "j", 'Rue "A" & <B>')
-    inner = NetEdge(SumoEdgeId(":j_0"), INTERNAL, (WAY,))
+    inner = NetEdge(SumoEdgeId(":j_0"), INTERNAL, (INNER,))
     return Net(
         (100.0, -5.0),
         lefthand,
         (street, inner, *edges),
-        (NetLink(SumoEdgeId("a"), SumoEdgeId("b"), 0, 1, WAY.id, "l", "m", "j", 3),),
+        (NetLink(SumoEdgeId("a"), SumoEdgeId("b"), 0, 1, INNER.id, "l", "m", "j", 3),),
         junctions,
         lights,
         flat=flat,
@@ -97,7 +97,7 @@ def test_edges_inside_junctions_come_first_as_sumo_wants_them() -> None:
     assert [edge.get("id") for edge in text(net()).iter("edge")] == [":j_0", "a"]
 
 
-def test_a_connection_names_its_lanes_its_way_and_its_light() -> None:
+def test_a_connection_names_its_lanes_its_internal_lane_and_its_light() -> None:
     assert text(net()).find("connection").attrib == {
         "from": "a", "to": "b", "fromLane": "0", "toLane": "1", "via": ":j_0_0", "tl": "j",
         "linkIndex": "3", "dir": "l", "state": "m",
@@ -111,7 +111,7 @@ def test_the_last_letter_of_a_response_is_the_first_link() -> None:
         Request(frozenset({0}), frozenset({0})),
     )
     junction = NetJunction(
-        "j", "priority", (10.0, 0.0, 0.0), np.zeros((3, 3)), (STREET.id,), (WAY.id,), requests
+        "j", "priority", (10.0, 0.0, 0.0), np.zeros((3, 3)), (STREET.id,), (INNER.id,), requests
     )
     rows = text(net(junctions=(junction,))).findall("junction/request")
     assert [row.get("response") for row in rows] == ["000", "001", "001"]

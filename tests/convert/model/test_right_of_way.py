@@ -1,4 +1,4 @@
-"""Who lets whom go first, told by hand-made movements over a junction around (0, 0)."""
+"""Who lets whom go first, shown by hand-made movements over a junction around (0, 0)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def movement(
     come: float, go: float, *, rules: Rules = RIGHT, name: str = "", speed: float = 13.9,
     **more: object,
 ) -> Movement:  # fmt: skip
-    """A way in by heading ``come`` and out by heading ``go``, 2 m beside the axes."""
+    """A movement in by heading ``come`` and out by heading ``go``, 2 m beside the axes."""
     side = 2.0 if rules.lefthand else -2.0
 
     def place(heading: float, ahead: float) -> np.ndarray:
@@ -49,7 +49,7 @@ def movement(
         "target": (f"out{round(math.degrees(go))}", 0),
         "width": 3.5,
         "sign": Sign.NONE,
-        "ring": False,
+        "in_roundabout": False,
         "roads": frozenset[str](),
     }
     return Movement(
@@ -118,7 +118,7 @@ def test_priorities_of_the_junction_come_before_right_before_left_and_after_sign
 
 
 def test_what_is_in_the_roundabout_goes_before_what_comes_from_outside() -> None:
-    inside, outside = movement(EAST, EAST, ring=True), movement(NORTH, EAST)
+    inside, outside = movement(EAST, EAST, in_roundabout=True), movement(NORTH, EAST)
     assert waits(outside, inside)
     assert not waits(replace(inside, sign=Sign.YIELD), outside)
 
@@ -157,7 +157,7 @@ def test_some_never_meet(pair: tuple[Movement, Movement]) -> None:
     assert find_conflicts(pair, []).pairs == ()
 
 
-def test_what_runs_over_a_bridge_meets_nobody_below() -> None:
+def test_what_runs_over_a_bridge_meets_no_vehicle_below() -> None:
     above = movement(NORTH, NORTH)
     above = replace(above, shape=above.shape + np.array([0.0, 0.0, 6.0]))
     assert find_conflicts([movement(EAST, EAST), above], []).pairs == ()
@@ -181,7 +181,7 @@ movements = st.builds(
     name=st.sampled_from(["", "x"]),
     speed=st.floats(3.0, 40.0),
     sign=st.sampled_from(Sign),
-    ring=st.booleans(),
+    in_roundabout=st.booleans(),
     roads=st.frozensets(st.sampled_from("abc"), max_size=1),
 )
 crossings = st.builds(

@@ -1,4 +1,4 @@
-"""Signal programs: nobody who would meet has green together, everybody gets it in time."""
+"""Signal programs: movements that meet never have green together, each gets it in time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ GOING = frozenset("Ggy")
 Foes = frozenset[tuple[int, int]]
 
 
-def car(link: int, *, speed: float = 13.89, way: float = 20.0, controller: str = "") -> SignalGroup:
-    return SignalGroup((link,), controller, walkers=False, speed=speed, way=way)
+def car(
+    link: int, *, speed: float = 13.89, path: float = 20.0, controller: str = ""
+) -> SignalGroup:
+    return SignalGroup((link,), controller, walkers=False, speed=speed, path=path)
 
 
-def walk(link: int, *, way: float = 12.0) -> SignalGroup:
-    return SignalGroup((link,), "", walkers=True, speed=0.0, way=way)
+def walk(link: int, *, path: float = 12.0) -> SignalGroup:
+    return SignalGroup((link,), "", walkers=True, speed=0.0, path=path)
 
 
 def phases_of(groups: list[SignalGroup], foes: Foes) -> tuple[Phase, ...]:
@@ -41,12 +43,12 @@ def junctions(draw: st.DrawFn) -> tuple[list[SignalGroup], Foes]:
         car(
             n,
             speed=draw(st.sampled_from([5.0, 8.33, 13.89, 16.67, 19.44, 27.78])),
-            way=draw(st.floats(5.0, 60.0)),
+            path=draw(st.floats(5.0, 60.0)),
             controller=draw(st.sampled_from(["", "a", "b"])),
         )
         for n in range(cars)
     ]
-    groups += [walk(cars + n, way=draw(st.floats(3.0, 25.0))) for n in range(walks)]
+    groups += [walk(cars + n, path=draw(st.floats(3.0, 25.0))) for n in range(walks)]
     pairs = [(i, j) for i, j in combinations(range(cars + walks), 2) if i < cars]
     return groups, draw(st.frozensets(st.sampled_from(pairs))) if pairs else frozenset()
 
@@ -77,7 +79,7 @@ def test_no_two_that_meet_may_go_at_a_time(junction: tuple[list[SignalGroup], Fo
 
 
 @given(junctions())
-def test_everybody_has_green_and_red_but_who_meets_nobody(
+def test_every_group_has_green_and_red_unless_it_meets_no_other(
     junction: tuple[list[SignalGroup], Foes],
 ) -> None:
     groups, foes = junction
@@ -114,9 +116,9 @@ def test_between_two_greens_the_junction_is_cleared(
 def cleared_after(group: SignalGroup) -> float:
     """Seconds after green until the last one has left; the others need one of them to start."""
     if group.walkers:
-        return group.way / 1.2
-    way = (group.way + 6.0) / min(group.speed, 14.0) - 1.0
-    return group.yellow + min(max(way, 1.0), 8.0)
+        return group.path / 1.2
+    seconds = (group.path + 6.0) / min(group.speed, 14.0) - 1.0
+    return group.yellow + min(max(seconds, 1.0), 8.0)
 
 
 @given(junctions())
@@ -146,7 +148,7 @@ def test_yellow_grows_with_the_limit(kmh: float, seconds: float) -> None:
 
 
 def test_persons_who_started_last_get_over_the_road() -> None:
-    phases = phases_of([car(0), walk(1, way=12.0)], frozenset({(0, 1)}))
+    phases = phases_of([car(0), walk(1, path=12.0)], frozenset({(0, 1)}))
     assert min(gaps(letters(phases, 1), letters(phases, 0))) >= 10, "12 m at 1.2 m/s"
 
 
@@ -232,7 +234,7 @@ def test_every_light_of_the_map_is_behind_a_link_or_reported_lost(path: Path) ->
     lost = {
         e.element.rsplit(" ", 1)[1]
         for e in report
-        if e.fate is ElementOutcome.LOST and "> sig" in e[1]
+        if e.outcome is ElementOutcome.LOST and "> sig" in e[1]
     }
     values = [entry.get("value") for entry in made.xml.iterfind("tlLogic/param")]
     assert {signal for value in values for signal in value.split()} == lights - lost

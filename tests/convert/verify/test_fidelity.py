@@ -194,7 +194,7 @@ def test_a_map_without_drivable_lanes_and_a_network_without_any_can_be_compared(
     }
 
 
-def test_traffic_on_the_wrong_side_is_told():
+def test_traffic_on_the_wrong_side_is_reported():
     assert broken(found(replace(HandNet(), left_hand=True))) == {"wrong side of the road"}
 
 

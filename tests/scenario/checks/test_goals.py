@@ -77,7 +77,7 @@ def test_a_flow_has_all_candidates_or_the_goal_given() -> None:
     assert flow_goals(given, GRAPH)["flow-1"].tolist() == [node_index(GRAPH, "3.0.-1.29")]
 
 
-def test_streams_are_told_apart_by_their_names() -> None:
+def test_random_streams_differ_by_their_names() -> None:
     draws = {tuple(stream(1, *names).integers(1000, size=4)) for names in ("a", "b", ("a", "b"))}
     assert len(draws) == 3
     assert np.array_equal(stream(5, "x").random(3), stream(5, "x").random(3))

@@ -135,7 +135,7 @@ def test_names_are_shared_with_actors_and_flows() -> None:
         demand_edits.set_matrix(one, GRAPH, matrix="rush", trips=[("r1", "r2", 1)])
 
 
-def test_turns_that_add_up_to_more_than_their_stream_are_named() -> None:
+def test_turns_that_add_up_to_more_than_their_flow_are_named() -> None:
     survey = counts(("r1>j9", 0, 900, 50), ("r1>j9>r2", 0, 900, 40), ("r1>j9>r3", 0, 900, 30))
     found = list(contradictions(survey, GRAPH))
     assert [(one.places, one.begin) for one in found] == [(("r1>j9", "r1>j9>r2", "r1>j9>r3"), 0.0)]
@@ -148,7 +148,7 @@ def test_turns_that_add_up_to_more_than_their_stream_are_named() -> None:
 def test_a_junction_that_more_enter_than_leave_is_named() -> None:
     survey = counts(("r1>j9", 0, 900, 90), ("j9>r2", 0, 900, 40), ("j9>r3", 0, 900, 20))
     messages = [one.message for one in contradictions(survey, GRAPH)]
-    assert messages == ["90 were counted on all ways into j9, but 60 on all ways out"]
+    assert messages == ["90 were counted on all entries of j9, but 60 on all exits"]
 
 
 def test_counts_a_few_vehicles_apart_do_not_contradict_each_other() -> None:
@@ -162,7 +162,7 @@ def test_geh_is_that_of_the_textbook() -> None:
     assert geh(0, 0, 900) == 0.0
 
 
-def test_a_way_passes_streams_turns_and_segments() -> None:
+def test_a_route_passes_flows_turns_and_segments() -> None:
     passing = Passing(GRAPH, ["r1>j9>r2", "r2", "r1>j9", "r1>j9>r3", "nowhere"])
     row = {name: index for index, name in enumerate(GRAPH.segments.ids)}
     passed = passing.of([row["r1"], row["j9"], row["r2"]])

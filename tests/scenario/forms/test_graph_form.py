@@ -24,14 +24,14 @@ NODES = [*node_ids(GRAPH), *walk_node_ids(GRAPH)]
 def placed(draw: st.DrawFn) -> Scenario:
     """A scenario on distinct spawn nodes with distinct ids; not necessarily one that runs."""
     people = draw(st.lists(actors, max_size=5, unique_by=lambda actor: actor.id))
-    streams = draw(st.lists(flows, max_size=3, unique_by=lambda flow: flow.id))
-    streams = [flow for flow in streams if flow.id not in {one.id for one in people}]
-    count = len(people) + len(streams)
+    moving = draw(st.lists(flows, max_size=3, unique_by=lambda flow: flow.id))
+    moving = [flow for flow in moving if flow.id not in {one.id for one in people}]
+    count = len(people) + len(moving)
     spawns = draw(st.lists(st.sampled_from(NODES), min_size=count, max_size=count, unique=True))
     goals = draw(st.lists(st.none() | st.sampled_from(NODES), min_size=count, max_size=count))
     ones: list[Any] = [
         one.model_copy(update={"spawn": spawn, "goal": goal})
-        for one, spawn, goal in zip([*people, *streams], spawns, goals, strict=True)
+        for one, spawn, goal in zip([*people, *moving], spawns, goals, strict=True)
     ]
     return Scenario(
         name=draw(labels),

@@ -74,7 +74,7 @@ def test_a_lateral_offset_is_to_the_left_of_the_driving_direction() -> None:
 
 def test_a_lane_of_known_length_takes_a_known_number_of_cars() -> None:
     # 100 m, nodes every 2 m from 1 m on; 5 m and 3 m gap make one car every 8 m. The first whose
-    # body is on the lane with whole nodes to spare stands at 7 m, the last at or before 93 m.
+    # body is on the lane with whole nodes to spare is at 7 m, the last at or before 93 m.
     graph = two_lane_road().lanes
     room = standing_room(graph, CAR[Category.CAR], allowed=np.ones(100, dtype=bool))
     assert np.flatnonzero(room[:50]).tolist() == list(range(2, 48))
@@ -107,7 +107,7 @@ def test_a_mixed_crowd_keeps_the_shares() -> None:
 
 
 @pytest.mark.parametrize(("radius", "fits"), [(61.0, False), (64.0, True)])
-def test_a_body_stands_in_a_curve_only_if_its_middle_stays_on_the_lane(
+def test_a_body_fits_in_a_curve_only_if_its_middle_stays_on_the_lane(
     radius: float, *, fits: bool
 ) -> None:
     # 5^2 / (8 R) <= 0.05 m needs R >= 62.5 m.
@@ -130,10 +130,10 @@ def test_a_lane_narrower_than_the_body_has_no_room() -> None:
     assert not standing_room(graph, wide, allowed=np.ones(100, dtype=bool)).any()
 
 
-def test_the_way_to_the_nearest_end_follows_the_lanes() -> None:
+def test_the_path_to_the_nearest_end_follows_the_lanes() -> None:
     graph = fork().lanes
     ends = np.array([len(graph.x) - 1])
-    way = distance_to_end(ends, graph, np.ones(len(graph.x), dtype=bool))
+    to_end = distance_to_end(ends, graph, np.ones(len(graph.x), dtype=bool))
     # From the first node of road 1 to the last of road 3: 99 m, the quarter circle, 59 m.
-    assert way[0] == pytest.approx(99 + 12 * radians(90) + 59, abs=0.2)
-    assert np.isinf(way[50])
+    assert to_end[0] == pytest.approx(99 + 12 * radians(90) + 59, abs=0.2)
+    assert np.isinf(to_end[50])

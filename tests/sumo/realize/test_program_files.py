@@ -284,5 +284,5 @@ def test_a_run_has_the_file_only_where_the_scenario_changes_something(tmp_path: 
 def test_timing_that_is_not_possible_is_refused_before_anything_is_written() -> None:
     timing = {"junction": "nowhere", "green": [1]}
     wrong = Signals.model_validate({"junctions": [timing]})
-    with pytest.raises(ScenarioError, match="no traffic light stands in junction 'nowhere'"):
+    with pytest.raises(ScenarioError, match="there is no traffic light in junction 'nowhere'"):
         realize(from_one_side().model_copy(update={"signals": wrong}), crossing().sumo)

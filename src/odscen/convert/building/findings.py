@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.connections import PlannedConnections
     from odscen.convert.model.net import Net
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
-    from odscen.convert.signals.map_signals import Ruled
+    from odscen.convert.signals.map_signals import SignalControl
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
 
@@ -46,7 +46,7 @@ def findings(
     net: Net,
     lanes: LaneTable,
     found: PlannedConnections,
-    ruled: Ruled,
+    control: SignalControl,
     crosswalks: Sequence[PlacedCrosswalk],
 ) -> Findings:
     """Say what became of each element."""
@@ -55,25 +55,25 @@ def findings(
         *_varying(table, lanes),
         *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
         *_crosswalks(odr, crosswalks),
-        *_signals(odr, net, ruled),
+        *_signals(odr, net, control),
     ]
     lengths = _lengths(odr, table, lanes)
     figures = {
         **lengths,
-        "connections": float(len(found.ways)),
+        "connections": float(len(found.connections)),
         "connections_lost": float(len(found.lost)),
         "crosswalks": float(len(crosswalks)),
         "crossings": float(net.counts()["crossings"]),
         "traffic_lights": float(len(net.lights)),
         "signals": float(sum(len(road.signals) for road in odr.roads.values())),
-        "signals_unplaced": float(len(ruled.unplaced)),
+        "signals_unplaced": float(len(control.unplaced)),
         "roundabouts": float(len(net.roundabouts)),
     }
     return Findings((*_kept(lengths, found), *entries), figures)
 
 
 def _kept(lengths: Mapping[str, float], found: PlannedConnections) -> Iterator[ReportEntry]:
-    """One line for each kind of thing of which there are thousands."""
+    """One line for each kind of element of which there are thousands."""
     for name, length in lengths.items():
         if name.endswith("_length") and length > 0.0:
             covered = lengths[name.replace("_length", "_covered")]
@@ -82,9 +82,9 @@ def _kept(lengths: Mapping[str, float], found: PlannedConnections) -> Iterator[R
             yield ReportEntry(
                 ElementOutcome.KEPT, "junctions" if where == "junction" else "roads", reason
             )
-    if found.ways:
+    if found.connections:
         yield ReportEntry(
-            ElementOutcome.KEPT, "map", f"{len(found.ways)} connections between lanes"
+            ElementOutcome.KEPT, "map", f"{len(found.connections)} connections between lanes"
         )
 
 
@@ -115,7 +115,7 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
                 )
                 yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
         elif kind not in ("none", ""):
-            reason = f"lanes of type {kind} are open to nobody and left out"
+            reason = f"lanes of type {kind} are open to no road user and left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
 
 
@@ -137,17 +137,20 @@ def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, fl
 
 
 def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
-    """SUMO lanes have one width; tell of lanes that differ from it."""
+    """SUMO lanes have one width; report lanes that differ from it."""
     sumo = lanes.lane_list
-    for piece in lanes.pieces:
-        key = lanes.lane_keys[piece.lane]
-        width = sumo[piece.sumo].width
-        if not isinstance(key, LaneKey) or lanes.edges[sumo[piece.sumo].edge].function != "normal":
+    for interval in lanes.intervals:
+        key = lanes.lane_keys[interval.lane]
+        width = sumo[interval.sumo].width
+        if (
+            not isinstance(key, LaneKey)
+            or lanes.edges[sumo[interval.sumo].edge].function != "normal"
+        ):
             continue
         row = table.lane_index[key]
         if table.lane_type[row] not in DRIVABLE_TYPES:
             continue
-        s = np.linspace(piece.s[0], piece.s[-1], 9)
+        s = np.linspace(interval.s[0], interval.s[-1], 9)
         true = table.lane_width(np.full(9, row), s)
         low, high = float(true.min()), float(true.max())
         if high - width > VARYING or width - low > VARYING:
@@ -158,11 +161,11 @@ def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
 def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[ReportEntry]:
     kept = {(one.crosswalk.road, one.crosswalk.object_id) for one in placed}
     for road in odr.roads.values():
-        for thing in road.objects:
-            if not is_crosswalk(thing):
+        for item in road.objects:
+            if not is_crosswalk(item):
                 continue
-            element = f"road {road.id} > object {thing.id}"
-            if (road.id, thing.id) in kept:
+            element = f"road {road.id} > object {item.id}"
+            if (road.id, item.id) in kept:
                 yield ReportEntry(
                     ElementOutcome.KEPT, element, "crosswalk, as a crossing of its place and width"
                 )
@@ -170,8 +173,8 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
                 yield ReportEntry(ElementOutcome.LOST, element, "crosswalk without any size")
 
 
-def _signals(odr: OpenDrive, net: Net, ruled: Ruled) -> Iterator[ReportEntry]:
-    unplaced = dict(ruled.unplaced)
+def _signals(odr: OpenDrive, net: Net, control: SignalControl) -> Iterator[ReportEntry]:
+    unplaced = dict(control.unplaced)
     for road in odr.roads.values():
         for signal in road.signals:
             element = f"road {road.id} > signal {signal.id}"
@@ -182,9 +185,7 @@ def _signals(odr: OpenDrive, net: Net, ruled: Ruled) -> Iterator[ReportEntry]:
                 word = kind.replace("_", " ")
                 yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
             elif kind == "pedestrian_light":
-                reason = (
-                    "every crossing of a junction with lights has a light, wherever poles stand"
-                )
+                reason = "every crossing of a junction with lights has a light, wherever poles are"
                 yield ReportEntry(ElementOutcome.GUESSED, element, reason)
     if net.lights:
         reason = (

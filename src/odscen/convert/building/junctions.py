@@ -47,7 +47,7 @@ _AROUND = math.radians(150.0)
 class Passage:
     """A movement with all that its internal lane needs.
 
-    ``lights`` are the OpenDRIVE signals that rule it.
+    ``lights`` are the OpenDRIVE signals that control it.
     """
 
     movement: Movement
@@ -287,13 +287,15 @@ def _light(
     controllers: Mapping[str, str],
 ) -> tuple[TrafficLight, dict[int, int]]:
     """Traffic light of a junction, and the row in it of each link that it rules."""
-    ruled = [n for n, passage in enumerate(passages) if passage.lights]
+    controlled = [n for n, passage in enumerate(passages) if passage.lights]
     count = len(passages)
-    rows = {link: row for row, link in enumerate((*ruled, *range(count, count + len(crossings))))}
+    rows = {
+        link: row for row, link in enumerate((*controlled, *range(count, count + len(crossings))))
+    }
     foes = set(conflicts.pairs)
     foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
     heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
-    for lane in _lanes_of(passages, ruled):
+    for lane in _lanes_of(passages, controlled):
         # Who waits for the green of one lane must not be held up by those who wait for another.
         key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
         own = heads.setdefault(key, [])
@@ -312,14 +314,14 @@ def _light(
                     controllers.get(lights[0], ""),
                     walkers=False,
                     speed=max(passages[n].movement.speed for n in links),
-                    way=max(passages[n].length for n in links),
+                    path=max(passages[n].length for n in links),
                 )
             )
             members.append(links)
     for index, crossing in enumerate(crossings):
         link = count + index
         length = crossing.edge.length
-        groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0, way=length))
+        groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0, path=length))
         members.append([link])
     meeting = frozenset(
         (i, j)
@@ -332,10 +334,10 @@ def _light(
     return TrafficLight(name, phases, signals=signals), rows
 
 
-def _lanes_of(passages: Sequence[Passage], ruled: Sequence[int]) -> list[list[int]]:
-    """Links by the lane that they leave and the signals that rule them, in order."""
+def _lanes_of(passages: Sequence[Passage], controlled: Sequence[int]) -> list[list[int]]:
+    """Links by the lane that they leave and the signals that control them, in order."""
     found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
-    for link in ruled:
+    for link in controlled:
         passage = passages[link]
         found.setdefault((passage.movement.source, passage.lights), []).append(link)
     return list(found.values())

@@ -16,10 +16,10 @@ from odscen.base.ids import SumoEdgeId
 from odscen.convert.building.findings import findings
 from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.building.nodes import find_nodes, plain_ids
-from odscen.convert.building.roundabouts import find_rings
+from odscen.convert.building.roundabouts import find_roundabouts
 from odscen.convert.lane_table.table_build import build_table
 from odscen.convert.model.access import speed as lane_speed
-from odscen.convert.model.connections import find_ways
+from odscen.convert.model.connections import find_connections
 from odscen.convert.model.conversion_report import ConversionReport, ElementOutcome, ReportEntry
 from odscen.convert.model.edge_plan import plan_edges
 from odscen.convert.model.lane_alignment import evaluate
@@ -29,7 +29,7 @@ from odscen.convert.model.right_of_way import Movement, wrapped
 from odscen.convert.model.road_gaps import merge_gaps, side_gaps
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
 from odscen.convert.pedestrian.pedestrian_network import build_walks
-from odscen.convert.signals.map_signals import rule
+from odscen.convert.signals.map_signals import signal_control
 from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from odscen.convert.building.nodes import Nodes
     from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.model.connections import PlannedConnection, PlannedConnections
-    from odscen.convert.model.lane_alignment import Course, Line
+    from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.model.walk_net import WalkNet
-    from odscen.convert.signals.map_signals import Ruled
+    from odscen.convert.signals.map_signals import SignalControl
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
@@ -80,13 +80,13 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     crosswalks, under = place_crosswalks(odr, table)
     gaps = merge_gaps(odr, under, side_gaps(sides))
     plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
-    found = find_ways(table, successors, plans, sides)
+    found = find_connections(table, successors, plans, sides)
     nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
     on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
     builder = _NetworkBuilder(odr, table, found, nodes, on_foot, lefthand=lefthand)
     net = builder.net()
     lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
-    entries, figures = findings(odr, table, net, lanes, found, builder.ruled, crosswalks)
+    entries, figures = findings(odr, table, net, lanes, found, builder.control, crosswalks)
     notes = [ReportEntry(ElementOutcome.REPAIRED, *_split(note)) for note in odr.notes]
     report = ConversionReport.of([*notes, *entries], figures)
     return SumoNetwork(net.to_xml(), lanes, report)
@@ -121,27 +121,35 @@ class _NetworkBuilder:
         self._odr = odr
         self._table = table
         self._edges = found.edges
-        self._ways = found.ways
+        self._connections = found.connections
         self._nodes = nodes
         self._walks = walks
         self._lefthand = lefthand
-        courses = [lane.course for edge in self._edges for lane in edge.lanes]
-        lines = evaluate([*courses, *(way.course for way in self._ways)], table)
+        alignments = [lane.alignment for edge in self._edges for lane in edge.lanes]
+        lines = evaluate(
+            [*alignments, *(connection.alignment for connection in self._connections)], table
+        )
         self._lane_lines: list[list[Line]] = []
         start = 0
         for edge in self._edges:
             self._lane_lines.append(lines[start : start + len(edge.lanes)])
             start += len(edge.lanes)
-        self._way_lines = lines[start:]
+        self._connection_lines = lines[start:]
         self._ids = self._edge_ids()
         self._net_edges = [self._edge(number) for number in range(len(self._edges))]
         self._by_node: dict[str, list[int]] = {}
-        for number, way in enumerate(self._ways):
-            self._by_node.setdefault(nodes.ends[way.source], []).append(number)
-        self._rings = find_rings(
-            self._edges, self._ways, self._lane_lines, self._way_lines, lefthand=lefthand
+        for number, connection in enumerate(self._connections):
+            self._by_node.setdefault(nodes.ends[connection.source], []).append(number)
+        self._roundabout_edges = find_roundabouts(
+            self._edges,
+            self._connections,
+            self._lane_lines,
+            self._connection_lines,
+            lefthand=lefthand,
         )
-        self._ring_edges = {edge for ring in self._rings for edge in ring}
+        self._on_roundabouts = {
+            edge for roundabout in self._roundabout_edges for edge in roundabout
+        }
         self._controllers = {
             signal: controller.id
             for controller in odr.controllers.values()
@@ -152,18 +160,20 @@ class _NetworkBuilder:
         self._walked: dict[str, list[SumoLaneId]] = {}
         for walk in walks.lanes:
             self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
-        self.ruled = self._rule()
+        self.control = self._signal_control()
         self._via: dict[int, NetLane] = {}
 
-    def laid(self) -> list[tuple[NetLane, Line, Course]]:
-        """SUMO lanes with the lines and the courses that they are laid on."""
+    def laid(self) -> list[tuple[NetLane, Line, LaneAlignment]]:
+        """SUMO lanes with the lines and the alignments that they are laid on."""
         found = []
         for number, edge in enumerate(self._edges):
             for index, lane in enumerate(edge.lanes):
                 line = self._lane_lines[number][index]
-                found.append((self._net_edges[number].lanes[index], line, lane.course))
+                found.append((self._net_edges[number].lanes[index], line, lane.alignment))
         for number, inner in sorted(self._via.items()):
-            found.append((inner, self._way_lines[number], self._ways[number].course))
+            found.append(
+                (inner, self._connection_lines[number], self._connections[number].alignment)
+            )
         return found
 
     def net(self) -> Net:
@@ -193,7 +203,7 @@ class _NetworkBuilder:
     # Junctions
 
     def _junction(self, name: str) -> BuiltJunction:
-        numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._ways[n][:4])
+        numbers = sorted(self._by_node.get(name, ()), key=lambda n: self._connections[n][:4])
         crossings = self._walks.crossings.get(name, ())
         passages = [self._passage(number) for number in numbers]
         built = build_junction(name, passages, crossings, self._around(name))
@@ -232,42 +242,42 @@ class _NetworkBuilder:
         )
 
     def _passage(self, number: int) -> Passage:
-        way, line = self._ways[number], self._way_lines[number]
-        source = self._net_edges[way.source].lanes[way.source_lane]
-        target = self._net_edges[way.target].lanes[way.target_lane]
-        before = self._lane_lines[way.source][way.source_lane]
-        after = self._lane_lines[way.target][way.target_lane]
+        connection, line = self._connections[number], self._connection_lines[number]
+        source = self._net_edges[connection.source].lanes[connection.source_lane]
+        target = self._net_edges[connection.target].lanes[connection.target_lane]
+        before = self._lane_lines[connection.source][connection.source_lane]
+        after = self._lane_lines[connection.target][connection.target_lane]
         table = self._table
-        over = [table.road_ids[table.lane_road[stretch.row]] for stretch in way.course]
+        over = [table.road_ids[table.lane_road[stretch.row]] for stretch in connection.alignment]
         connecting = [road for road in over if self._odr.roads[road].junction is not None]
-        incoming = table.road_ids[self._edges[way.source].road]
+        incoming = table.road_ids[self._edges[connection.source].road]
         movement = Movement(
-            source=(self._ids[way.source], way.source_lane),
-            target=(self._ids[way.target], way.target_lane),
+            source=(self._ids[connection.source], connection.source_lane),
+            target=(self._ids[connection.target], connection.target_lane),
             shape=line.shape,
             width=min(source.width, target.width),
             heading_in=before.headings()[1],
             heading_out=after.headings()[0],
             speed=source.speed,
-            sign=self.ruled.signs[number],
-            ring=way.source in self._ring_edges,
+            sign=self.control.signs[number],
+            in_roundabout=connection.source in self._on_roundabouts,
             roads=frozenset(str(road) for road in (incoming, *connecting)),
         )
         return Passage(
             movement,
             line.length,
-            self._speed(way, line, min(source.speed, target.speed)),
+            self._speed(connection, line, min(source.speed, target.speed)),
             source.allowed & target.allowed,
             source.type,
-            self._origins(way.course),
-            self.ruled.lights[number],
+            self._origins(connection.alignment),
+            self.control.lights[number],
         )
 
-    def _speed(self, way: PlannedConnection, line: Line, around: float) -> float:
+    def _speed(self, connection: PlannedConnection, line: Line, around: float) -> float:
         """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
         table = self._table
-        rows = np.array([stretch.row for stretch in way.course])
-        middle = np.array([(stretch.start + stretch.end) / 2.0 for stretch in way.course])
+        rows = np.array([stretch.row for stretch in connection.alignment])
+        middle = np.array([(stretch.start + stretch.end) / 2.0 for stretch in connection.alignment])
         limits = table.speed_limit(rows, middle)
         own = [
             lane_speed(float(limit), table.lane_type[row], "")
@@ -306,7 +316,7 @@ class _NetworkBuilder:
                 lane.type,
                 lane.change_left,
                 lane.change_right,
-                self._origins(lane.course),
+                self._origins(lane.alignment),
             )
             for index, (lane, line) in enumerate(zip(plan.lanes, lines, strict=True))
         )
@@ -314,29 +324,29 @@ class _NetworkBuilder:
         start, end = self._nodes.starts[number], self._nodes.ends[number]
         return NetEdge(edge, NORMAL, lanes, start, end, road.name)
 
-    def _origins(self, course: Course) -> tuple[str, ...]:
-        keys = [self._table.lane_keys[stretch.row] for stretch in course]
+    def _origins(self, alignment: LaneAlignment) -> tuple[str, ...]:
+        keys = [self._table.lane_keys[stretch.row] for stretch in alignment]
         return tuple(dict.fromkeys(f"{key.road}_{key.lane}" for key in keys))
 
     def _roundabouts(self) -> tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...]:
         return tuple(
             (
-                tuple(dict.fromkeys(self._nodes.ends[edge] for edge in ring)),
-                tuple(self._ids[edge] for edge in ring),
+                tuple(dict.fromkeys(self._nodes.ends[edge] for edge in roundabout)),
+                tuple(self._ids[edge] for edge in roundabout),
             )
-            for ring in self._rings
+            for roundabout in self._roundabout_edges
         )
 
     # Signals
 
-    def _rule(self) -> Ruled:
+    def _signal_control(self) -> SignalControl:
         crossed = set(self._nodes.crosswalks)
 
         def is_junction(edge: int) -> bool:
             node = self._nodes.ends[edge]
             return node in self._nodes.xodr or node in crossed
 
-        return rule(self._odr, self._table, self._edges, self._ways, is_junction)
+        return signal_control(self._odr, self._table, self._edges, self._connections, is_junction)
 
     # Persons
 

@@ -60,7 +60,7 @@ def find_nodes(
     crosswalks: Sequence[PlacedCrosswalk],
     sides: Sequence[SideLink] = (),
 ) -> Nodes:
-    """Join the ends of edges: those of one OpenDRIVE junction, and those that ways connect."""
+    """Join the ends of edges: those of one OpenDRIVE junction, and those that connections join."""
     groups = _joined(odr, gaps)
     for side in sides:
         main = odr.roads[side.main.road]
@@ -72,12 +72,12 @@ def find_nodes(
     roads = [odr.roads[table.road_ids[edge.road]] for edge in found.edges]
     heads = [_port(road, edge.end) for road, edge in zip(roads, found.edges, strict=True)]
     tails = [_port(road, edge.start) for road, edge in zip(roads, found.edges, strict=True)]
-    for way in found.ways:
-        join_groups(groups, heads[way.source], tails[way.target])
-        for stretch in way.course:
+    for connection in found.connections:
+        join_groups(groups, heads[connection.source], tails[connection.target])
+        for stretch in connection.alignment:
             junction_of = odr.roads[table.road_ids[table.lane_road[stretch.row]]].junction
             if junction_of is not None:
-                join_groups(groups, ("junction", junction_of), heads[way.source])
+                join_groups(groups, ("junction", junction_of), heads[connection.source])
     first = first_members(groups)
     ports = [first.get(port, port) for port in (*tails, *heads, *walked)]
     names = plain_ids(_name(port) for port in dict.fromkeys(ports))

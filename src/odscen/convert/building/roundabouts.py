@@ -1,4 +1,4 @@
-"""Roundabouts: circles of one-way edges that turn the way traffic goes round."""
+"""Roundabouts: circles of one-way edges that turn as traffic goes round."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ LONGEST = 600.0
 MOST_EDGES = 60
 
 
-def find_rings(
+def find_roundabouts(
     edges: Sequence[EdgePlan],
-    ways: Sequence[PlannedConnection],
+    connections: Sequence[PlannedConnection],
     lane_lines: Sequence[Sequence[Line]],
-    way_lines: Sequence[Line],
+    connection_lines: Sequence[Line],
     *,
     lefthand: bool,
 ) -> tuple[tuple[int, ...], ...]:
@@ -33,31 +33,32 @@ def find_rings(
 
     Parameters
     ----------
-    lane_lines, way_lines
-        The lanes of each edge, and each way, evaluated.
+    lane_lines, connection_lines
+        The lanes of each edge, and each connection, evaluated.
     """
     sides: dict[int, set[bool]] = {}
     for edge in edges:
         sides.setdefault(edge.road, set()).add(edge.forward)
     one_way = [len(sides[edge.road]) == 1 for edge in edges]
     following: dict[int, dict[int, float]] = {}
-    for way, line in zip(ways, way_lines, strict=True):
-        if one_way[way.source] and one_way[way.target]:
+    for connection, line in zip(connections, connection_lines, strict=True):
+        if one_way[connection.source] and one_way[connection.target]:
             turn = _turned(line)
-            known = following.setdefault(way.source, {})
-            if way.target not in known or abs(turn) < abs(known[way.target]):
-                known[way.target] = turn
+            known = following.setdefault(connection.source, {})
+            target = connection.target
+            if target not in known or abs(turn) < abs(known[target]):
+                known[target] = turn
     wanted = -2.0 * math.pi if lefthand else 2.0 * math.pi
-    rings: list[tuple[int, ...]] = []
+    roundabouts: list[tuple[int, ...]] = []
     taken: set[int] = set()
     for start in sorted(following):
         if start in taken:
             continue
-        ring = _around(start, following, lane_lines, wanted)
-        if ring and not taken & set(ring):
-            rings.append(ring)
-            taken |= set(ring)
-    return tuple(rings)
+        roundabout = _around(start, following, lane_lines, wanted)
+        if roundabout and not taken & set(roundabout):
+            roundabouts.append(roundabout)
+            taken |= set(roundabout)
+    return tuple(roundabouts)
 
 
 def _around(
@@ -66,22 +67,22 @@ def _around(
     lines: Sequence[Sequence[Line]],
     wanted: float,
 ) -> tuple[int, ...]:
-    """The way round from an edge back to it, inwards at every choice, or nothing."""
+    """The edges round from an edge back to it, inwards at every choice, or nothing."""
     side = math.copysign(1.0, wanted)
-    ring = [start]
+    roundabout = [start]
     turned, length = _turned(lines[start][0]), lines[start][0].length
-    while len(ring) <= MOST_EDGES and length <= LONGEST:
-        choices = following.get(ring[-1], {})
+    while len(roundabout) <= MOST_EDGES and length <= LONGEST:
+        choices = following.get(roundabout[-1], {})
         if not choices:
             return ()
-        # The ring goes on where the way turns most to the inside.
+        # The roundabout continues where the connection turns most to the inside.
         edge = max(choices, key=lambda n: (side * choices[n], -n))
         turned += choices[edge]
         if edge == start:
-            return tuple(ring) if abs(turned - wanted) < 0.6 else ()
-        if edge in ring:
+            return tuple(roundabout) if abs(turned - wanted) < 0.6 else ()
+        if edge in roundabout:
             return ()
-        ring.append(edge)
+        roundabout.append(edge)
         turned += _turned(lines[edge][0])
         length += lines[edge][0].length
     return ()

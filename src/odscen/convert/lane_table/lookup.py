@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 SNAP = 0.65
-"""Metres: a place this close beside the end of a piece is taken to be on it."""
+"""Metres: a place this close beside the end of an interval is taken to be on it."""
 
 _STRIDE = 1e6
 """Longer than any lane: lane number times this plus s sorts by lane, then s (exact to 1e-5 m)."""
@@ -30,7 +30,7 @@ class Lookup:
     low: FloatArray
     high: FloatArray
     interval_key: FloatArray
-    piece: NDArray[np.int64]
+    function: NDArray[np.int64]
     first: NDArray[np.int64]
     knot_key: FloatArray
     x: FloatArray
@@ -71,7 +71,7 @@ class Lookup:
     def find(
         self, lane: NDArray[np.int64], x: FloatArray
     ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Find the piece that answers (-1: none), the place on it, and how far off that is."""
+        """Find the function that answers (-1: none), the place on it, and how far off that is."""
         none = np.full(len(x), -1, dtype=np.int64)
         if not len(self.low):
             return none, x, np.zeros(len(x))
@@ -85,13 +85,13 @@ class Lookup:
             gap = np.where(better, off, gap)
         index = np.maximum(best, 0)
         on = np.clip(x, self.low[index], self.high[index])
-        return np.where(best < 0, -1, self.piece[index]), on, np.where(best < 0, 0.0, gap)
+        return np.where(best < 0, -1, self.function[index]), on, np.where(best < 0, 0.0, gap)
 
-    def value(self, piece: NDArray[np.int64], x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Value and deviation at places ``x`` of pieces ``piece``."""
+    def value(self, function: NDArray[np.int64], x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Value and deviation at places ``x`` of functions ``function``."""
         if not len(self.x):
             return np.zeros(len(x)), np.zeros(len(x))
-        own = np.maximum(piece, 0)
+        own = np.maximum(function, 0)
         after = np.searchsorted(self.knot_key, own * _STRIDE + x, side="right")
         after = np.clip(after, self.first[own] + 1, self.first[own + 1] - 1)
         before = after - 1

@@ -1,4 +1,4 @@
-"""Pieces: stretches of one OpenDRIVE lane that are stretches of one SUMO lane."""
+"""Mapping intervals: stretches of one OpenDRIVE lane that are stretches of one SUMO lane."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEAST_STEP = 1e-3
 """Metres between knots."""
 
 
-class Piece(NamedTuple):
+class MappingInterval(NamedTuple):
     """Knots of a monotone, piecewise linear relation between s and pos.
 
     Attributes
@@ -51,62 +51,70 @@ class Piece(NamedTuple):
         return min(ends), max(ends)
 
 
-def monotone(piece: Piece, *, growing: bool) -> Piece | None:
+def monotone(interval: MappingInterval, *, growing: bool) -> MappingInterval | None:
     """Drop knots that run backwards; ``None`` if fewer than two are left."""
-    s = piece.s if growing else -piece.s
+    s = interval.s if growing else -interval.s
     keep = np.flatnonzero(s >= np.maximum.accumulate(s))
-    steps = (np.diff(s[keep]) > LEAST_STEP) & (np.diff(piece.pos[keep]) > LEAST_STEP)
+    steps = (np.diff(s[keep]) > LEAST_STEP) & (np.diff(interval.pos[keep]) > LEAST_STEP)
     keep = keep[np.concatenate(([True], steps))] if len(keep) else keep
     if len(keep) < 2:
         return None
-    return Piece(piece.lane, piece.sumo, piece.pos[keep], piece.s[keep], piece.deviation[keep])
+    return MappingInterval(
+        interval.lane, interval.sumo, interval.pos[keep], interval.s[keep], interval.deviation[keep]
+    )
 
 
-def simplified(piece: Piece) -> Piece:
+def simplified(interval: MappingInterval) -> MappingInterval:
     """Leave out knots that a straight line between their neighbours gives anyway."""
-    keep = np.zeros(len(piece.pos), dtype=np.bool_)
+    keep = np.zeros(len(interval.pos), dtype=np.bool_)
     keep[[0, -1]] = True
-    open_spans = [(0, len(piece.pos) - 1)]
+    open_spans = [(0, len(interval.pos) - 1)]
     while open_spans:
         low, high = open_spans.pop()
         if high - low < 2:
             continue
         inner = slice(low + 1, high)
-        share = (piece.pos[inner] - piece.pos[low]) / (piece.pos[high] - piece.pos[low])
-        error_s = np.abs(piece.s[low] + share * (piece.s[high] - piece.s[low]) - piece.s[inner])
-        line = piece.deviation[low] + share * (piece.deviation[high] - piece.deviation[low])
+        share = (interval.pos[inner] - interval.pos[low]) / (interval.pos[high] - interval.pos[low])
+        error_s = np.abs(
+            interval.s[low] + share * (interval.s[high] - interval.s[low]) - interval.s[inner]
+        )
+        line = interval.deviation[low] + share * (
+            interval.deviation[high] - interval.deviation[low]
+        )
         error = np.maximum(
-            error_s / SIMPLE_S, np.abs(line - piece.deviation[inner]) / SIMPLE_DEVIATION
+            error_s / SIMPLE_S, np.abs(line - interval.deviation[inner]) / SIMPLE_DEVIATION
         )
         worst = int(np.argmax(error))
         if error[worst] > 1.0:
             middle = low + 1 + worst
             keep[middle] = True
             open_spans += [(low, middle), (middle, high)]
-    return Piece(piece.lane, piece.sumo, piece.pos[keep], piece.s[keep], piece.deviation[keep])
+    return MappingInterval(
+        interval.lane, interval.sumo, interval.pos[keep], interval.s[keep], interval.deviation[keep]
+    )
 
 
 class Span(NamedTuple):
-    """Where a piece answers "which SUMO lane is here": s from ``low`` to ``high`` of its lane."""
+    """Where an interval answers which SUMO lane is here: s from ``low`` to ``high`` of its lane."""
 
     lane: int
     low: float
     high: float
-    piece: int
+    interval: int
 
 
-def answering(pieces: Sequence[Piece], *, least: float = 0.01) -> list[Span]:
-    """Divide the OpenDRIVE lanes among their pieces; sorted, without overlaps.
+def answering(intervals: Sequence[MappingInterval], *, least: float = 0.01) -> list[Span]:
+    """Divide the OpenDRIVE lanes among their mapping intervals; sorted, without overlaps.
 
     Where several SUMO lanes run over the same stretch (connections that share a connecting lane),
     the one with the smallest mean deviation answers, of equals the first. Remainders shorter than
     ``least`` metres are left out.
     """
-    order = sorted(range(len(pieces)), key=lambda i: (_badness(pieces[i]), i))
+    order = sorted(range(len(intervals)), key=lambda i: (_badness(intervals[i]), i))
     spans: dict[int, list[Span]] = {}
     for i in order:
-        low, high = pieces[i].span
-        lane = pieces[i].lane
+        low, high = intervals[i].span
+        lane = intervals[i].lane
         taken = spans.setdefault(lane, [])
         free = _without(low, high, taken)
         taken += [Span(lane, a, b, i) for a, b in free if b - a >= least]
@@ -115,7 +123,7 @@ def answering(pieces: Sequence[Piece], *, least: float = 0.01) -> list[Span]:
 
 
 def _without(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float, float]]:
-    """Tell what of an interval sorted, disjoint spans leave free."""
+    """What sorted, disjoint spans leave free from ``low`` to ``high``."""
     free: list[tuple[float, float]] = []
     for span in taken:
         if span.high <= low or span.low >= high:
@@ -128,5 +136,5 @@ def _without(low: float, high: float, taken: Sequence[Span]) -> list[tuple[float
     return free
 
 
-def _badness(piece: Piece) -> float:
-    return round(float(np.mean(piece.deviation)), 3)
+def _badness(interval: MappingInterval) -> float:
+    return round(float(np.mean(interval.deviation)), 3)

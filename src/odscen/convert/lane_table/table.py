@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from odscen.convert.lane_table.lookup import Lookup
-from odscen.convert.lane_table.mapping_intervals import Piece, Span, answering
+from odscen.convert.lane_table.mapping_intervals import MappingInterval, Span, answering
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -126,7 +126,7 @@ class SumoLight(NamedTuple):
     Attributes
     ----------
     junctions
-        OpenDRIVE junctions that it stands in; none at a crosswalk on the open road.
+        OpenDRIVE junctions that it is in; none at a crosswalk on the open road.
     phases
         In their order; the letters of a state are those of the links that the light rules.
     offset
@@ -158,8 +158,9 @@ class LaneTable:
         All connections.
     walk_links
         Pairs of edges (smaller id first, sorted) between which a person can walk either way.
-    pieces
-        The relation itself; ``Piece.lane`` is a row of ``lane_keys``, ``Piece.sumo`` of ``lanes``.
+    intervals
+        The relation itself; ``lane`` of an interval is a row of ``lane_keys``, ``sumo`` one of
+        ``lanes``.
     net_offset
         SUMO position minus OpenDRIVE position, metres.
     boundary
@@ -177,7 +178,7 @@ class LaneTable:
     edges: dict[SumoEdgeId, SumoEdge]
     links: tuple[SumoLink, ...]
     walk_links: tuple[tuple[SumoEdgeId, SumoEdgeId], ...]
-    pieces: tuple[Piece, ...]
+    intervals: tuple[MappingInterval, ...]
     net_offset: tuple[float, float]
     boundary: tuple[float, float, float, float]
     lefthand: bool
@@ -229,22 +230,22 @@ class LaneTable:
         """
         rows = np.array([self.key_row.get(key, -1) for key in lane_keys], dtype=np.int64)
         own = rows[lane] if len(lane_keys) else np.full(len(s), -1)
-        piece, s_on, gap = self._by_s.find(own, s)
-        pos, deviation = self._by_s.value(piece, s_on)
-        none = piece < 0
+        interval, s_on, gap = self._by_s.find(own, s)
+        pos, deviation = self._by_s.value(interval, s_on)
+        none = interval < 0
         return SumoPlaces(
-            np.where(none, -1, self._piece_sumo[piece]).astype(np.int32),
+            np.where(none, -1, self._interval_sumo[interval]).astype(np.int32),
             np.where(none, np.nan, pos),
             np.where(none, np.nan, np.hypot(deviation, gap)),
         )
 
     def xodr_places(self, lane: NDArray[np.integer[Any]], pos: FloatArray) -> XodrPlaces:
         """Find OpenDRIVE places for many positions; ``lane`` holds rows of ``lanes``."""
-        piece, pos_on, gap = self._by_pos.find(np.asarray(lane, dtype=np.int64), pos)
-        s, deviation = self._by_pos.value(piece, pos_on)
-        none = piece < 0
+        interval, pos_on, gap = self._by_pos.find(np.asarray(lane, dtype=np.int64), pos)
+        s, deviation = self._by_pos.value(interval, pos_on)
+        none = interval < 0
         return XodrPlaces(
-            np.where(none, -1, self._piece_lane[piece]).astype(np.int32),
+            np.where(none, -1, self._interval_lane[interval]).astype(np.int32),
             np.where(none, np.nan, s),
             np.where(none, np.nan, np.hypot(deviation, gap)),
         )
@@ -294,8 +295,8 @@ class LaneTable:
 
     @cached_property
     def spans(self) -> list[Span]:
-        """Which piece answers where on the OpenDRIVE lanes; sorted, without overlaps."""
-        return answering(self.pieces)
+        """Which interval answers where on the OpenDRIVE lanes; sorted, without overlaps."""
+        return answering(self.intervals)
 
     @cached_property
     def _walk_groups(self) -> dict[SumoEdgeId, int]:
@@ -307,30 +308,30 @@ class LaneTable:
         return dict(zip(row, group.tolist(), strict=True))
 
     @cached_property
-    def _piece_sumo(self) -> Int32Array:
-        return np.array([piece.sumo for piece in self.pieces] or [-1], dtype=np.int32)
+    def _interval_sumo(self) -> Int32Array:
+        return np.array([interval.sumo for interval in self.intervals] or [-1], dtype=np.int32)
 
     @cached_property
-    def _piece_lane(self) -> Int32Array:
-        return np.array([piece.lane for piece in self.pieces] or [-1], dtype=np.int32)
+    def _interval_lane(self) -> Int32Array:
+        return np.array([interval.lane for interval in self.intervals] or [-1], dtype=np.int32)
 
     @cached_property
     def _by_s(self) -> Lookup:
         knots = [
-            (piece.s, piece.pos, piece.deviation)
-            if piece.s[0] < piece.s[-1]
-            else (piece.s[::-1], piece.pos[::-1], piece.deviation[::-1])
-            for piece in self.pieces
+            (interval.s, interval.pos, interval.deviation)
+            if interval.s[0] < interval.s[-1]
+            else (interval.s[::-1], interval.pos[::-1], interval.deviation[::-1])
+            for interval in self.intervals
         ]
         return Lookup.of(
-            knots, [(span.lane, span.low, span.high, span.piece) for span in self.spans]
+            knots, [(span.lane, span.low, span.high, span.interval) for span in self.spans]
         )
 
     @cached_property
     def _by_pos(self) -> Lookup:
-        knots = [(piece.pos, piece.s, piece.deviation) for piece in self.pieces]
+        knots = [(interval.pos, interval.s, interval.deviation) for interval in self.intervals]
         spans = sorted(
-            (piece.sumo, float(piece.pos[0]), float(piece.pos[-1]), index)
-            for index, piece in enumerate(self.pieces)
+            (interval.sumo, float(interval.pos[0]), float(interval.pos[-1]), index)
+            for index, interval in enumerate(self.intervals)
         )
         return Lookup.of(knots, spans)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.ids import Roadside, SumoLaneId
-from odscen.convert.lane_table.mapping_intervals import Piece, monotone, simplified
+from odscen.convert.lane_table.mapping_intervals import MappingInterval, monotone, simplified
 from odscen.convert.lane_table.table import LaneTable, SumoEdge, SumoLane, SumoLight, SumoLink
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.base.ids import JunctionId, LaneKey
-    from odscen.convert.model.lane_alignment import Course, Line
+    from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.model.net import Net, NetLane
     from odscen.convert.model.walk_net import WalkNet
     from odscen.opendrive.lanes import RoadTable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def build_table(
     net: Net,
     table: RoadTable,
-    laid: Sequence[tuple[NetLane, Line, Course]],
+    laid: Sequence[tuple[NetLane, Line, LaneAlignment]],
     walks: WalkNet,
     xodr: Mapping[str, tuple[JunctionId, ...]],
 ) -> LaneTable:
@@ -32,25 +32,25 @@ def build_table(
     Parameters
     ----------
     laid
-        Lanes for vehicles, with the lines and courses that they were laid on.
+        Lanes for vehicles, with the lines and alignments that they were laid on.
     xodr
         OpenDRIVE junctions that a SUMO junction stands for.
     """
-    everything = [*laid, *((w.edge.lanes[0], w.line, w.course) for w in walks.lanes)]
+    everything = [*laid, *((w.edge.lanes[0], w.line, w.alignment) for w in walks.lanes)]
     keys: dict[LaneKey | Roadside, int] = {}
     rows = {lane.id: row for row, lane in enumerate(x for e in net.edges for x in e.lanes)}
-    pieces: list[Piece] = []
-    for lane, line, course in everything:
+    intervals: list[MappingInterval] = []
+    for lane, line, alignment in everything:
         scale = lane.length / max(line.length, 1e-9)
-        for stretch, arc, s in zip(course, line.arc, line.s, strict=True):
+        for stretch, arc, s in zip(alignment, line.arc, line.s, strict=True):
             key: LaneKey | Roadside = table.lane_keys[stretch.row]
             if stretch.beside:
                 key = Roadside(*key)
             row = keys.setdefault(key, len(keys))
-            piece = Piece(row, rows[lane.id], arc * scale, s, np.zeros(len(s)))
-            kept = monotone(piece, growing=bool(s[-1] > s[0]))
+            interval = MappingInterval(row, rows[lane.id], arc * scale, s, np.zeros(len(s)))
+            kept = monotone(interval, growing=bool(s[-1] > s[0]))
             if kept is not None:
-                pieces.append(simplified(kept))
+                intervals.append(simplified(kept))
     lanes = {
         lane.id: SumoLane(
             lane.id, edge.id, lane.index, lane.length, lane.speed, lane.width, lane.allowed
@@ -79,7 +79,7 @@ def build_table(
             if lanes[ids[link.target][link.target_lane]].allowed != frozenset({"pedestrian"})
         ),
         walk_links=walks.walk_links,
-        pieces=tuple(pieces),
+        intervals=tuple(intervals),
         net_offset=net.offset,
         boundary=net.boundary,
         lefthand=net.lefthand,

@@ -9,7 +9,7 @@ import numpy as np
 
 from odscen.base.errors import GraphFormatError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
-from odscen.convert.lane_table.mapping_intervals import Piece
+from odscen.convert.lane_table.mapping_intervals import MappingInterval
 from odscen.convert.lane_table.table import (
     VERSION,
     LaneTable,
@@ -80,12 +80,12 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
         ],
         "walk_links": [[edge_row[one], edge_row[other]] for one, other in table.walk_links],
         "pieces": {
-            "lane": [piece.lane for piece in table.pieces],
-            "sumo": [piece.sumo for piece in table.pieces],
-            "knots": [len(piece.pos) for piece in table.pieces],
-            "pos": _column([piece.pos for piece in table.pieces]),
-            "s": _column([piece.s for piece in table.pieces]),
-            "deviation": _column([piece.deviation for piece in table.pieces]),
+            "lane": [interval.lane for interval in table.intervals],
+            "sumo": [interval.sumo for interval in table.intervals],
+            "knots": [len(interval.pos) for interval in table.intervals],
+            "pos": _column([interval.pos for interval in table.intervals]),
+            "s": _column([interval.s for interval in table.intervals]),
+            "deviation": _column([interval.deviation for interval in table.intervals]),
         },
         "lights": [
             {
@@ -124,7 +124,7 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
             for one, other, via, tl in data["links"]
         ),
         walk_links=tuple((edge_ids[one], edge_ids[other]) for one, other in data["walk_links"]),
-        pieces=_pieces(data["pieces"]),
+        intervals=_intervals(data["pieces"]),
         net_offset=tuple(data["net_offset"]),
         boundary=tuple(data["boundary"]),
         lefthand=data["lefthand"],
@@ -190,7 +190,7 @@ def _edges(
     }
 
 
-def _pieces(data: dict[str, Any]) -> tuple[Piece, ...]:
+def _intervals(data: dict[str, Any]) -> tuple[MappingInterval, ...]:
     if not data["lane"]:
         return ()
     ends = np.cumsum(np.array(data["knots"], dtype=np.int64))
@@ -199,7 +199,8 @@ def _pieces(data: dict[str, Any]) -> tuple[Piece, ...]:
         for name in ("pos", "s", "deviation")
     )
     return tuple(
-        Piece(*row) for row in zip(data["lane"], data["sumo"], pos, s, deviation, strict=True)
+        MappingInterval(*row)
+        for row in zip(data["lane"], data["sumo"], pos, s, deviation, strict=True)
     )
 
 

@@ -47,7 +47,7 @@ _ROAD_SPEEDS = {
 
 
 def allowed(lane_type: str) -> frozenset[str]:
-    """Vehicle classes on a lane; empty for lanes that nobody drives on.
+    """Vehicle classes on a lane; empty for lanes that no vehicle drives on.
 
     Walkable lanes are not asked for here: persons have edges of their own.
     """

@@ -1,7 +1,7 @@
-"""Ways: how one leaves an edge and enters the next.
+"""Connections: from the end of an edge into the next one, and the nodes where that happens.
 
-A way runs over the connecting lanes of a junction, over what crosswalks take from a road, and over
-stretches too short for an edge; SUMO gets one internal lane for each.
+A connection runs over the connecting lanes of a junction, over what crosswalks take from a road,
+and over stretches too short for an edge; SUMO gets one internal lane for each.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.model.access import allowed
 from odscen.convert.model.edge_plan import LEAST_EDGE
-from odscen.convert.model.lane_alignment import Course, Stretch
+from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
     from odscen.opendrive.topology import SideLink
 
 NodeKey = tuple[object, ...]
-"""What is joined in groups: a kind and what tells things of a kind apart."""
+"""What is joined in groups: a kind and what distinguishes items of a kind."""
 
-LONGEST_WAY = 400
-"""Lanes in one way; more is a circle in a file that links a junction to itself."""
+MOST_LANES = 400
+"""Lanes under one connection; more is a circle in a file that links a junction to itself."""
 
-MOST_WAYS = 2_000
-"""Ways from one lane; a file with more has junctions that only consist of junctions."""
+MOST_CONNECTIONS = 2_000
+"""Connections from one lane; a file with more has junctions that only consist of junctions."""
 
 
 class PlannedConnection(NamedTuple):
-    """From a lane of an edge to a lane of another one (positions in the plans), over ``course``."""
+    """From a lane of an edge to one of another (positions in the plans), over ``alignment``."""
 
     source: int
     source_lane: int
     target: int
     target_lane: int
-    course: Course
+    alignment: LaneAlignment
 
 
 class LostConnection(NamedTuple):
-    """A way that has no place in the network, and why."""
+    """A connection that has no place in the network, and why."""
 
     lane: LaneKey
     reason: str
@@ -53,10 +53,10 @@ class LostConnection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlannedConnections:
-    """All ways, the edges with their ends trimmed, and what was lost."""
+    """All connections, the edges with their ends trimmed, and what was lost."""
 
     edges: tuple[EdgePlan, ...]
-    ways: tuple[PlannedConnection, ...]
+    connections: tuple[PlannedConnection, ...]
     lost: tuple[LostConnection, ...]
 
 
@@ -70,7 +70,7 @@ class _Visit(NamedTuple):
     first: bool
 
 
-def find_ways(
+def find_connections(
     table: RoadTable,
     successors: Mapping[LaneKey, Sequence[LaneKey]],
     edges: Sequence[EdgePlan],
@@ -78,15 +78,15 @@ def find_ways(
 ) -> PlannedConnections:
     """Follow the lanes of all edges to where the next edges begin, side links included.
 
-    Where several ways lead from one lane to the same other lane, the shortest is taken.
+    Where several connections lead from one lane to the same other lane, the shortest is taken.
     """
     finder = _ConnectionFinder(table, successors, edges, sides)
     found: list[PlannedConnection] = []
     for number, edge in enumerate(edges):
         for index in range(len(edge.lanes)):
-            found += finder.ways_from(number, index)
-    plans, ways = _with_room(edges, found)
-    return PlannedConnections(plans, ways, tuple(finder.lost))
+            found += finder.connections_from(number, index)
+    plans, connections = _with_room(edges, found)
+    return PlannedConnections(plans, connections, tuple(finder.lost))
 
 
 class _ConnectionFinder:
@@ -112,38 +112,40 @@ class _ConnectionFinder:
         self._visits: dict[int, list[_Visit]] = {}
         for number, edge in enumerate(edges):
             for index, lane in enumerate(edge.lanes):
-                for position, stretch in enumerate(lane.course):
+                for position, stretch in enumerate(lane.alignment):
                     visit = _Visit(stretch.start, stretch.end, number, index, position == 0)
                     self._visits.setdefault(stretch.row, []).append(visit)
         for row, visits in self._visits.items():
             visits.sort(key=lambda v: v.entry if table.lane_forward[row] else -v.entry)
 
-    def ways_from(self, edge: int, lane: int) -> list[PlannedConnection]:
-        """All ways from the end of a lane, the shortest to each other lane."""
-        last = self._edges[edge].lanes[lane].course[-1]
-        best: dict[tuple[int, int], Course] = {}
-        ways = self._onwards(last.row, last.end, ())
-        for target, course in islice(ways, MOST_WAYS):
+    def connections_from(self, edge: int, lane: int) -> list[PlannedConnection]:
+        """All connections from the end of a lane, the shortest to each other lane."""
+        last = self._edges[edge].lanes[lane].alignment[-1]
+        best: dict[tuple[int, int], LaneAlignment] = {}
+        paths = self._onwards(last.row, last.end, ())
+        for target, alignment in islice(paths, MOST_CONNECTIONS):
             known = best.get(target)
-            if known is None or _extent(course) < _extent(known):
-                best[target] = course
+            if known is None or _extent(alignment) < _extent(known):
+                best[target] = alignment
             if known is not None:
                 self._note(last.row, target)
-        return [PlannedConnection(edge, lane, *target, course) for target, course in best.items()]
+        return [
+            PlannedConnection(edge, lane, *target, alignment) for target, alignment in best.items()
+        ]
 
     def _note(self, row: int, target: tuple[int, int]) -> None:
-        there = self._edges[target[0]].lanes[target[1]].course[0].row
+        there = self._edges[target[0]].lanes[target[1]].alignment[0].row
         other = self._table.lane_keys[there]
-        reason = f"of several ways to lane {other} only the shortest is in the network"
+        reason = f"of several connections to lane {other} only the shortest is in the network"
         self.lost.append(LostConnection(self._table.lane_keys[row], reason))
 
     def _onwards(
-        self, row: int, s: float, course: Course
-    ) -> Iterator[tuple[tuple[int, int], Course]]:
-        """Follow a lane from s; yields each edge lane reached and the way to it."""
-        todo: list[tuple[int, float, Course]] = [(row, s, course)]
+        self, row: int, s: float, alignment: LaneAlignment
+    ) -> Iterator[tuple[tuple[int, int], LaneAlignment]]:
+        """Follow a lane from s; yields each edge lane reached and the path to it."""
+        todo: list[tuple[int, float, LaneAlignment]] = [(row, s, alignment)]
         while todo:
-            row, s, course = todo.pop()
+            row, s, alignment = todo.pop()
             ahead = bool(self._table.lane_forward[row])
             sign = 1.0 if ahead else -1.0
             end = float(self._table.lane_s1[row] if ahead else self._table.lane_s0[row])
@@ -151,81 +153,81 @@ class _ConnectionFinder:
                 (v for v in self._visits.get(row, ()) if sign * (v.entry - s) >= -1e-6), None
             )
             until = visit.entry if visit is not None else end
-            todo += self._turning_off(row, s, until, course)
+            todo += self._turning_off(row, s, until, alignment)
             if visit is not None and visit.first:
-                yield (visit.edge, visit.lane), _extended(course, Stretch(row, s, visit.entry))
+                yield (visit.edge, visit.lane), _extended(alignment, Stretch(row, s, visit.entry))
                 continue
-            if visit is not None or len(course) > LONGEST_WAY:
+            if visit is not None or len(alignment) > MOST_LANES:
                 continue
-            course = _extended(course, Stretch(row, s, end))
-            todo += [(main, place, course) for place, main in self._entries.get(row, ())]
+            alignment = _extended(alignment, Stretch(row, s, end))
+            todo += [(main, place, alignment) for place, main in self._entries.get(row, ())]
             following = [
                 self._table.lane_index[key]
                 for key in self._successors[self._table.lane_keys[row]]
                 if self._open(key)
             ]
             for other in reversed(following):
-                if any(stretch.row == other for stretch in course):
+                if any(stretch.row == other for stretch in alignment):
                     continue
                 forward = bool(self._table.lane_forward[other])
                 start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
-                todo.append((other, float(start), course))
+                todo.append((other, float(start), alignment))
 
     def _turning_off(
-        self, row: int, s: float, until: float, course: Course
-    ) -> Iterator[tuple[int, float, Course]]:
-        """Lanes that begin beside a lane between two places, with the way to them."""
+        self, row: int, s: float, until: float, alignment: LaneAlignment
+    ) -> Iterator[tuple[int, float, LaneAlignment]]:
+        """Lanes that begin beside a lane between two places, with the path to them."""
         low, high = sorted((s, until))
         for place, other in self._exits.get(row, ()):
             if low - 1e-6 <= place <= high + 1e-6 and self._open(self._table.lane_keys[other]):
                 forward = bool(self._table.lane_forward[other])
                 start = self._table.lane_s0[other] if forward else self._table.lane_s1[other]
-                yield other, float(start), _extended(course, Stretch(row, s, place))
+                yield other, float(start), _extended(alignment, Stretch(row, s, place))
 
     def _open(self, key: LaneKey) -> bool:
         return bool(allowed(self._table.lane_type[self._table.lane_index[key]]))
 
 
-def _extended(course: Course, stretch: Stretch) -> Course:
-    return (*course, stretch) if stretch.extent > 1e-6 else course
+def _extended(alignment: LaneAlignment, stretch: Stretch) -> LaneAlignment:
+    return (*alignment, stretch) if stretch.extent > 1e-6 else alignment
 
 
-def _extent(course: Course) -> float:
-    return sum(stretch.extent for stretch in course)
+def _extent(alignment: LaneAlignment) -> float:
+    return sum(stretch.extent for stretch in alignment)
 
 
 def _with_room(
-    edges: Sequence[EdgePlan], ways: Sequence[PlannedConnection]
+    edges: Sequence[EdgePlan], connections: Sequence[PlannedConnection]
 ) -> tuple[tuple[EdgePlan, ...], tuple[PlannedConnection, ...]]:
-    """Give ways of no length the last decimetre of the edge before: internal lanes need one."""
-    short = {way.source for way in ways if _extent(way.course) < LEAST_EDGE}
+    """Give connections of no length the last decimetre of the edge before, for internal lanes."""
+    short = {c.source for c in connections if _extent(c.alignment) < LEAST_EDGE}
     plans = list(edges)
     rests: dict[tuple[int, int], Stretch] = {}
     for number in sorted(short):
         plan = plans[number]
         lanes = []
         for index, lane in enumerate(plan.lanes):
-            last = lane.course[-1]
+            last = lane.alignment[-1]
             room = min(LEAST_EDGE, last.extent / 3.0)
             cut = last.end - room if last.end > last.start else last.end + room
             rests[number, index] = Stretch(last.row, cut, last.end)
             lanes.append(
-                replace(lane, course=(*lane.course[:-1], Stretch(last.row, last.start, cut)))
+                replace(lane, alignment=(*lane.alignment[:-1], Stretch(last.row, last.start, cut)))
             )
         plans[number] = replace(plan, lanes=tuple(lanes))
     longer = [
-        way._replace(course=_joined(rests[way.source, way.source_lane], way.course))
-        if way.source in short
-        else way
-        for way in ways
+        c._replace(alignment=_joined(rests[c.source, c.source_lane], c.alignment))
+        if c.source in short
+        else c
+        for c in connections
     ]
     return tuple(plans), tuple(longer)
 
 
-def _joined(first: Stretch, course: Course) -> Course:
-    if course and course[0].row == first.row:
-        return (Stretch(first.row, first.start, course[0].end), *course[1:])
-    return (first, *course)
+def _joined(first: Stretch, alignment: LaneAlignment) -> LaneAlignment:
+    if alignment and alignment[0].row == first.row:
+        return (Stretch(first.row, first.start, alignment[0].end), *alignment[1:])
+    return (first, *alignment)
 
 
 def join_groups(groups: DisjointSet[NodeKey], one: NodeKey, other: NodeKey) -> None:

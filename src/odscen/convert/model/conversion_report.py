@@ -22,7 +22,7 @@ class ElementOutcome(StrEnum):
 class ReportEntry(NamedTuple):
     """One line of the report; ``element`` is a path as in ``road 7 > laneSection 0 > lane -1``."""
 
-    fate: ElementOutcome
+    outcome: ElementOutcome
     element: str
     reason: str
 
@@ -51,8 +51,8 @@ class ConversionReport:
 
     def counts(self) -> dict[str, int]:
         """Count the entries of each kind."""
-        fates = [entry.fate for entry in self.entries]
-        return {fate.value: fates.count(fate) for fate in ElementOutcome}
+        outcomes = [entry.outcome for entry in self.entries]
+        return {outcome.value: outcomes.count(outcome) for outcome in ElementOutcome}
 
     def to_dict(self) -> dict[str, Any]:
         """Form for JSON."""
@@ -60,7 +60,7 @@ class ConversionReport:
             "counts": self.counts(),
             "figures": dict(self.figures),
             "entries": [
-                {"fate": entry.fate.value, "element": entry.element, "reason": entry.reason}
+                {"fate": entry.outcome.value, "element": entry.element, "reason": entry.reason}
                 for entry in self.entries
             ],
         }

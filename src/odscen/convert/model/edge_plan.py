@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.convert.model.access import allowed, speed
-from odscen.convert.model.lane_alignment import Course, Stretch
+from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 
 if TYPE_CHECKING:
@@ -50,9 +50,9 @@ does within a few metres of broken line SUMO's drivers need the length of an edg
 
 @dataclass(frozen=True, slots=True)
 class EdgeLane:
-    """A lane to be; ``course`` runs in driving direction."""
+    """A lane to be; ``alignment`` runs in driving direction."""
 
-    course: Course
+    alignment: LaneAlignment
     allowed: frozenset[str]
     speed: float
     change_left: bool
@@ -284,17 +284,17 @@ class _Planner:
         longest = max(range(len(parts)), key=lambda i: parts[i].end - parts[i].start)
         lanes: list[EdgeLane] = []
         for index, state in enumerate(sides[longest]):
-            course: list[Stretch] = []
+            alignment: list[Stretch] = []
             for part, side in zip(parts, sides, strict=True):
                 start, end = (part.start, part.end) if forward else (part.end, part.start)
                 row = side[index].row
-                if course and course[-1].row == row:
-                    course[-1] = Stretch(row, course[-1].start, end)
+                if alignment and alignment[-1].row == row:
+                    alignment[-1] = Stretch(row, alignment[-1].start, end)
                 else:
-                    course.append(Stretch(row, start, end))
+                    alignment.append(Stretch(row, start, end))
             lanes.append(
                 EdgeLane(
-                    tuple(course),
+                    tuple(alignment),
                     state.allowed,
                     state.speed,
                     any(side[index].change_left for side in sides),

@@ -1,7 +1,7 @@
-"""Courses: what SUMO lanes are laid on, stretch by stretch of OpenDRIVE lanes.
+"""Lane alignments: what SUMO lanes are laid on, stretch by stretch of OpenDRIVE lanes.
 
-A course becomes the shape of a SUMO lane, and the pieces of the lane table, in one pass for all
-lanes of a map.
+An alignment becomes the shape of a SUMO lane, and the intervals of the lane table, in one pass for
+all lanes of a map.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ class Stretch(NamedTuple):
         return abs(self.end - self.start)
 
 
-Course = tuple[Stretch, ...]
+LaneAlignment = tuple[Stretch, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A course evaluated.
+    """A lane alignment evaluated.
 
     Attributes
     ----------
@@ -67,8 +67,8 @@ class Line:
     length
         Metres along ``shape``.
     arc, s
-        For each stretch of the course: metres along the line at its sampled places, and their road
-        coordinates.
+        For each stretch of the alignment: metres along the line at its sampled places, and their
+        road coordinates.
     widths
         Smallest, median and largest width of the lanes, metres.
     """
@@ -85,11 +85,11 @@ class Line:
         return float(np.arctan2(first[1], first[0])), float(np.arctan2(last[1], last[0]))
 
 
-def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
-    """Evaluate courses; each must be longer than a millimetre."""
-    if not courses:
+def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line]:
+    """Evaluate alignments; each must be longer than a millimetre."""
+    if not alignments:
         return []
-    flat = [stretch for course in courses for stretch in course]
+    flat = [stretch for alignment in alignments for stretch in alignment]
     rows = np.array([stretch.row for stretch in flat], dtype=np.int64)
     start = np.array([stretch.start for stretch in flat])
     end = np.array([stretch.end for stretch in flat])
@@ -100,8 +100,8 @@ def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
     out = np.array([x.beside for x in flat])[owner] * np.sign(table.lane_id[rows[owner]])
     x, y = found.x - out * np.sin(found.hdg), found.y + out * np.cos(found.hdg)
     points = np.column_stack((x, y, found.z))
-    of_course = np.concatenate(([0], np.cumsum([len(course) for course in courses])))
-    bounds = first[of_course]
+    of_alignment = np.concatenate(([0], np.cumsum([len(alignment) for alignment in alignments])))
+    bounds = first[of_alignment]
     shapes = thinned([_distinct(points[a:b]) for a, b in pairwise(bounds)])
     lines: list[Line] = []
     for number, shape in enumerate(shapes):
@@ -110,7 +110,7 @@ def evaluate(courses: Sequence[Course], table: RoadTable) -> list[Line]:
         arc = np.concatenate(([0.0], np.cumsum(steps)))
         length = drawn_length(shape)
         arc *= length / max(arc[-1], 1e-9)
-        cuts = first[of_course[number] + 1 : of_course[number + 1]] - a
+        cuts = first[of_alignment[number] + 1 : of_alignment[number + 1]] - a
         width = found.width[a:b]
         lines.append(
             Line(

@@ -1,13 +1,13 @@
 """Right of way in a junction: which movements meet, and who lets whom go first.
 
-Conflicts are found on the ground, between the true courses of the movements. Of two movements that
-meet, the first of these rules that tells them apart decides:
+Conflicts are found on the ground, between the true centre lines of the movements. Of two that
+meet, the first of these rules that distinguishes them decides:
 
 1. vehicles give way to persons on crossings;
-2. in a roundabout, what comes from outside gives way to the ring;
-3. stop gives way to yield and yield to everybody else;
+2. in a roundabout, what comes from outside gives way to what is inside;
+3. stop gives way to yield and yield to all others;
 4. ``<priority>`` of the OpenDRIVE junction;
-5. where lanes only merge, the faster road goes first, and then the straighter way;
+5. where lanes only merge, the faster road goes first, and then the straighter movement;
 6. one who turns across gives way to oncoming traffic that does not;
 7. right before left (left before right where traffic keeps left).
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 MOST_WIDTH = 2.0
-"""Metres between two courses on which vehicles are taken to touch; less for narrow lanes."""
+"""Metres between two centre lines on which vehicles are taken to touch; less for narrow lanes."""
 
 WIDTH_SHARE = 0.45
 """Share of the sum of two lanes' widths that takes the place of :data:`MOST_WIDTH` if smaller."""
@@ -41,14 +41,14 @@ LEVEL = 3.0
 """Metres of height between movements that do not meet."""
 
 WALKER_REACH = 1.0
-"""Metres beside a movement's course that a vehicle needs free of persons."""
+"""Metres beside a movement's centre line that a vehicle needs free of persons."""
 
 _FASTER = 2.0
 """m/s by which a road must be faster to go first where lanes merge."""
 
 
 class Sign(IntEnum):
-    """What tells an approach to wait; more has less right."""
+    """What makes an approach wait; more has less right."""
 
     NONE = 0
     YIELD = 1
@@ -57,7 +57,7 @@ class Sign(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movement:
-    """A way through a junction.
+    """A movement through a junction.
 
     Attributes
     ----------
@@ -72,8 +72,8 @@ class Movement:
     speed
         m/s, of the edge before.
     sign
-        What stands at the approach.
-    ring
+        The sign at the approach.
+    in_roundabout
         Whether it comes from within a roundabout.
     roads
         OpenDRIVE road that it comes from, and connecting roads that it runs over: files name either
@@ -88,7 +88,7 @@ class Movement:
     heading_out: float
     speed: float
     sign: Sign
-    ring: bool
+    in_roundabout: bool
     roads: frozenset[str]
 
     @property
@@ -221,13 +221,13 @@ def requests(
 
 def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merges: bool) -> bool:
     """Whether ``one`` gives way to ``other``; exactly one of the two does."""
-    if one.ring != other.ring:
-        return other.ring
+    if one.in_roundabout != other.in_roundabout:
+        return other.in_roundabout
     if one.sign != other.sign:
         return one.sign > other.sign
-    ruled = _ruled(one, other, rules)
-    if ruled is not None:
-        return ruled
+    stated = _stated(one, other, rules)
+    if stated is not None:
+        return stated
     if merge and (only_merges or abs(wrapped(one.heading_in - other.heading_in)) < math.pi / 4):
         if abs(one.speed - other.speed) > _FASTER:
             return one.speed < other.speed
@@ -236,7 +236,7 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
     return _waits_by_place(one, other, -1.0 if rules.lefthand else 1.0)
 
 
-def _ruled(one: Movement, other: Movement, rules: Rules) -> bool | None:
+def _stated(one: Movement, other: Movement, rules: Rules) -> bool | None:
     """What ``<priority>`` says on who gives way, if anything that does not contradict itself."""
     pairs = [(mine, theirs) for mine in one.roads for theirs in other.roads]
     waits = any((theirs, mine) in rules.high_low for mine, theirs in pairs)

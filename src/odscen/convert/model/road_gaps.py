@@ -65,7 +65,7 @@ def _merged(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
     """Gaps of a road, widened to junctions that are near, and joined if they are close."""
     found: list[RoadGap] = []
     for gap in gaps:
-        # At a dead end a stub stays: without an edge there nobody would come over the gap.
+        # At a dead end a stub stays: without an edge there no vehicle would come over the gap.
         start = max(gap.start, 0.0 if road.predecessor else min(STUB, 0.1 * road.length))
         end = min(gap.end, road.length - (0.0 if road.successor else min(STUB, 0.1 * road.length)))
         before, behind = start, road.length - end

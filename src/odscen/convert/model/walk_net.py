@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from odscen.base.ids import SumoEdgeId
-    from odscen.convert.model.lane_alignment import Course, Line
+    from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.model.net import (
         NetEdge,
         NetJunction,
@@ -21,7 +21,7 @@ class WalkLane(NamedTuple):
 
     edge: NetEdge
     line: Line
-    course: Course
+    alignment: LaneAlignment
 
 
 class PlacedCrossing(NamedTuple):

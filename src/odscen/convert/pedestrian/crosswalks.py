@@ -46,8 +46,8 @@ def place_crosswalks(
     tuple
         The crosswalks in the order of the file, and by road the parts that they take from it.
     """
-    things = crosswalks(odr, table)
-    if not things:
+    found = crosswalks(odr, table)
+    if not found:
         return (), {}
     usable = [bool(allowed(kind)) for kind in table.lane_type]
     rows = np.flatnonzero(np.array(usable) & (table.lane_s1 - table.lane_s0 > 1e-3))
@@ -58,10 +58,10 @@ def place_crosswalks(
     tree = shapely.STRtree(shapely.points(points.x, points.y))
     placed: list[PlacedCrosswalk] = []
     taken: dict[RoadId, list[RoadGap]] = {}
-    for thing in things:
-        area = shapely.Polygon(thing.polygon).buffer(DENSE / 2.0)
+    for crosswalk in found:
+        area = shapely.Polygon(crosswalk.polygon).buffer(DENSE / 2.0)
         inside = np.sort(tree.query(area, predicate="intersects"))
-        inside = inside[np.abs(points.z[inside] - thing.z) < LEVEL]
+        inside = inside[np.abs(points.z[inside] - crosswalk.z) < LEVEL]
         roads = table.lane_road[rows[owner[inside]]]
         outside: list[tuple[RoadId, float]] = []
         connecting: list[RoadId] = []
@@ -75,5 +75,5 @@ def place_crosswalks(
             gap = RoadGap(float(under.min()) - margin, float(under.max()) + margin)
             taken.setdefault(road, []).append(gap)
             outside.append((road, float(under.min() + under.max()) / 2.0))
-        placed.append(PlacedCrosswalk(thing, tuple(outside), tuple(connecting)))
+        placed.append(PlacedCrosswalk(crosswalk, tuple(outside), tuple(connecting)))
     return tuple(placed), taken

@@ -1,6 +1,6 @@
 """The pedestrian network: the pedestrian graph in SUMO's terms.
 
-Every way along the graph becomes an edge for persons only, every crosswalk a crossing, and wherever
+Each path along the graph becomes an edge for persons only, every crosswalk a crossing, and where
 they meet is a walking area. SUMO lets persons cross a junction only on walking areas and crossings
 of that same junction; so a walking area at a crosswalk belongs to the junction whose traffic the
 crosswalk stops, all others are small junctions of their own.
@@ -18,7 +18,7 @@ from scipy.cluster.hierarchy import DisjointSet
 from odscen.base.ids import SumoEdgeId
 from odscen.convert.model.access import PEDESTRIAN, WALKING_SPEED
 from odscen.convert.model.connections import NodeKey, first_members, join_groups
-from odscen.convert.model.lane_alignment import Course, Line, Stretch, evaluate
+from odscen.convert.model.lane_alignment import LaneAlignment, Line, Stretch, evaluate
 from odscen.convert.model.net import (
     CROSSING,
     LEAST_LENGTH,
@@ -60,17 +60,17 @@ TOGETHER = 2.5
 
 @dataclass(slots=True, eq=False)
 class _WalkingArea:
-    """A place where ways meet; ``junction`` is empty until one is known."""
+    """A node where walks meet; ``junction`` is empty until one is known."""
 
     junction: str = ""
-    arms: list[tuple[FloatArray, float]] = field(default_factory=list)  # cross lines: (2, 3)
+    legs: list[tuple[FloatArray, float]] = field(default_factory=list)  # cross lines: (2, 3)
     edges: list[tuple[SumoEdgeId, bool]] = field(default_factory=list)  # and whether they end here
     crossings: int = 0
-    area: SumoEdgeId | None = None
+    edge: SumoEdgeId | None = None
 
 
 class _Arc(NamedTuple):
-    """A part of a walk between two hubs; ``walk`` is a row of the graph's lane keys."""
+    """A part of a walk between two nodes; ``walk`` is a row of the graph's lane keys."""
 
     walk: int
     start: float
@@ -120,8 +120,8 @@ class _WalkNetBuilder:
         self._crosswalks = crosswalks
         self._junctions = junctions
         self._rows = [table.lane_index[key] for key in graph.lane_keys]
-        self._hubs: dict[NodeKey, _WalkingArea] = {}
-        self._ends: dict[tuple[int, int], NodeKey] = {}  # hub of each end of each crosswalk
+        self._nodes: dict[NodeKey, _WalkingArea] = {}
+        self._ends: dict[tuple[int, int], NodeKey] = {}  # node of each end of each crosswalk
         self._lanes: list[WalkLane] = []
         self._number = 0
         self._own: list[NetJunction] = []
@@ -217,9 +217,9 @@ class _WalkNetBuilder:
             last: NodeKey = clusters[walk, 1]
             for end in ends.get(walk, ()):
                 junction = self._junctions[end.crosswalk]
-                hub = self._hubs.get(before[1])
+                node = self._nodes.get(before[1])
                 near = end.s - before[0]
-                if near < TOGETHER and hub is not None and hub.junction == junction:
+                if near < TOGETHER and node is not None and node.junction == junction:
                     self._attach(end, before[1], junction)
                     continue
                 if near < APART and self._takes(before[1], junction):
@@ -237,13 +237,13 @@ class _WalkNetBuilder:
         return arcs
 
     def _takes(self, key: NodeKey, junction: str) -> bool:
-        hub = self._hubs.get(key)
-        return hub is None or hub.junction in ("", junction)
+        node = self._nodes.get(key)
+        return node is None or node.junction in ("", junction)
 
     def _attach(self, end: _CrosswalkEnd, key: NodeKey, junction: str) -> None:
-        hub = self._hubs.setdefault(key, _WalkingArea())
-        hub.junction = junction
-        hub.crossings += 1
+        node = self._nodes.setdefault(key, _WalkingArea())
+        node.junction = junction
+        node.crossings += 1
         self._ends[end.crosswalk, end.which] = key
 
     def _chains(self, arcs: Sequence[_Arc]) -> list[list[tuple[_Arc, bool]]]:
@@ -253,7 +253,7 @@ class _WalkNetBuilder:
         for number, arc in enumerate(arcs):
             meeting.setdefault(arc.first, []).append(number)
             meeting.setdefault(arc.last, []).append(number)
-        passed = {key for key, count in degree.items() if count == 2 and key not in self._hubs}
+        passed = {key for key, count in degree.items() if count == 2 and key not in self._nodes}
         used: set[int] = set()
         chains: list[list[tuple[_Arc, bool]]] = []
 
@@ -274,14 +274,14 @@ class _WalkNetBuilder:
             start = next((key for key in (arc.first, arc.last) if key not in passed), None)
             if number not in used and start is not None:
                 chains.append(follow(number, start))
-        for number, arc in enumerate(arcs):  # what is left are rings
+        for number, arc in enumerate(arcs):  # what is left is closed
             if number not in used:
                 passed.discard(arc.first)
                 chains.append(follow(number, arc.first))
         return chains
 
     def _free_ends(self) -> None:
-        """Give crosswalk ends without a walk a hub of their own; ends side by side share one."""
+        """Give crosswalk ends without a walk a node of their own; ends side by side share one."""
         free: dict[str, list[tuple[NodeKey, FloatArray]]] = {}
         for number, placed in enumerate(self._crosswalks):
             junction = self._junctions[number]
@@ -301,61 +301,62 @@ class _WalkNetBuilder:
 
     def _lay(self, chains: Sequence[list[tuple[_Arc, bool]]]) -> None:
         """Make an edge of each chain, of three parts if both ends are at one junction."""
-        courses: list[Course] = []
+        alignments: list[LaneAlignment] = []
         ends: list[tuple[NodeKey, NodeKey]] = []
         for chain in chains:
-            course = tuple(
+            alignment = tuple(
                 self._stretch(arc.walk, *((arc.start, arc.end) if along else (arc.end, arc.start)))
                 for arc, along in chain
             )
             first = chain[0][0].first if chain[0][1] else chain[0][0].last
             last = chain[-1][0].last if chain[-1][1] else chain[-1][0].first
-            course = tuple(s for s in course if s.extent > 1e-3)
-            if sum(s.extent for s in course) < LEAST_LENGTH:
+            alignment = tuple(s for s in alignment if s.extent > 1e-3)
+            if sum(s.extent for s in alignment) < LEAST_LENGTH:
                 continue
-            one, other = self._hub(first), self._hub(last)
+            one, other = self._node(first), self._node(last)
             if one is other or (one.junction and one.junction == other.junction):
                 # Of two parts both would join the same junctions, and SUMO could not tell
                 # whether a walk from one to the other goes over the middle or round the ends.
-                keys = [("part", len(courses)), ("part", len(courses) + 1)]
-                courses += thirds(course)
+                keys = [("part", len(alignments)), ("part", len(alignments) + 1)]
+                alignments += thirds(alignment)
                 ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
             else:
-                courses.append(course)
+                alignments.append(alignment)
                 ends.append((first, last))
         meetings = Counter(key for pair in ends for key in pair)
 
         def meets(key: NodeKey) -> bool:
-            return meetings[key] + self._hub(key).crossings > 1
+            return meetings[key] + self._node(key).crossings > 1
 
         cut_back = [
-            trimmed(course, start=meets(pair[0]), end=meets(pair[1]))
-            for course, pair in zip(courses, ends, strict=True)
+            trimmed(alignment, start=meets(pair[0]), end=meets(pair[1]))
+            for alignment, pair in zip(alignments, ends, strict=True)
         ]
-        for line, course, pair in zip(evaluate(cut_back, self._table), cut_back, ends, strict=True):
-            self._edge(line, course, pair)
+        lines = evaluate(cut_back, self._table)
+        for line, alignment, pair in zip(lines, cut_back, ends, strict=True):
+            self._edge(line, alignment, pair)
 
-    def _hub(self, key: NodeKey) -> _WalkingArea:
-        return self._hubs.setdefault(key, _WalkingArea())
+    def _node(self, key: NodeKey) -> _WalkingArea:
+        return self._nodes.setdefault(key, _WalkingArea())
 
-    def _edge(self, line: Line, course: Course, ends: tuple[NodeKey, NodeKey]) -> None:
-        roadside = course[0].at == 1.0
+    def _edge(self, line: Line, alignment: LaneAlignment, ends: tuple[NodeKey, NodeKey]) -> None:
+        roadside = alignment[0].at == 1.0
         name = f"w{self._number}"
         self._number += 1
         edge, lane = SumoEdgeId(name), lane_id(name)
         width = ROADSIDE_WIDTH if roadside else max(line.widths[1], 0.5)
         junctions: list[str] = []
         for key, which in ((ends[0], 0), (ends[1], -1)):
-            hub = self._hub(key)
-            if not hub.junction:
-                hub.junction = f"walk{len(self._own)}"
+            node = self._node(key)
+            if not node.junction:
+                node.junction = f"walk{len(self._own)}"
                 ends_at = line_across(line.shape, which, width)
                 self._own.append(
-                    NetJunction(hub.junction, "dead_end", triple(line.shape[which]), ends_at)
+                    NetJunction(node.junction, "dead_end", triple(line.shape[which]), ends_at)
                 )
-            junctions.append(hub.junction)
-            hub.arms.append((line_across(line.shape, which, width), width))
-            hub.edges.append((edge, which == -1))
+            junctions.append(node.junction)
+            node.legs.append((line_across(line.shape, which, width), width))
+            node.edges.append((edge, which == -1))
         walk = NetLane(
             lane,
             0,
@@ -365,10 +366,10 @@ class _WalkNetBuilder:
             PEDESTRIAN,
             line.shape,
             type="roadside" if roadside else "sidewalk",
-            xodr=tuple(dict.fromkeys(self._name(stretch.row) for stretch in course)),
+            xodr=tuple(dict.fromkeys(self._name(stretch.row) for stretch in alignment)),
         )
         net_edge = NetEdge(edge, NORMAL, (walk,), junctions[0], junctions[1], priority=0)
-        self._lanes.append(WalkLane(net_edge, line, course))
+        self._lanes.append(WalkLane(net_edge, line, alignment))
 
     def _name(self, row: int) -> str:
         key = self._table.lane_keys[row]
@@ -379,11 +380,11 @@ class _WalkNetBuilder:
         counts: Counter[str] = Counter()
 
         def area(key: NodeKey) -> SumoEdgeId:
-            hub = self._hubs[key]
-            if hub.area is None:
-                hub.area = walking_area_id(hub.junction, counts[hub.junction])
-                counts[hub.junction] += 1
-            return hub.area
+            node = self._nodes[key]
+            if node.edge is None:
+                node.edge = walking_area_id(node.junction, counts[node.junction])
+                counts[node.junction] += 1
+            return node.edge
 
         found: dict[str, list[PlacedCrossing]] = {}
         order = sorted(
@@ -395,10 +396,10 @@ class _WalkNetBuilder:
             start, end = area(self._ends[number, 0]), area(self._ends[number, 1])
             own = found.setdefault(junction, [])
             edge = crossing_id(junction, len(own))
-            thing = placed.crosswalk
-            axis = np.column_stack((thing.axis, np.full(2, thing.z)))
+            crosswalk = placed.crosswalk
+            axis = np.column_stack((crosswalk.axis, np.full(2, crosswalk.z)))
             length = float(np.linalg.norm(axis[1] - axis[0]))
-            width = max(thing.width, 0.5)
+            width = max(crosswalk.width, 0.5)
             lane = NetLane(
                 lane_id(edge),
                 0,
@@ -407,17 +408,17 @@ class _WalkNetBuilder:
                 round(width, 2),
                 PEDESTRIAN,
                 axis,
-                xodr=(f"{thing.road}:{thing.object_id}",),
+                xodr=(f"{crosswalk.road}:{crosswalk.object_id}",),
             )
             for which in (0, 1):
                 across = line_across(axis, 0 if which == 0 else -1, width)
-                self._hubs[self._ends[number, which]].arms.append((across, width))
+                self._nodes[self._ends[number, which]].legs.append((across, width))
             link = NetLink(edge, end)
             crossing = NetEdge(edge, CROSSING, (lane,))
             walkway = Walkway(axis, width)
             own.append(PlacedCrossing(crossing, walkway, start, link))
-        for key, hub in self._hubs.items():
-            if len(hub.edges) > 1:
+        for key, node in self._nodes.items():
+            if len(node.edges) > 1:
                 area(key)
         return found
 
@@ -431,24 +432,24 @@ class _WalkNetBuilder:
         def pair(one: SumoEdgeId, other: SumoEdgeId) -> None:
             pairs.add((one, other) if one < other else (other, one))
 
-        for hub in self._hubs.values():
-            if hub.area is None:
+        for node in self._nodes.values():
+            if node.edge is None:
                 continue
-            outline = area_outline([arm for arm, _ in hub.arms])
+            outline = area_outline([leg for leg, _ in node.legs])
             size = float(np.ptp(outline[:, :2], axis=0).max())
             lane = NetLane(
-                lane_id(hub.area),
+                lane_id(node.edge),
                 0,
                 round(max(size, 0.5), 4),
                 WALKING_SPEED,
-                round(min(width for _, width in hub.arms), 2),
+                round(min(width for _, width in node.legs), 2),
                 PEDESTRIAN,
                 outline,
             )
-            areas.append(NetEdge(hub.area, WALKING_AREA, (lane,)))
-            for edge, ends_here in hub.edges:
-                links.append(NetLink(edge, hub.area) if ends_here else NetLink(hub.area, edge))
-                pair(hub.area, edge)
+            areas.append(NetEdge(node.edge, WALKING_AREA, (lane,)))
+            for edge, ends_here in node.edges:
+                links.append(NetLink(edge, node.edge) if ends_here else NetLink(node.edge, edge))
+                pair(node.edge, edge)
         for own in crossings.values():
             for crossing in own:
                 pair(crossing.start, crossing.edge.id)

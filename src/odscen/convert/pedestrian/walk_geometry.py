@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.base.arrays import FloatArray
-    from odscen.convert.model.lane_alignment import Course, Stretch
+    from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
 
 
 TRIM = 0.6
@@ -33,9 +33,9 @@ def line_across(shape: FloatArray, which: int, width: float) -> FloatArray:
     return result
 
 
-def area_outline(arms: Sequence[FloatArray]) -> FloatArray:
+def area_outline(legs: Sequence[FloatArray]) -> FloatArray:
     """Outline of a walking area, shape ``(N, 3)``: hull of the ends of walks that meet in it."""
-    points = np.concatenate(list(arms))
+    points = np.concatenate(list(legs))
     z = float(points[:, 2].mean())
     hull = shapely.MultiPoint(points[:, :2]).convex_hull
     if hull.geom_type != "Polygon" or hull.area < 0.05:
@@ -44,35 +44,35 @@ def area_outline(arms: Sequence[FloatArray]) -> FloatArray:
     return np.column_stack((outline, np.full(len(outline), z)))
 
 
-def thirds(course: Course) -> list[Course]:
-    """Divide a course into three parts of about the same extent."""
-    third = sum(stretch.extent for stretch in course) / 3.0
-    head, rest = divided(course, third)
+def thirds(alignment: LaneAlignment) -> list[LaneAlignment]:
+    """Divide an alignment into three parts of about the same extent."""
+    third = sum(stretch.extent for stretch in alignment) / 3.0
+    head, rest = divided(alignment, third)
     return [head, *divided(rest, third)]
 
 
-def divided(course: Course, extent: float) -> tuple[Course, Course]:
-    """Divide a course after ``extent`` metres of s.
+def divided(alignment: LaneAlignment, extent: float) -> tuple[LaneAlignment, LaneAlignment]:
+    """Divide an alignment after ``extent`` metres of s.
 
     Raises
     ------
     ValueError
         If it has no stretch.
     """
-    for index, stretch in enumerate(course):
-        if extent < stretch.extent or index == len(course) - 1:
+    for index, stretch in enumerate(alignment):
+        if extent < stretch.extent or index == len(alignment) - 1:
             share = min(max(extent / stretch.extent, 0.1), 0.9)
             middle = stretch.start + share * (stretch.end - stretch.start)
             head, tail = stretch._replace(end=middle), stretch._replace(start=middle)
-            return (*course[:index], head), (tail, *course[index + 1 :])
+            return (*alignment[:index], head), (tail, *alignment[index + 1 :])
         extent -= stretch.extent
     msg = "nothing to divide"
     raise ValueError(msg)
 
 
-def trimmed(course: Course, *, start: bool, end: bool) -> Course:
+def trimmed(alignment: LaneAlignment, *, start: bool, end: bool) -> LaneAlignment:
     """Take :data:`TRIM` off the ends that meet others, at most a quarter of the last stretch."""
-    result = list(course)
+    result = list(alignment)
     if start:
         old = result[0]
         result[0] = old._replace(start=old.start + cut(old))

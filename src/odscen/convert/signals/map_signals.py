@@ -1,8 +1,8 @@
-"""Signals and signs of the map: which movements they rule, and in which junctions.
+"""Signals and signs of the map: which movements they control, and in which junctions.
 
-A signal acts where it stands and wherever a ``<signalReference>`` repeats it, on the lanes of its
-validity, in the direction of its orientation (sections 14.1 to 14.5). On a connecting road it rules
-the ways that run over it; on any other road it rules the next junction ahead.
+A signal acts where it is and wherever a ``<signalReference>`` repeats it, on the lanes of its
+validity, in the direction of its orientation (sections 14.1 to 14.5). On a connecting road it
+controls the connections that run over it; on any other road it controls the next junction ahead.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from odscen.base.ids import RoadId
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
-    from odscen.convert.model.lane_alignment import Course
+    from odscen.convert.model.lane_alignment import LaneAlignment
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference, Validity
 
 REACH = 80.0
-"""Metres ahead of a signal on a road within which the junction that it rules must come."""
+"""Metres ahead of a signal on a road within which the junction that it controls must come."""
 
 BEHIND = 5.0
-"""Metres past the end of an edge where its signals may stand, as beyond a stop line."""
+"""Metres past the end of an edge where its signals may be, as beyond a stop line."""
 
 SIGN_KINDS = {"stop": Sign.STOP, "yield": Sign.YIELD}
 
@@ -41,7 +41,7 @@ class Acting(NamedTuple):
     orientation: str
     validities: tuple[Validity, ...]
 
-    def rules(self, lane_id: int) -> bool:
+    def applies_to(self, lane_id: int) -> bool:
         """Whether it is valid for a lane; without validity it is for all."""
         if not self.validities:
             return True
@@ -60,10 +60,10 @@ class Acting(NamedTuple):
         return {"+": growing, "-": not growing}.get(self.orientation, True)
 
 
-class Ruled(NamedTuple):
-    """What rules each way: ids of traffic lights, and the strongest sign.
+class SignalControl(NamedTuple):
+    """What controls each connection: ids of traffic lights, and the strongest sign.
 
-    ``unplaced`` are signals that rule nothing, with the reason.
+    ``unplaced`` are signals that control nothing, with the reason.
     """
 
     lights: tuple[tuple[str, ...], ...]
@@ -77,37 +77,37 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
         signal.id: signal_kind(signal) for road in odr.roads.values() for signal in road.signals
     }
     for road in odr.roads.values():
-        things: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
-        for thing in things:
-            kind = kinds.get(thing.id, "other")
+        signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
+        for one in signals:
+            kind = kinds.get(one.id, "other")
             if kind == "traffic_light" or kind in SIGN_KINDS:
-                yield Acting(thing.id, kind, road.id, thing.s, thing.orientation, thing.validities)
+                yield Acting(one.id, kind, road.id, one.s, one.orientation, one.validities)
 
 
-def rule(
+def signal_control(
     odr: OpenDrive,
     table: RoadTable,
     edges: Sequence[EdgePlan],
-    ways: Sequence[PlannedConnection],
+    connections: Sequence[PlannedConnection],
     is_junction: Callable[[int], bool],
-) -> Ruled:
-    """Relate signals and signs to ways.
+) -> SignalControl:
+    """Relate signals and signs to connections.
 
     Parameters
     ----------
-    edges, ways
+    edges, connections
         The network to be.
     is_junction
         Whether an edge (its position) ends at a place where traffic meets, and not only where the
         lanes of one road change.
     """
-    lights: list[dict[str, None]] = [{} for _ in ways]
-    signs = [Sign.NONE for _ in ways]
+    lights: list[dict[str, None]] = [{} for _ in connections]
+    signs = [Sign.NONE for _ in connections]
     over: dict[RoadId, list[int]] = {}
     leaving: dict[int, list[int]] = {}
-    for number, way in enumerate(ways):
-        leaving.setdefault(way.source, []).append(number)
-        for road in _roads(way.course, table):
+    for number, connection in enumerate(connections):
+        leaving.setdefault(connection.source, []).append(number)
+        for road in _roads(connection.alignment, table):
             over.setdefault(road, []).append(number)
     by_road: dict[tuple[int, bool], list[int]] = {}
     for index, edge in enumerate(edges):
@@ -118,9 +118,9 @@ def rule(
         seen[place.signal] = f"road {place.road} > signal {place.signal}"
         inside = odr.roads[place.road].junction is not None
         if inside:
-            numbers = _on_connecting(place, table, ways, over)
+            numbers = _on_connecting(place, table, connections, over)
         else:
-            numbers = _ahead(place, table, edges, ways, by_road, leaving, is_junction)
+            numbers = _ahead(place, table, edges, connections, by_road, leaving, is_junction)
         for number in numbers:
             placed.add(place.signal)
             if place.kind == "traffic_light":
@@ -128,22 +128,22 @@ def rule(
             else:
                 signs[number] = max(signs[number], SIGN_KINDS[place.kind])
     unplaced = [
-        (where, "it rules no movement: no lane within its validity leads to a junction near it")
+        (where, "it controls no movement: no lane within its validity leads to a junction near it")
         for signal, where in seen.items()
         if signal not in placed
     ]
-    return Ruled(tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced))
+    return SignalControl(tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced))
 
 
-def _roads(course: Course, table: RoadTable) -> Iterator[RoadId]:
-    for stretch in course:
+def _roads(alignment: LaneAlignment, table: RoadTable) -> Iterator[RoadId]:
+    for stretch in alignment:
         yield table.road_ids[table.lane_road[stretch.row]]
 
 
 def _on_connecting(
     place: Acting,
     table: RoadTable,
-    ways: Sequence[PlannedConnection],
+    connections: Sequence[PlannedConnection],
     over: dict[RoadId, list[int]],
 ) -> list[int]:
     return [
@@ -151,9 +151,9 @@ def _on_connecting(
         for number in dict.fromkeys(over.get(place.road, ()))
         if any(
             table.road_ids[table.lane_road[stretch.row]] == place.road
-            and place.rules(int(table.lane_id[stretch.row]))
+            and place.applies_to(int(table.lane_id[stretch.row]))
             and place.faces(growing=stretch.end > stretch.start)
-            for stretch in ways[number].course
+            for stretch in connections[number].alignment
         )
     ]
 
@@ -162,7 +162,7 @@ def _ahead(
     place: Acting,
     table: RoadTable,
     edges: Sequence[EdgePlan],
-    ways: Sequence[PlannedConnection],
+    connections: Sequence[PlannedConnection],
     by_road: dict[tuple[int, bool], list[int]],
     leaving: dict[int, list[int]],
     is_junction: Callable[[int], bool],
@@ -179,7 +179,7 @@ def _ahead(
             continue
         edge = ahead[0]
         for number in leaving.get(edge, ()):
-            last = edges[edge].lanes[ways[number].source_lane].course[-1]
-            if place.rules(int(table.lane_id[last.row])):
+            last = edges[edge].lanes[connections[number].source_lane].alignment[-1]
+            if place.applies_to(int(table.lane_id[last.row])):
                 found.append(number)
     return found

@@ -2,11 +2,11 @@
 
 OpenDRIVE says which signals there are and which of them a controller switches together, but nothing
 on timing. A program of ours never shows green to two movements that meet, pedestrians included:
-nobody turns left through oncoming traffic and nobody turns over a crossing with green. Times follow
+no vehicle turns left through oncoming traffic, and none over a crossing with green. Times follow
 common practice:
 
 - yellow by speed: 3 s up to 50 km/h, 4 s up to 60, 5 s above (RiLSA 2015, section 2.4);
-- all-red until the last vehicle has left, (way through the junction + 6 m) / speed, but for the
+- all-red until the last vehicle has left, (path through the junction + 6 m) / speed, but for the
   second that the next ones need to start; whole seconds, from 1 to 8;
 - a crossing turns red so early that one who has just started walks over at 1.2 m/s.
 """
@@ -40,7 +40,7 @@ CLEARING = 14.0
 """m/s at which vehicles are taken to leave a junction, at most."""
 
 STARTING = 1.0
-"""Seconds after the change to green before anybody moves."""
+"""Seconds after the change to green before any road user moves."""
 
 VEHICLE = 6.0
 """Metres of a vehicle that must have left."""
@@ -62,7 +62,7 @@ class SignalGroup(NamedTuple):
         Whether it is a crossing.
     speed
         m/s of the approach.
-    way
+    path
         Metres through the junction, or of the crossing.
     """
 
@@ -70,7 +70,7 @@ class SignalGroup(NamedTuple):
     controller: str
     walkers: bool
     speed: float
-    way: float
+    path: float
 
     @property
     def yellow(self) -> float:
@@ -84,9 +84,9 @@ class SignalGroup(NamedTuple):
     def clearance(self) -> float:
         """Seconds after yellow, or after the crossing's green, until others may go."""
         if self.walkers:
-            return math.ceil(self.way / WALKER)
+            return math.ceil(self.path / WALKER)
         pace = min(max(self.speed, 3.0), CLEARING)
-        return min(max(math.ceil((self.way + VEHICLE) / pace - STARTING), 1.0), 8.0)
+        return min(max(math.ceil((self.path + VEHICLE) / pace - STARTING), 1.0), 8.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
 def _loss(
     groups: Sequence[SignalGroup], stage: frozenset[int], following: frozenset[int]
 ) -> tuple[float, float, float]:
-    """Seconds of clearing crossings, of yellow, and of red, at the end of a stage."""
+    """Seconds of pedestrian clearance, of yellow, and of all-red, at the end of a stage."""
     ending = [groups[g] for g in sorted(stage - following)]
     yellow = max((group.yellow for group in ending), default=0.0)
     red = max((group.clearance for group in ending if not group.walkers), default=0.0)

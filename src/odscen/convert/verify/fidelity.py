@@ -30,8 +30,8 @@ from odscen.convert.verify.lane_relations import (
     is_between_roads,
     lane_relations,
     passed_over,
+    paths_over_short_lanes,
     sumo_ends,
-    ways_over_short_lanes,
 )
 from odscen.convert.verify.net_reader import read_net
 from odscen.convert.verify.polyline_finder import STEP, Finder, Polylines
@@ -227,18 +227,18 @@ def _relations(
     lengths: dict[RoadLane, float] = defaultdict(float)
     for lane, length in zip(lane_of, drivable.lines.lengths.tolist(), strict=True):
         lengths[lane] += length
-    ways = ways_over_short_lanes(stated, lengths) | {pair: {pair} for pair in stated}
+    paths = paths_over_short_lanes(stated, lengths) | {pair: {pair} for pair in stated}
     held: set[LanePair] = set()
     for pair in passed_over(list(lanes.values()), outer, lane_of):
-        held |= ways.get(pair, set())
+        held |= paths.get(pair, set())
     invented = []
     for link in net.links:
         if link.source not in lanes or link.target not in lanes:
             continue
         sources, targets = ends[link.source].end, ends[link.target].start
         pairs = [(a, b) for a in sources for b in targets]
-        found = [pair for pair in pairs if pair in ways]
-        held.update(*(ways[pair] for pair in found))
+        found = [pair for pair in pairs if pair in paths]
+        held.update(*(paths[pair] for pair in found))
         # Within one side of a road SUMO may well divide and join edges as it needs.
         if not found and (not pairs or all(is_between_roads(*pair) for pair in pairs)):
             names = f"{link.source} to {link.target}"

@@ -66,7 +66,7 @@ class UncoveredStretch:
 
 @dataclass(frozen=True, slots=True)
 class LaneRelation:
-    """A way from lane to lane (``road.lane``, ``?`` if SUMO's lane is none of the map's).
+    """A connection from lane to lane (``road.lane``, ``?`` if SUMO's lane is none of the map's).
 
     ``sumo`` names the SUMO lanes of an invented one.
     """

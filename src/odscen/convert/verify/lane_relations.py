@@ -31,7 +31,7 @@ _LANE_SHARES = tuple((k + 0.5) / 10 for k in range(10))
 _APART = 2.0
 """Metres aside at which a SUMO lane belongs to a lane of the map at most."""
 _ALIKE = 0.05
-"""Lanes of the map whose distances differ by less, in metres, are told apart otherwise or not."""
+"""Lanes of the map whose distances differ by less, in metres, count as equally near."""
 
 
 def lane_relations(odr: OpenDrive, drivable: Sequence[LaneKey]) -> dict[LanePair, LaneKey]:
@@ -66,12 +66,12 @@ def lane_relations(odr: OpenDrive, drivable: Sequence[LaneKey]) -> dict[LanePair
     return found
 
 
-def ways_over_short_lanes(
+def paths_over_short_lanes(
     stated: Collection[LanePair], lengths: Mapping[RoadLane, float]
 ) -> dict[LanePair, set[LanePair]]:
     """Relations that follow each other over lanes shorter than a metre, by their outer lanes.
 
-    Nothing ever stands on so short a lane: SUMO may lead across it at once.
+    Nothing ever stops on so short a lane: SUMO may lead across it at once.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def ways_over_short_lanes(
     following: dict[RoadLane, list[RoadLane]] = defaultdict(list)
     for source, target in stated:
         following[source].append(target)
-    ways: dict[LanePair, set[LanePair]] = defaultdict(set)
+    paths: dict[LanePair, set[LanePair]] = defaultdict(set)
     for source, target in stated:
         todo: list[tuple[LanePair, ...]] = [((source, target),)]
         while todo:
@@ -93,9 +93,9 @@ def ways_over_short_lanes(
                 continue
             for further in following[last]:
                 longer = (*chain, (last, further))
-                ways[source, further].update(longer)
+                paths[source, further].update(longer)
                 todo.append(longer)
-    return ways
+    return paths
 
 
 def is_between_roads(source: RoadLane, target: RoadLane) -> bool:

@@ -82,7 +82,7 @@ class NetFile:
         """Links of each junction (by its id) in the order of its ``<request>`` rows.
 
         As SUMO counts them: by incoming lane, then in the order of the connections in the file;
-        of the walking areas only the ways onto crossings.
+        of the walking areas only the links onto crossings.
         """
         leaving: dict[str, list[NetFileLink]] = defaultdict(list)
         for link in self.links:

@@ -33,11 +33,11 @@ def compare_signals(
         Pieces of the map's drivable lanes, and the junction of each owner of a piece.
     """
     lit = lit_junctions(odr)
-    ruled, elsewhere = _ruled_junctions(net, drivable, junction_of)
+    controlled, elsewhere = _controlled_junctions(net, drivable, junction_of)
     return SignalCoverage(
         opendrive=len(lit),
-        sumo=sum(bool(links) for links in _ruled_links(net).values()),
-        lost=tuple(junction for junction in lit if junction not in ruled),
+        sumo=sum(bool(links) for links in _controlled_links(net).values()),
+        lost=tuple(junction for junction in lit if junction not in controlled),
         invented=tuple(name for name, found in elsewhere.items() if not found & set(lit)),
     )
 
@@ -69,7 +69,7 @@ def lit_junctions(odr: OpenDrive) -> tuple[str, ...]:
     )
 
 
-def _ruled_links(net: NetFile) -> dict[str, list[NetFileLink]]:
+def _controlled_links(net: NetFile) -> dict[str, list[NetFileLink]]:
     """Links that a traffic light rules, by SUMO junction."""
     programs = {program.tl for program in net.programs}
     return {
@@ -78,13 +78,13 @@ def _ruled_links(net: NetFile) -> dict[str, list[NetFileLink]]:
     }
 
 
-def _ruled_junctions(
+def _controlled_junctions(
     net: NetFile, drivable: Finder, junction_of: Sequence[str | None]
 ) -> tuple[set[str], dict[str, set[str]]]:
-    """Junctions of the map that SUMO's lights rule: all of them, and by SUMO junction."""
+    """Junctions of the map that SUMO's lights control: all of them, and by SUMO junction."""
     names, shapes = [], []
     by_sumo: dict[str, set[str]] = {}
-    for name, links in _ruled_links(net).items():
+    for name, links in _controlled_links(net).items():
         driven = [link for link in links if link.via]
         if links:
             by_sumo[name] = set()
@@ -110,12 +110,12 @@ def unsafe_pairs(net: NetFile) -> tuple[UnsafePair, ...]:
 def _unsafe_at(
     net: NetFile, junction: NetFileJunction, links: list[NetFileLink]
 ) -> Iterator[UnsafePair]:
-    ruled: dict[str, list[int]] = defaultdict(list)
+    controlled: dict[str, list[int]] = defaultdict(list)
     for row, link in enumerate(links):
         if link.tl:
-            ruled[link.tl].append(row)
+            controlled[link.tl].append(row)
     for program in net.programs:
-        for a, b in combinations(ruled.get(program.tl, ()), 2):
+        for a, b in combinations(controlled.get(program.tl, ()), 2):
             if b not in junction.foes.get(a, ()) and a not in junction.foes.get(b, ()):
                 continue
             indices = (links[a].link_index, links[b].link_index)
@@ -127,7 +127,9 @@ def _unsafe_at(
 
 
 def _middle(net: NetFile, *links: NetFileLink) -> tuple[float, float]:
-    """Where two links meet, about: the middle between the ways they take."""
-    ways = [net.lanes[link.via or link.target].shape for link in links]
-    x, y = np.mean([0.5 * (way.min(axis=0) + way.max(axis=0)) for way in ways], axis=0).tolist()
+    """Where two links meet, about: the middle between their lanes."""
+    shapes = [net.lanes[link.via or link.target].shape for link in links]
+    x, y = np.mean(
+        [0.5 * (shape.min(axis=0) + shape.max(axis=0)) for shape in shapes], axis=0
+    ).tolist()
     return x, y

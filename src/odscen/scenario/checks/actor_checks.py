@@ -182,8 +182,8 @@ def goal_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
         yield error(
             "no_goal",
             f"{subject.where}.spawn",
-            f"{subject.name} starts on {one.spawn!r}, from where no way leads on inside the region "
-            "of interest; start further back or add the next segment",
+            f"{subject.name} starts on {one.spawn!r}, from where no path leads on inside the "
+            "region of interest; start further back or add the next segment",
             nodes=[one.spawn],
         )
         return
@@ -209,7 +209,7 @@ def goal_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
         yield error("goal_unreachable", where, message, nodes=nodes)
     elif not region.is_candidate(spawn, goal):
         message = (
-            f"{subject.name} goes to {one.goal!r}, which is not where a way through the region "
+            f"{subject.name} goes to {one.goal!r}, which is not where a path through the region "
             f"ends, and vanishes there; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield warning("goal_not_candidate", where, message, nodes=nodes)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 SAME_TIME = 1.0
-"""Actors that depart within this many seconds of each other stand on the road together."""
+"""Actors that depart within this many seconds of each other are on the road together."""
 
 
 def check(
@@ -49,7 +49,7 @@ def check(
     lights
         Traffic lights of the map for the rules on their timing; without them those are left out.
     region
-        The scenario's region on ``graph``, if the caller has it: ways found once are remembered.
+        The scenario's region on ``graph``, if the caller has it: paths found once are remembered.
 
     Returns
     -------

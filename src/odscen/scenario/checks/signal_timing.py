@@ -46,7 +46,7 @@ def signal_problems(signals: Signals, lights: Sequence[Light]) -> Iterator[Probl
         where = f"signals.junctions[{index}]"
         light = find_light(lights, timing.junction)
         if light is None:
-            message = f"no traffic light stands in junction {timing.junction!r}; {_known(lights)}"
+            message = f"there is no traffic light in junction {timing.junction!r}; {_known(lights)}"
             yield error("unknown_light", f"{where}.junction", message)
             continue
         if light in timed:

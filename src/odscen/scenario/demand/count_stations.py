@@ -63,7 +63,7 @@ def geh(modelled: float, counted: float, seconds: float) -> float:
 
 
 class Passing:
-    """Finds out which places of counting a way passes.
+    """Finds out which count stations a route passes.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Passing:
         self._lengths = sorted({len(window) for window in self._windows})
 
     def of(self, segments: Sequence[int]) -> list[tuple[int, int]]:
-        """Places that are passed, and where on the way that is done.
+        """Places that are passed, and where on the route that is done.
 
         Parameters
         ----------
@@ -116,10 +116,10 @@ def transitions(graph: MapGraph) -> dict[str, set[str]]:
 
 
 def place_points(graph: MapGraph, places: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """Where places of counting are on the map: x and y in metres, OpenDRIVE frame.
+    """Where count stations are on the map: x and y in metres, OpenDRIVE frame.
 
-    A segment is at the middle of its nodes; a stream where lanes lead from one segment into the
-    next; a turn in the middle of the streams that it is made of. Places with unknown segments, or
+    A segment is at the middle of its nodes; a flow where lanes lead from one segment into the
+    next; a turn in the middle of the flows that it is made of. Places with unknown segments, or
     between which no lane leads, have none.
     """
     lanes, ids = graph.lanes, graph.segments.ids
@@ -150,9 +150,9 @@ def place_points(graph: MapGraph, places: Iterable[str]) -> dict[str, tuple[floa
 def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
     """Yield counts that cannot be right together.
 
-    - Turns out of a stream, or into one, that together are more than the stream; or less, where all
+    - Turns out of a flow, or into one, that together are more than the flow; or less, where all
       of them are counted.
-    - A junction with all ways in and out counted into which more, or fewer, go than come out.
+    - A junction with all entries and exits counted into which more, or fewer, go than come out.
     """
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
@@ -163,7 +163,7 @@ def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
     for place, begin, end, number in counts.rows:
         slices[begin, end][place_segments(place)] = number
     for (begin, end), counted in sorted(slices.items()):
-        found = [*_streams(counted, onwards, before), *_balances(counted, graph, onwards, before)]
+        found = [*_flows(counted, onwards, before), *_balances(counted, graph, onwards, before)]
         for places, message in found:
             yield Contradiction(counts.id, places, begin, end, message)
 
@@ -171,24 +171,24 @@ def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
 _Found = tuple[tuple[str, ...], str]
 
 
-def _streams(
+def _flows(
     counted: Mapping[tuple[str, ...], float],
     onwards: Mapping[str, set[str]],
     before: Mapping[str, set[str]],
 ) -> Iterator[_Found]:
     turns = [place for place in counted if len(place) == 3]
-    for stream, number in counted.items():
-        if len(stream) != 2:
+    for flow, number in counted.items():
+        if len(flow) != 2:
             continue
-        out = [turn for turn in turns if turn[:2] == stream]
-        into = [turn for turn in turns if turn[1:] == stream]
-        every_out = onwards.get(stream[1], set()) <= {turn[2] for turn in out} | {stream[0]}
-        every_in = before.get(stream[0], set()) <= {turn[0] for turn in into} | {stream[1]}
-        for some, every, word in ((out, every_out, "go on"), (into, every_in, "come")):
+        out = [turn for turn in turns if turn[:2] == flow]
+        into = [turn for turn in turns if turn[1:] == flow]
+        every_out = onwards.get(flow[1], set()) <= {turn[2] for turn in out} | {flow[0]}
+        every_in = before.get(flow[0], set()) <= {turn[0] for turn in into} | {flow[1]}
+        for some, every, word in ((out, every_out, "continue"), (into, every_in, "come")):
             total = sum(counted[turn] for turn in some)
             apart = _apart(total, number)
             if some and apart and (total > number or every):
-                name = _name(stream)
+                name = _name(flow)
                 yield (
                     (name, *map(_name, some)),
                     f"{number:g} were counted at {name}, but the turns by which they {word} add "
@@ -205,16 +205,16 @@ def _balances(
     for name, kind in zip(graph.segments.ids, graph.segments.kinds, strict=True):
         if kind != "junction":
             continue
-        ways_in = [(one, str(name)) for one in sorted(before.get(name, ()))]
-        ways_out = [(str(name), one) for one in sorted(onwards.get(name, ()))]
-        if not ways_in or not ways_out or not all(way in counted for way in (*ways_in, *ways_out)):
+        entries = [(one, str(name)) for one in sorted(before.get(name, ()))]
+        exits = [(str(name), one) for one in sorted(onwards.get(name, ()))]
+        if not entries or not exits or not all(pair in counted for pair in (*entries, *exits)):
             continue
-        coming = sum(counted[way] for way in ways_in)
-        leaving = sum(counted[way] for way in ways_out)
+        coming = sum(counted[pair] for pair in entries)
+        leaving = sum(counted[pair] for pair in exits)
         if _apart(coming, leaving):
             yield (
-                tuple(map(_name, (*ways_in, *ways_out))),
-                f"{coming:g} were counted on all ways into {name}, but {leaving:g} on all ways out",
+                tuple(map(_name, (*entries, *exits))),
+                f"{coming:g} were counted on all entries of {name}, but {leaving:g} on all exits",
             )
 
 

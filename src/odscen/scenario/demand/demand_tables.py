@@ -40,7 +40,7 @@ _Row = TypeVar("_Row")
 
 
 class Rows(NamedTuple, Generic[_Row]):
-    """Rows of a table, and the line of the file that each stands in, so that errors can tell it."""
+    """Rows of a table, and the line of the file that each is on, so that errors can name it."""
 
     values: tuple[_Row, ...]
     lines: tuple[int, ...]
@@ -177,7 +177,7 @@ class _TableLine:
 
 
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
-    """Yield the lines of a CSV file; comma, semicolon or tab, which its first line tells."""
+    """Yield the lines of a CSV file; comma, semicolon or tab, as its first line shows."""
     text = text.removeprefix("\ufeff")
     head = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=head.count)

@@ -57,7 +57,7 @@ class Trips:
     departs
         Seconds.
     unmet
-        Trips that have no place to start or no way, and why.
+        Trips that have no place to start or no path, and why.
     """
 
     name: str
@@ -115,7 +115,7 @@ def window(scenario: Scenario, part: Window) -> tuple[float, float]:
 def usual_duration(ground: TripEnds, mix: Mapping[Category, float]) -> float:
     """Seconds that a trip across the region usually takes, roughly.
 
-    The mean way between random places at the mean limit, times :data:`SLOWER`.
+    The mean path between random places at the mean limit, times :data:`SLOWER`.
     """
     rng = np.random.default_rng(0)
     category = max(mix, key=lambda one: mix[one])
@@ -124,8 +124,8 @@ def usual_duration(ground: TripEnds, mix: Mapping[Category, float]) -> float:
     found: list[float] = []
     if len(starts):
         for goal in rng.choice(ends, size=min(len(ends), 20), replace=False).tolist():
-            ways = router.paths_to(goal).distance(rng.choice(starts, size=SAMPLE // 20))
-            found += ways[np.isfinite(ways)].tolist()
+            lengths = router.paths_to(goal).distance(rng.choice(starts, size=SAMPLE // 20))
+            found += lengths[np.isfinite(lengths)].tolist()
     limits = ground.region.graph.lanes.speed_limit
     limit = float(np.nanmean(limits)) if np.isfinite(limits).any() else 13.89
     return max(SLOWER * float(np.mean(found or [500.0])) / limit, 1.0)
@@ -159,10 +159,10 @@ def _drawn(
     goals = np.full(count, -1, dtype=np.int32)
     for category in set(categories):
         mine = np.array([one is category for one in categories], dtype=np.bool_)
-        ways = ground.ways(category, *between)
-        if len(ways.starts):
-            picked = (uniform[mine, 2] * len(ways.starts)).astype(np.intp)
-            starts[mine], goals[mine] = ways.starts[picked], ways.goals(picked, uniform[mine, 3])
+        reach = ground.reachable_ends(category, *between)
+        if len(reach.starts):
+            picked = (uniform[mine, 2] * len(reach.starts)).astype(np.intp)
+            starts[mine], goals[mine] = reach.starts[picked], reach.goals(picked, uniform[mine, 3])
     met = goals >= 0
     return Trips(
         name=name,
@@ -172,7 +172,7 @@ def _drawn(
         goals=goals[met],
         departs=departs[met],
         unmet=int(np.sum(~met)),
-        why="" if met.all() else "there is no place to start or no way",
+        why="" if met.all() else "there is no place to start or no path",
     )
 
 
@@ -193,7 +193,7 @@ def _first_crowd(
     usable: Usable,
     standing: float,
 ) -> Trips:
-    """Vehicles that stand on the road at the start, clear of the placed actors."""
+    """Vehicles that are on the road at the start, clear of the placed actors."""
     day = curve(scenario.demand, background.profile)
     now = standing * (day.amount(60.0) - day.amount(0.0)) / 60.0
     rng = stream(scenario.seed, "standing", background.id)
@@ -204,9 +204,9 @@ def _first_crowd(
     placed = _placed_crowd(scenario, ground.region, usable)
     categories, starts, goals = [], [], []
     for spot, number in zip(spots, numbers, strict=True):
-        ways = ground.ways(spot.category)
-        picked = np.flatnonzero(ways.starts == spot.node)
-        goal = int(ways.goals(picked, np.array([number]))[0]) if len(picked) else -1
+        reach = ground.reachable_ends(spot.category)
+        picked = np.flatnonzero(reach.starts == spot.node)
+        goal = int(reach.goals(picked, np.array([number]))[0]) if len(picked) else -1
         box = box_at(lanes, spot.node, usable.bodies[spot.category])
         if goal >= 0 and placed.is_free(box):
             categories.append(spot.category)

@@ -31,7 +31,7 @@ def segments_of(demand: Demand, name: str) -> tuple[str, ...]:
 
 
 def place_segments(place: str) -> tuple[str, ...]:
-    """Return the segments that a place of counting names, in the order in which they are passed."""
+    """Return the segments that a count station names, in the order in which they are passed."""
     return tuple(place.split(PLACE_SEPARATOR))
 
 
@@ -96,7 +96,7 @@ class TripEnds:
     usable
         What the simulator can use of the map.
     taken
-        Places of placed actors: nobody else starts there.
+        Places of placed actors: no other road user starts there.
     """
 
     def __init__(self, region: Region, usable: Usable, *, taken: Iterable[NodePlace] = ()) -> None:
@@ -108,35 +108,35 @@ class TripEnds:
 
     @cached_property
     def router(self) -> Router:
-        """Ways of vehicles that the simulator has."""
+        """Paths of vehicles that the simulator has."""
         drivable = self._usable.drivable
         mask = self.region.lanes
         return Router(self.region.graph, mask if drivable is None else mask & drivable)
 
     @property
     def walk_router(self) -> WalkRouter:
-        """Ways of pedestrians."""
+        """Paths of pedestrians."""
         return self.region.walk_router
 
     def router_of(self, category: Category) -> Router | WalkRouter:
-        """Ways of a category."""
+        """Paths of a category."""
         return self.walk_router if category is Category.PEDESTRIAN else self.router
 
     def starts(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
-        """Nodes on which somebody can start, ascending; of the whole region without segments."""
+        """Nodes on which a road user can start, ascending; of the whole region without segments."""
         return self._nodes("start", category, segments)
 
     def ends(self, category: Category, segments: tuple[str, ...] | None = None) -> Int32Array:
-        """Nodes at which a way can end, ascending; of the whole region without segments."""
+        """Nodes at which a path can end, ascending; of the whole region without segments."""
         return self._nodes("end", category, segments)
 
-    def ways(
+    def reachable_ends(
         self,
         category: Category,
         origins: tuple[str, ...] | None = None,
         destinations: tuple[str, ...] | None = None,
     ) -> ReachableEnds:
-        """Ways between segments, or anywhere in the region; starts without any are left out."""
+        """Starts and ends between segments, or anywhere; starts without any end are left out."""
         starts, ends = self.starts(category, origins), self.ends(category, destinations)
         every_start, every_end = self.starts(category), self.ends(category)
         if category not in self._reach:
@@ -211,7 +211,7 @@ class TripEnds:
 
     @cached_property
     def _stretch_ends(self) -> BoolArray:
-        """Last node of each lane in each segment on which a body can stand."""
+        """Last node of each lane in each segment on which a body fits."""
         lanes = self.region.graph.lanes
         good = np.flatnonzero(self._on_roads & self._spawnable)
         last = np.ones(len(good), dtype=np.bool_)

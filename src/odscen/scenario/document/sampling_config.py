@@ -1,4 +1,4 @@
-"""What the sampler is told: one small TOML or JSON file, every field with a default (R46).
+"""The configuration of the sampler: one small TOML or JSON file, every field with a default (R46).
 
 An empty file is a valid configuration. docs/sampling.md explains the fields with an example.
 """
@@ -36,8 +36,8 @@ class MapFilter(Part):
     """Which maps may be drawn (R19).
 
     ``names`` and ``exclude`` are shell patterns; ``where`` maps a statistic's name (as in ``odscen
-    maps show``) to bounds; ``weight_by`` names the statistic that a map's chance is proportional to
-    (equal chances without).
+    maps show``) to bounds; ``weight_by`` names the statistic that the probability of a map is
+    proportional to (equal ones without).
     """
 
     names: tuple[Label, ...] = ("*",)
@@ -78,7 +78,7 @@ class EnvironmentShares(Part):
 class PlacingRules(Part):
     """Where actors may start. Junction lanes are never used for sampled spawns.
 
-    ``minimum_gap`` is the free length between two bodies, ``minimum_trip`` the least way to the
+    ``minimum_gap`` is the free length between two bodies, ``minimum_trip`` the shortest path to the
     nearest end of the region, ``lane_types`` restricts to these types (all drivable ones if empty),
     ``speed_limit_max`` keeps a category off faster lanes. Metres and m/s.
     """

@@ -31,7 +31,7 @@ Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 Control = Literal["fixed", "actuated"]
 Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
-"""How many road users; a part of one is a chance."""
+"""How many road users; a fraction is a probability."""
 Mix = dict[Category, Annotated[float, Field(gt=0)]]
 """Share of each category; shares are relative, they need not sum to one."""
 
@@ -82,7 +82,7 @@ class Actor(Part):
 
 
 class Flow(Part):
-    """A stream of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
+    """A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
 
     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
@@ -161,7 +161,7 @@ class Background(Window):
 
     ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
     many are to be on the road at a time; with a profile, on average over a day. ``trips`` is how
-    many set out in the window.
+    many depart in the window.
     """
 
     fill: Annotated[float, Field(gt=0, le=1)] | None = None
@@ -189,7 +189,7 @@ class Demand(Part):
 
     @property
     def parts(self) -> tuple[tuple[str, Matrix | Counts | Background], ...]:
-        """All that puts somebody on the road, with its place in the document."""
+        """All that puts road users on the road, with its place in the document."""
         return tuple(
             (f"demand.{kind}[{index}]", part)
             for kind in ("matrices", "counts", "background")
@@ -200,10 +200,11 @@ class Demand(Part):
 class JunctionTiming(Part):
     """Timing of the traffic light of one junction, where it differs from the map's program.
 
-    ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that stands in none.
+    ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
     ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-    order; empty keeps the program's. Yellow and clearing times cannot be changed. The program
-    begins ``offset`` seconds into the scenario, as if it had run before.
+    order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
+    cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
+    before.
     """
 
     junction: Label
@@ -213,7 +214,7 @@ class JunctionTiming(Part):
 
 
 class Signals(Part):
-    """How traffic lights are run: by the clock, or with greens that waiting vehicles prolong."""
+    """How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens)."""
 
     control: Control = "fixed"
     junctions: tuple[JunctionTiming, ...] = ()

@@ -83,7 +83,7 @@ def rename(scenario: Scenario, *, name: str, description: str | None = None) -> 
 
 
 def set_seed(scenario: Scenario, *, seed: int) -> Scenario:
-    """Set the seed that open goals and the run's chances are drawn by."""
+    """Set the random seed of the open goals and of the run."""
     return _with(scenario, seed=seed)
 
 
@@ -132,7 +132,7 @@ def set_timing(
     Raises
     ------
     ScenarioError
-        If no light stands in the junction, or if it cannot be timed so.
+        If no light is in the junction, or if it cannot be timed so.
     """
     timings = scenario.signals.junctions
     light = find_light(lights, junction)
@@ -314,7 +314,7 @@ def change_actor(scenario: Scenario, actor: str, **fields: Any) -> Scenario:
     changed = _put(scenario, index, **fields)
     new = changed.actors[index]
     if on_foot(new.category) != on_foot(old.category):
-        msg = f"{actor!r} stands where a {old.category} can be, not a {new.category}; add a new one"
+        msg = f"{actor!r} is where a {old.category} can be, not a {new.category}; add a new one"
         raise ScenarioError(msg)
     refuse_errors(duplicate_ids(changed))
     return changed
@@ -357,7 +357,7 @@ def fill_roi(
     Raises
     ------
     ScenarioError
-        If the region is not usable, the share is not possible, or nobody fits.
+        If the region is not usable, the share is not possible, or no actor fits.
     """
     refuse_errors(roi_problems(scenario, graph))
     crowd = sample_scenario(

@@ -4,7 +4,7 @@ A directed multigraph of networkx whose nodes are those of the region of interes
 walks (``kind`` vehicle or pedestrian). A spawn node carries its actor or flow: fields of the
 document with the prefix ``actor_`` or ``flow_``, and with ``order`` their place in the document. An
 edge with ``relation`` ``goal`` leads from the spawn to the goal. What remains of the document is in
-the attributes of the graph. Ways on foot are undirected in the map and stored as two edges.
+the attributes of the graph. Paths on foot are undirected in the map and stored as two edges.
 
 Graph form and document convert into each other without loss. A graph that a program has filled in
 may leave out ids and orders: they are then given in the order of the nodes.

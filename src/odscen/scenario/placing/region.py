@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class NodePlace(NamedTuple):
-    """A node by its index; ``walk`` tells the pedestrian graph from the lane graph."""
+    """A node by its index; ``walk`` says whether it is one of the pedestrian graph."""
 
     walk: bool
     node: int
@@ -64,12 +64,12 @@ class Region:
 
     @cached_property
     def router(self) -> Router:
-        """Ways on the lane graph inside the region."""
+        """Paths on the lane graph inside the region."""
         return Router(self.graph, self.lanes)
 
     @cached_property
     def walk_router(self) -> WalkRouter:
-        """Ways on the pedestrian graph inside the region."""
+        """Paths on the pedestrian graph inside the region."""
         return WalkRouter(self.graph, self.walks)
 
     def place(self, node: str) -> NodePlace | None:
@@ -85,7 +85,7 @@ class Region:
         return self.graph.walks if place.walk else self.graph.lanes
 
     def router_of(self, place: NodePlace) -> Router | WalkRouter:
-        """Return the ways on the graph that a place is on."""
+        """Return the paths on the graph that a place is on."""
         return self.walk_router if place.walk else self.router
 
     def candidates(self, spawn: NodePlace) -> Int32Array:
@@ -93,7 +93,7 @@ class Region:
         return self.router_of(spawn).goal_candidates(spawn.node)
 
     def is_candidate(self, spawn: NodePlace, goal: NodePlace) -> bool:
-        """Whether a goal that a way leads to is among the candidates of a spawn."""
+        """Whether a goal that a path leads to is among the candidates of a spawn."""
         known = self._candidates.get((spawn, goal))
         if known is None:
             known = self.router_of(spawn).is_candidate(spawn.node, goal.node)
@@ -101,7 +101,7 @@ class Region:
         return known
 
     def leads(self, spawn: NodePlace, goal: NodePlace) -> bool:
-        """Whether a way inside the region leads from ``spawn`` on to ``goal``."""
+        """Whether a path inside the region leads from ``spawn`` on to ``goal``."""
         if spawn.walk != goal.walk or spawn == goal or not self.holds(goal):
             return False
         known = self._leads.get((spawn, goal))
@@ -110,7 +110,7 @@ class Region:
         return known
 
     def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
-        """Find the ways between many spawns and goals at once, for :meth:`leads` to remember."""
+        """Find the paths between many spawns and goals at once, for :meth:`leads` to remember."""
         places = {(self.place(spawn), self.place(goal)) for spawn, goal in pairs if goal}
         for router, walk in ((self.router, False), (self.walk_router, True)):
             asked = [

@@ -1,4 +1,4 @@
-"""Where a body can stand on the lane graph, node by node, and the largest crowd that fits (R47)."""
+"""Where a body fits on the lane graph, node by node, and the largest crowd that fits (R47)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ a car at full lock needs to move a lane's width aside."""
 
 
 class MaximalCrowd(NamedTuple):
-    """A maximal crowd: nodes in the order of the graph, and the category that stands on each."""
+    """A maximal crowd: nodes in the order of the graph, and the category that is on each."""
 
     nodes: tuple[int, ...]
     categories: tuple[Category, ...]
@@ -51,7 +51,7 @@ def standing_room(graph: LaneGraph, body: Body, *, allowed: BoolArray) -> BoolAr
 
     Returns
     -------
-    Shape ``(N,)``: the lane is wide enough, it goes on for half a length either way, all nodes
+    Shape ``(N,)``: the lane is wide enough, it continues for half a length either way, all nodes
     under the body are ``allowed``, and none of them bends more than :data:`SAGITTA` permits.
     """
     bends = body.length**2 * np.abs(graph.curvature) / 8 > SAGITTA
@@ -66,7 +66,7 @@ def standing_room(graph: LaneGraph, body: Body, *, allowed: BoolArray) -> BoolAr
 
 
 def late_for_changes(graph: LaneGraph, body: Body) -> BoolArray:
-    """Nodes where lanes may be changed, but not for long enough for somebody who sets off there.
+    """Nodes where lanes may be changed, but not for long enough for a vehicle that departs there.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def max_fit(
 ) -> MaximalCrowd:
     """Place as many bodies as fit: lane after lane, from its start, at the first node that is free.
 
-    At each node the body's category is the one furthest behind its share among those that may stand
+    At each node the body's category is the one furthest behind its share among those that may be
     there, so that the crowd keeps the ``shares`` as closely as the places allow. The result depends
     on nothing but the arguments; with one category nothing can be added to it.
 

@@ -1,4 +1,4 @@
-"""Where sampled actors may stand in a region, category by category, and how many fit (R47)."""
+"""Where sampled actors may start in a region, category by category, and how many fit (R47)."""
 
 from __future__ import annotations
 
@@ -102,13 +102,13 @@ def _with_goal(region: Region, places: PlacingRules, usable: Usable) -> BoolArra
     leaves = np.zeros(len(lanes.x), dtype=np.bool_)
     leaves[lanes.source[inside[lanes.source] & inside[lanes.target]]] = True
     ends = np.flatnonzero(inside & ~leaves)
-    way = distance_to_end(ends, lanes, inside)
+    to_end = distance_to_end(ends, lanes, inside)
     if usable.drivable is None:
-        return inside & leaves & (way >= places.minimum_trip)
+        return inside & leaves & (to_end >= places.minimum_trip)
     driven = distance_to_end(ends[usable.drivable[ends]], lanes, inside & usable.drivable)
     # Where no end can be reached at all (a ring) the goals are the farthest nodes.
-    reached = np.isfinite(driven) | (np.isinf(way) & usable.drivable)
-    return inside & leaves & (way >= places.minimum_trip) & reached
+    reached = np.isfinite(driven) | (np.isinf(to_end) & usable.drivable)
+    return inside & leaves & (to_end >= places.minimum_trip) & reached
 
 
 def _or_all(mask: BoolArray | None, count: int) -> BoolArray:

@@ -23,7 +23,7 @@ class Usable:
     spawnable
         Shape ``(N,)``: lane-graph nodes on which a vehicle can be placed exactly.
     drivable
-        Shape ``(N,)``: lane-graph nodes that a way can lead over.
+        Shape ``(N,)``: lane-graph nodes that a path can lead over.
     walkable
         Shape ``(P,)``: pedestrian nodes on which a walker can be placed, and arrive.
     bodies

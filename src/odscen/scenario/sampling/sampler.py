@@ -171,7 +171,7 @@ def sample_scenario(
 def numbers_to_place(
     fill: float, vehicles: int, walkers: int, *, pedestrian_share: float, most: int | None = None
 ) -> tuple[int, int]:
-    """Vehicles and pedestrians that a fill share stands for (R47).
+    """Vehicles and pedestrians that a fill share amounts to (R47).
 
     The largest number of actors that fit is the ``vehicles`` that fit and as many of the
     ``walkers`` that fit as their share allows; ``fill`` of each are placed, at least one vehicle if
@@ -196,7 +196,7 @@ def _numbers(statistics: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _map_weight(maps: MapFilter, name: str, statistics: Mapping[str, float]) -> float:
-    """Chance of a map, 0 if it does not pass the filter; a missing number passes no bounds."""
+    """Weight of a map, 0 if it does not pass the filter; a missing number passes no bounds."""
     if not any(fnmatchcase(name, pattern) for pattern in maps.names):
         return 0.0
     if any(fnmatchcase(name, pattern) for pattern in maps.exclude):
@@ -232,7 +232,7 @@ def _draw_environment(shares: EnvironmentShares, rng: np.random.Generator) -> En
 
 
 class _ScenarioDraft(NamedTuple):
-    """An actor to be: where it stands, what it is, where it goes, how it moves."""
+    """An actor to be: where it starts, what it is, where it goes, how it moves."""
 
     spot: Spot
     walk: bool
