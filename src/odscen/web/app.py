@@ -16,6 +16,7 @@ from odscen.carla.client import Address
 from odscen.web import (
     carla_routes,
     demand_routes,
+    figure_routes,
     map_routes,
     result_routes,
     run_routes,
@@ -102,6 +103,7 @@ def create_app(
         demand_routes,
         run_routes,
         result_routes,
+        figure_routes,
         carla_routes,
     ):
         app.include_router(routes.router)

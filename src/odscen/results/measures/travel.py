@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     Outcomes = Sequence[ActorOutcome]
 
 _TRIPINFO = "SUMO tripinfo"
+_EVENTS = "SUMO, departed and arrived"
 
 
 def _times(outcomes: Outcomes) -> list[float]:
@@ -68,7 +69,7 @@ def _of_mode(
             unit="s",
             label=f"{who}mean travel time",
             definition=f"Mean time from insertion to arrival, per {walker} that arrived.",
-            source=f"{_TRIPINFO} duration",
+            source=_EVENTS,
             better=Better.LOWER,
             display=CLOCK,
             section=section,
@@ -81,7 +82,7 @@ def _of_mode(
             unit="s",
             label=f"{who}median travel time",
             definition="Median of these times.",
-            source=f"{_TRIPINFO} duration",
+            source=_EVENTS,
             better=Better.LOWER,
             display=CLOCK,
             compute=lambda run: _percentile(of(run), 50.0),
@@ -91,7 +92,7 @@ def _of_mode(
             unit="s",
             label=f"{who}95th percentile travel time",
             definition="95th percentile of these times.",
-            source=f"{_TRIPINFO} duration; FHWA-HOP-06-070",
+            source=f"{_EVENTS}; FHWA-HOP-06-070",
             better=Better.LOWER,
             display=CLOCK,
             compute=lambda run: _percentile(of(run), 95.0),
@@ -102,7 +103,7 @@ def _of_mode(
             label=f"{who}mean speed",
             definition=f"Space mean speed: route metres of all {walker}s that arrived over their "
             "seconds.",
-            source="odscen, from the events of the run",
+            source=f"{_EVENTS}; route length of the lane graph",
             better=Better.HIGHER,
             display=Display("m/s", digits=2) if afoot else KMH,
             section=section if afoot else None,
