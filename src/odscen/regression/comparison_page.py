@@ -179,7 +179,7 @@ def _table_row(row: Row) -> Markup:
         element("th", row.key.label, scope="row"),
         element("td", cells[1]),
         *(element("td", text, class_="n") for text in cells[2:6]),
-        element("td", cells[6] + (_better(row) if clear else ""), class_="fair" if clear else None),
+        element("td", cells[6] + (_better(row) if clear else ""), class_="fair wrap" if clear else None),
     )
 
 

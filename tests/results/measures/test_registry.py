@@ -29,7 +29,7 @@ def test_every_figure_has_its_own_name_and_words_and_a_tolerance_that_a_suite_ma
     assert len({(figure.kind, figure.name) for figure in ALL_FIGURES}) == len(ALL_FIGURES)
     assert len({(figure.kind, figure.label) for figure in ALL_FIGURES}) == len(ALL_FIGURES)
     for figure in ALL_FIGURES:
-        assert figure.label
+        assert 0 < len(figure.label) <= 42, "the chart of a comparison has no room for more"
         assert figure.source
         assert figure.definition.endswith(".")
         assert usual(figure).allowed(100.0) >= 0.0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.figure import RunData
 
 _FHWA = "FHWA-HOP-06-070"
-_TIMES = Display("times", digits=2)
+_RATIO = Display("", digits=2)
 
 
 def _ratios(run: RunData) -> pl.Series:
@@ -53,9 +53,9 @@ FIGURES = (
         source=_FHWA,
         better=Better.LOWER,
         basis=Basis.TRIPS,
-        display=_TIMES,
+        display=_RATIO,
         section=Section.KEY_FIGURES,
-        note="the free-flow time, on average",
+        note="mean travel time over free-flow time",
         compute=_mean_ratio,
     ),
     RunFigure(
@@ -66,9 +66,9 @@ FIGURES = (
         source=_FHWA,
         better=Better.LOWER,
         basis=Basis.TRIPS,
-        display=_TIMES,
+        display=_RATIO,
         section=Section.KEY_FIGURES,
-        note="the free-flow time, to be on time on 19 of 20 trips",
+        note="free-flow times to plan for 19 of 20 trips",
         compute=_late_ratio,
     ),
     RunFigure(
