@@ -174,12 +174,13 @@ def _table_section(figures: Sequence[Row]) -> Markup:
 def _table_row(row: Row) -> Markup:
     cells = row.cells
     clear = row.says is Finding.CLEAR
+    says = row.says + (_better(row) if clear else "")
     return element(
         "tr",
         element("th", row.key.label, scope="row"),
         element("td", cells[1]),
         *(element("td", text, class_="n") for text in cells[2:6]),
-        element("td", cells[6] + (_better(row) if clear else ""), class_="fair wrap" if clear else None),
+        element("td", says, class_="fair wrap" if clear else None),
     )
 
 
