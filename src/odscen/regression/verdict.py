@@ -91,10 +91,14 @@ class Verdict:
 def hold_against(
     baseline: Baseline, runs: Mapping[int, Measured], tolerances: Tolerances
 ) -> Verdict:
-    """Hold new runs, given by seed, against a baseline, by the means over the seeds of both."""
+    """Hold new runs, given by seed, against a baseline, by the means over the seeds of both.
+
+    Figures of the run that the baseline does not have are newer than it, and are not judged.
+    """
     seeds = [seed for seed in baseline.seeds if seed in runs]
     position = {seed: index for index, seed in enumerate(baseline.seeds)}
-    keys = dict.fromkeys((*baseline.figures, *(key for seed in seeds for key in runs[seed])))
+    found = (key for seed in seeds for key in runs[seed] if key.kind != "run")
+    keys = dict.fromkeys((*baseline.figures, *found))
     changes = []
     for key in keys:
         stored = baseline.figures.get(key)

@@ -10,7 +10,7 @@ import pytest
 
 from odscen.errors import InputError
 from odscen.regression.tolerance import usual
-from odscen.results.measures.figure import Basis, Better, Figure, Part, RunData
+from odscen.results.measures.figure import Better, Figure, Part, RunData
 from odscen.results.measures.figure_docs import between_markers, column_table, run_figure_table
 from odscen.results.measures.registry import (
     ALL_FIGURES,
@@ -93,7 +93,6 @@ def test_shipped_baselines_have_known_figures_only() -> None:
         rows = json.loads(file.read_text())["rows"]
         names = {row["figure"] for row in rows if "figure" in row}
         assert names <= {figure.name for figure in RUN_FIGURES}
-        assert names >= {f.name for f in RUN_FIGURES if f.basis is not Basis.CONFLICTS}
 
 
 def test_figures_of_a_run_stand_in_the_parts_of_its_summary() -> None:
