@@ -111,7 +111,7 @@ def test_conflicts_are_told_the_worst_first():
     told = [[cell.text_content() for cell in row] for row in page.findall(".//tbody/tr")]
     assert told == [
         ["5", "c", "d", "crossing", "0.75", "", "", "3, -4"],
-        ["1", "<b>", "a", "in a line", "2.50", "", "", "3, -4"],
+        ["1", "<b>", "a", "following", "2.50", "", "", "3, -4"],
     ]
     text = page.text_content()
     assert "1serious conflictsof 2 recorded" in text

@@ -23,10 +23,10 @@ SHOWN = 15
 """Rows of the table at most."""
 
 KINDS = {
-    "following": "in a line",
+    "following": "following",
     "merging": "merging",
     "crossing": "crossing",
-    "walking": "on foot",
+    "walking": "with a pedestrian",
 }
 
 
