@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.results.curves import presence
 from odscen.results.gridlock import find_incidents
-from odscen.results.measures.figure import Part, RunData
+from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.registry import figure_values
 from odscen.results.outcomes import RunStatus
 from odscen.results.plots import Series, line_chart
@@ -109,7 +109,7 @@ def render_report(
     incidents = find_incidents(plan, actors, events, end=end)
     title = plan.scenario or "Run"
     run = RunData(actors, figures, conflicts=conflicts)
-    counts = figure_values(run, part=Part.ACTORS)
+    counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
     body = [
         _head(title, plan, summary, _in_a_sentence(counts)),

@@ -11,7 +11,7 @@ from odscen.results.conflicts import (
     SERIOUS_TTC,
     is_serious,
 )
-from odscen.results.measures.figure import RunData, Section
+from odscen.results.measures.figure import ReportSection, RunData
 from odscen.results.measures.registry import figure_values
 from odscen.results.report_figures import card_grid, figure_cards
 from odscen.results.report_tables import html_table, report_section
@@ -41,7 +41,7 @@ def conflict_section(conflicts: pl.DataFrame) -> Markup:
     values = {**figure_values(RunData(conflicts=conflicts)), "conflicts": conflicts.height}
     if not (conflicts["kind"] == "walking").any():
         del values["pedestrian_min_pet"]
-    cards = figure_cards(Section.CONFLICTS, values)
+    cards = figure_cards(ReportSection.CONFLICTS, values)
     explained = (
         "the time to collision is what is left until two crash if both continue as they do; the "
         "post-encroachment time is from when the first leaves a spot until the other is there. A "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.catalog.markup import Markup, element, number
-from odscen.results.measures.figure import Better, Section
+from odscen.results.measures.figure import Better, ReportSection
 from odscen.results.measures.registry import RUN_FIGURES
 from odscen.results.report_tables import report_section
 from odscen.results.report_words import duration
@@ -42,7 +42,7 @@ def card_grid(cards: Iterable[Card]) -> Markup:
     return element("div", *shown, class_="cards")
 
 
-def figure_cards(section: Section, values: Mapping[str, Any]) -> list[Card]:
+def figure_cards(section: ReportSection, values: Mapping[str, Any]) -> list[Card]:
     """Cards of all figures of a section that the run has.
 
     Parameters
@@ -58,7 +58,7 @@ def figure_cards(section: Section, values: Mapping[str, Any]) -> list[Card]:
 
 
 def key_figure_section(values: Mapping[str, Any], traces: pl.DataFrame) -> Markup:
-    """Section of the cards.
+    """ReportSection of the cards.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def key_figure_section(values: Mapping[str, Any], traces: pl.DataFrame) -> Marku
         "long, and put back further on. Delay is the time lost below the speed that the driver "
         "desires on a free road, stopped delay the part of it below 0.1 m/s."
     )
-    cards = [*figure_cards(Section.KEY_FIGURES, values), *_speed_on_the_road(traces)]
+    cards = [*figure_cards(ReportSection.KEY_FIGURES, values), *_speed_on_the_road(traces)]
     return report_section("Key figures", card_grid(cards), explained=explained, ident="figures")
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.results.measures.figure import Section
+from odscen.results.measures.figure import ReportSection
 from odscen.results.outcomes import ActorStatus
 from odscen.results.plots import Series, line_chart
 from odscen.results.report_figures import Card, card_grid, figure_cards
@@ -44,7 +44,7 @@ def walking_section(
     arrived = sum(actor.status is ActorStatus.ARRIVED for actor in walkers)
     cards = [
         Card("pedestrians", f"{len(walkers):,}", f"{arrived:,} arrived"),
-        *figure_cards(Section.PEDESTRIANS, figures),
+        *figure_cards(ReportSection.PEDESTRIANS, figures),
     ]
     parts: list[Markup | None] = [card_grid(cards)]
     on_foot = traces.filter(traces["category"] == "pedestrian")

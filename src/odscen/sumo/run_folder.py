@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from odscen import __version__
 from odscen.results.expectations import evaluate
 from odscen.results.gridlock import find_incidents, incident_summary
-from odscen.results.measures.figure import Part
+from odscen.results.measures.figure import SummaryPart
 from odscen.results.measures.registry import COUNTS, figure_values
 from odscen.results.outcomes import RunStatus
 from odscen.results.records import events_from_json, rounded
@@ -165,7 +165,7 @@ def make_summary(
         meso = bool(prepared.about.get("meso"))
         data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso)
         write_figures(folder, data)
-        summary["actors"] = figure_values(data, part=Part.ACTORS)
+        summary["actors"] = figure_values(data, part=SummaryPart.ACTORS)
         summary["figures"] = rounded(figure_values(data))
         summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")

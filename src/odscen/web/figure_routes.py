@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from odscen.results.measures.figure import Better, Part
+from odscen.results.measures.figure import Better, SummaryPart
 from odscen.results.measures.registry import RUN_FIGURES
 from odscen.web.messages import Answer
 
@@ -24,7 +24,7 @@ class FigureInfo(Answer):
     """A figure of a run; ``part`` is where ``summary.json`` has it, "" for at its top."""
 
     name: str
-    part: Part
+    part: SummaryPart
     unit: str
     label: str
     definition: str

@@ -10,7 +10,7 @@ import pytest
 
 from odscen.errors import InputError
 from odscen.regression.tolerance import usual
-from odscen.results.measures.figure import Better, Figure, Part, RunData
+from odscen.results.measures.figure import Better, Figure, RunData, SummaryPart
 from odscen.results.measures.figure_docs import between_markers, column_table, run_figure_table
 from odscen.results.measures.registry import (
     ALL_FIGURES,
@@ -103,8 +103,8 @@ def test_figures_of_a_run_stand_in_the_parts_of_its_summary() -> None:
         "arrived": 3.0,
         "mean_delay": 1.5,
     }
-    assert set(figure_values(RunData(), part=Part.ACTORS)) == set(COUNTS)
-    assert figure_values(RunData(end=60.0), part=Part.RUN) == {"sim_seconds": 60.0}
+    assert set(figure_values(RunData(), part=SummaryPart.ACTORS)) == set(COUNTS)
+    assert figure_values(RunData(end=60.0), part=SummaryPart.RUN) == {"sim_seconds": 60.0}
 
 
 def test_a_value_is_written_in_its_unit() -> None:

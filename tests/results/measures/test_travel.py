@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from odscen.results.measures.figure import Part, RunData
+from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.registry import figure_values
 from odscen.results.records import Event, EventKind
 from odscen.results.summary import Trip, actor_outcomes
@@ -14,7 +14,7 @@ from tests.results.test_summary import EVENTS, plan, planned
 
 def test_counts_add_up_and_count_actors_not_events() -> None:
     outcomes = actor_outcomes(plan(planned("a"), planned("b"), planned("c")), EVENTS)
-    counts = figure_values(RunData(outcomes), part=Part.ACTORS)
+    counts = figure_values(RunData(outcomes), part=SummaryPart.ACTORS)
     assert counts == {
         "planned": 3, "inserted": 2, "arrived": 1, "running": 1, "waiting": 1, "teleported": 1,
         "collided": 2, "emergency_stopped": 1,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.measures.figure import Basis, Better, Display, RunFigure, Section
+from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -59,7 +59,7 @@ FIGURES = (
         source=_HBEFA,
         better=Better.LOWER,
         basis=Basis.ROADS,
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note=_fuel_per_km,
         compute=_total("fuel", 1000.0),
     ),
@@ -92,7 +92,7 @@ FIGURES = (
         better=Better.LOWER,
         basis=Basis.ROADS,
         display=Display("g/km", digits=0),
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note=_co2_in_all,
         compute=_co2_per_km,
     ),

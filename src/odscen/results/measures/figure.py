@@ -42,7 +42,7 @@ class Basis(StrEnum):
     CONFLICTS = "conflicts"
 
 
-class Part(StrEnum):
+class SummaryPart(StrEnum):
     """Parts of ``summary.json`` that hold figures; ``actors`` are counts of actors."""
 
     RUN = ""
@@ -50,7 +50,7 @@ class Part(StrEnum):
     FIGURES = "figures"
 
 
-class Section(StrEnum):
+class ReportSection(StrEnum):
     """Sections of the report with cards of figures."""
 
     KEY_FIGURES = "key figures"
@@ -209,8 +209,8 @@ class RunFigure(Figure):
 
     compute: Callable[[RunData], float | None]
     basis: Basis = Basis.ACTORS
-    part: Part = Part.FIGURES
-    section: Section | None = None
+    part: SummaryPart = SummaryPart.FIGURES
+    section: ReportSection | None = None
     note: str | Callable[[Mapping[str, Any]], str] = ""
     limit: float | None = None
     alarming: bool = False
@@ -219,7 +219,7 @@ class RunFigure(Figure):
     @property
     def count(self) -> bool:
         """Whether it counts actors, so that it is also a share of the planned ones."""
-        return self.part is Part.ACTORS
+        return self.part is SummaryPart.ACTORS
 
     def of_summary(self, summary: Mapping[str, Any]) -> float | None:
         """Its value in ``summary.json``; ``None`` if the run does not have it."""

@@ -6,8 +6,8 @@ from odscen.results.measures.figure import (
     CLOCK,
     CM,
     Better,
+    ReportSection,
     RunFigure,
-    Section,
     largest,
     mean,
 )
@@ -23,7 +23,7 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="5 cm",
         display=CM,
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note="from the planned place",
         compute=lambda run: largest([one.insertion_error for one in run.outcomes]),
     ),

@@ -23,9 +23,9 @@ from odscen.results.measures.figure import (
     ActorFigure,
     Basis,
     Figure,
-    Part,
     RunFigure,
     SegmentFigure,
+    SummaryPart,
 )
 
 if TYPE_CHECKING:
@@ -87,7 +87,10 @@ def figure_of(kind: FigureKind, name: str) -> Figure:
 
 
 def figure_values(
-    data: RunData, figures: Iterable[RunFigure] = RUN_FIGURES, *, part: Part = Part.FIGURES
+    data: RunData,
+    figures: Iterable[RunFigure] = RUN_FIGURES,
+    *,
+    part: SummaryPart = SummaryPart.FIGURES,
 ) -> Values:
     """Values of the figures of one part of the summary.
 

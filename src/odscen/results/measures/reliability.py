@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.measures.figure import Basis, Better, Display, RunFigure, Section
+from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
     import polars as pl
@@ -54,7 +54,7 @@ FIGURES = (
         better=Better.LOWER,
         basis=Basis.TRIPS,
         display=_RATIO,
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note="mean travel time over free-flow time",
         compute=_mean_ratio,
     ),
@@ -67,7 +67,7 @@ FIGURES = (
         better=Better.LOWER,
         basis=Basis.TRIPS,
         display=_RATIO,
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note="free-flow times to plan for 19 of 20 trips",
         compute=_late_ratio,
     ),

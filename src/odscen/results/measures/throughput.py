@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.measures.figure import CLOCK, Basis, Better, Display, RunFigure, Section
+from odscen.results.measures.figure import CLOCK, Basis, Better, Display, ReportSection, RunFigure
 from odscen.results.traffic import over_run
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ FIGURES = (
         source="SUMO lane data, distance",
         basis=Basis.ROADS,
         display=Display("km", digits=0),
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note=_arrivals,
         compute=lambda run: float(run.network["distance"]) / 1000.0,
     ),
@@ -71,7 +71,7 @@ FIGURES = (
         better=Better.LOWER,
         basis=Basis.ROADS,
         display=CLOCK,
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note="per vehicle, on its approaches and in it",
         compute=_worst_junction_delay,
     ),

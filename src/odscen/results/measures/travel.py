@@ -14,8 +14,8 @@ from odscen.results.measures.figure import (
     KMH,
     Better,
     Display,
+    ReportSection,
     RunFigure,
-    Section,
     mean,
 )
 from odscen.results.outcomes import ActorStatus
@@ -57,7 +57,7 @@ def _arrived(outcomes: Outcomes) -> Outcomes:
 
 
 def _of_mode(
-    prefix: str, who: str, of: Callable[[RunData], Outcomes], *, section: Section
+    prefix: str, who: str, of: Callable[[RunData], Outcomes], *, section: ReportSection
 ) -> tuple[RunFigure, ...]:
     """Figures of vehicles or of pedestrians; ``who`` begins the label of the latter."""
     afoot = bool(prefix)
@@ -142,9 +142,9 @@ def _of_mode(
 
 
 FIGURES = (
-    *_of_mode("", "", lambda run: run.vehicles, section=Section.KEY_FIGURES),
+    *_of_mode("", "", lambda run: run.vehicles, section=ReportSection.KEY_FIGURES),
     *_of_mode(
-        "pedestrian_", "pedestrian ", lambda run: run.pedestrians, section=Section.PEDESTRIANS
+        "pedestrian_", "pedestrian ", lambda run: run.pedestrians, section=ReportSection.PEDESTRIANS
     ),
     RunFigure(
         name="mean_stops",
@@ -155,7 +155,7 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="5 % or 0.1",
         display=Display("", digits=1),
-        section=Section.KEY_FIGURES,
+        section=ReportSection.KEY_FIGURES,
         note="on average",
         compute=lambda run: mean([one.stops for one in _arrived(run.vehicles)]),
     ),
