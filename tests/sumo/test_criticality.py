@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from odscen.results.conflicts import SEEN_TTC, conflict_figures
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.recorded import read_conflicts, read_trajectories
 from odscen.sumo.recording import Recording
 from odscen.sumo.runner import PreparedRun, run_prepared
@@ -21,7 +21,7 @@ col = pl.col
 
 def watched(prepared: PreparedRun) -> PreparedRun:
     """The same run with an SSM device in every vehicle."""
-    settings = RunSettings(
+    settings = SumocfgSettings(
         until=UNTIL,
         step_length=prepared.plan.step_length,
         seed=prepared.plan.seed,

@@ -13,10 +13,10 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
+from odscen.app.text_files import write_text
 from odscen.errors import InputError, in_file
 from odscen.regression.measure import Key
 from odscen.results.records import json_with_rows
-from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

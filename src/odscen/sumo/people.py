@@ -7,13 +7,14 @@ independent of what else is in the scenario.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.categories import Category
 from odscen.scenario.counting import observations
+from odscen.scenario.document import Actor
 from odscen.scenario.goals import flow_goals, resolve_goals, stream
 from odscen.scenario.profiles import curve
 from odscen.scenario.region import place_of
@@ -62,6 +63,14 @@ class RoadUser:
         return self.category is Category.PEDESTRIAN
 
 
+_DESIGNED = Actor.model_fields.keys() & {one.name for one in fields(RoadUser)} - {"spawn", "goal"}
+"""Fields of an actor that a run acts on as they are."""
+
+
+def _as_designed(actor: Actor) -> dict[str, Any]:
+    return {name: getattr(actor, name) for name in _DESIGNED}
+
+
 def road_users(
     scenario: Scenario, graph: MapGraph, region: Region, *, until: float
 ) -> tuple[RoadUser, ...]:
@@ -74,19 +83,7 @@ def road_users(
     """
     goals = resolve_goals(scenario, graph, region=region)
     users = [
-        RoadUser(
-            id=actor.id,
-            category=actor.category,
-            spawn=_node(graph, actor.spawn),
-            goal=goals[actor.id],
-            depart=actor.depart,
-            model=actor.model,
-            speed=actor.speed,
-            lateral_offset=actor.lateral_offset,
-            style=actor.style,
-            ego=actor.ego,
-            ignores_red=actor.ignores_red,
-        )
+        RoadUser(spawn=_node(graph, actor.spawn), goal=goals[actor.id], **_as_designed(actor))
         for actor in scenario.actors
     ]
     if scenario.flows:

@@ -36,7 +36,7 @@ from odscen.scenario.supply import Usable
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from odscen.workflow import LoadedMap
+    from odscen.app.maps import LoadedMap
 
 _KNOWN = {"scenario", "graph", "lights", "usable"}
 _FIELDS_OF: Mapping[str, type[Part]] = {

@@ -11,6 +11,7 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
+from odscen.app.maps import load_map
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import check_name, name_from_file
 from odscen.categories import DEFAULT_BODY
@@ -30,7 +31,6 @@ from odscen.web.messages import (
 )
 from odscen.web.packed import answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
-from odscen.workflow import load_map
 
 if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry, Progress

@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
-from odscen.workflow import load_map
+from odscen.app.maps import load_map
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
