@@ -12,15 +12,16 @@ from hypothesis import strategies as st
 
 from odscen.categories import DEFAULT_BODY, Category
 from odscen.sumo.driving import KINDS, STYLES, Driver, draw_factor, driver, number
+from odscen.sumo.people import RoadUser
 from odscen.sumo.weather import BRAKING, NO_EFFECT, REACTION, stopping_speed, weather_effect
 from tests.sumo.conftest import BIN
 
 
 def made(category: Category = Category.CAR, **changes: Any) -> Driver:
-    values: dict[str, Any] = {
-        "style": "normal", "factor": 1.0, "speed": None, "limit": 13.89, "weather": NO_EFFECT,
-    }  # fmt: skip
-    return driver(category, DEFAULT_BODY[category], **{**values, **changes})
+    own = {name: changes.pop(name) for name in ("style", "speed", "ignores_red") if name in changes}
+    user = RoadUser(id="one", category=category, spawn=0, goal=1, depart=0.0, **own)
+    values: dict[str, Any] = {"factor": 1.0, "limit": 13.89, "weather": NO_EFFECT}
+    return driver(user, DEFAULT_BODY[category], **{**values, **changes})
 
 
 def test_a_normal_car_in_good_weather_is_sumos_own() -> None:

@@ -471,16 +471,17 @@ def test_a_worker_ends_when_the_program_that_started_it_is_gone(
     script = """
 import os, sys, threading, time
 from pathlib import Path
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import read_scenario
 from odscen.catalog.store import Workspace
 from odscen.sumo.live import Live
 from odscen.sumo.prepare import prepare
 from odscen.sumo.progress import Pace
 from odscen.sumo.runner import run_prepared
 workspace = Workspace.open(Path(sys.argv[1]))
-scenario = workflow.read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
+scenario = read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
 entry = workspace.map("signal_crossing")
-prepared = prepare(scenario, workflow.load_map(entry).sumo, entry.path("net"))
+prepared = prepare(scenario, load_map(entry).sumo, entry.path("net"))
 live = Live(Pace(speed=0.1))
 threading.Thread(
     target=run_prepared, args=(prepared, Path(sys.argv[3]) / "run"), kwargs={"live": live},

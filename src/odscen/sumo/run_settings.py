@@ -21,6 +21,13 @@ _LONGEST = 1e9
 """Seconds that a run may last, as in the document."""
 
 
+def _refuse_time(name: str, seconds: float | None, *, most: float = math.inf) -> None:
+    if seconds is not None and not (0 < seconds <= most and math.isfinite(seconds)):
+        limit = f" and at most {most:g}" if math.isfinite(most) else ""
+        msg = f"{name} must be above 0{limit} s, not {seconds:g}"
+        raise InputError(msg)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSettings:
     """How a scenario is run; times are in seconds.
@@ -101,10 +108,3 @@ class RunSettings:
 
 AS_DESIGNED = RunSettings()
 """A run as its scenario says, without any wish."""
-
-
-def _refuse_time(name: str, seconds: float | None, *, most: float = math.inf) -> None:
-    if seconds is not None and not (0 < seconds <= most and math.isfinite(seconds)):
-        limit = f" and at most {most:g}" if math.isfinite(most) else ""
-        msg = f"{name} must be above 0{limit} s, not {seconds:g}"
-        raise InputError(msg)
