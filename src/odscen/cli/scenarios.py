@@ -6,7 +6,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import click
 import typer
 
 from odscen.app.export import EXPORTERS
@@ -15,6 +14,13 @@ from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, prog
 ScenarioArgument = Annotated[
     Path, typer.Argument(help="Scenario, as JSON or GraphML.", metavar="SCENARIO")
 ]
+
+
+def _format(text: str) -> str:
+    if text not in EXPORTERS:
+        msg = f"{text!r} is not one of {', '.join(EXPORTERS)}"
+        raise typer.BadParameter(msg)
+    return text
 
 
 def generate(
@@ -102,7 +108,8 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            click_type=click.Choice(list(EXPORTERS)),
+            parser=_format,
+            metavar="|".join(EXPORTERS),
             help="; ".join(f"{one.name}: {one.label}" for one in EXPORTERS.values()) + ".",
         ),
     ],
