@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from odscen.regression.measure import Kind, Measured
     from odscen.scenario.document import Scenario
+    from odscen.sumo.run_settings import RunSettings
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -48,9 +49,7 @@ class Baseline:
     figures: dict[Key, tuple[float | None, ...]]
 
 
-def fingerprint(
-    scenario: Scenario, map_sha256: str, *, until: float | None, step_length: float | None
-) -> Fingerprint:
+def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> Fingerprint:
     """Fingerprint of what a scenario is run from.
 
     The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
@@ -58,8 +57,8 @@ def fingerprint(
     """
     # What has its default value is left out: a field that a later version adds changes nothing.
     document = scenario.model_dump(mode="json", exclude_defaults=True)
-    settings = {"duration": until, "step_length": step_length}
-    given = {name: value for name, value in settings.items() if value is not None}
+    wished = {"duration": settings.until, "step_length": settings.step_length}
+    given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)

@@ -204,9 +204,7 @@ def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_L
             scenario = scenario.model_copy(update={"map": reference})
             settings = _settings(case, suite)
             run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
-        made_of = fingerprint(
-            scenario, entry.sha256, until=case.until, step_length=case.step_length
-        )
+        made_of = fingerprint(scenario, entry.sha256, settings)
         baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
         run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
         loaded.append(_Loaded(case, run, made_of, baseline))
