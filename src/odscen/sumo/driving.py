@@ -145,7 +145,7 @@ def driver(
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
         return _walker(user, body, speed=speed)
-    kind, manner = KINDS[category], STYLES[user.style]
+    kind, manner = KINDS[category], STYLES[user.design.style]
     max_speed = kind.max_speed
     if speed is not None:
         max_speed = speed
@@ -184,7 +184,7 @@ def _walker(user: RoadUser, body: Body, *, speed: float) -> Driver:
         ("speedDev", "0"),
         ("emissionClass", KINDS[Category.PEDESTRIAN].emissions),
     )
-    if user.ignores_red:
+    if user.design.ignores_red:
         attributes += (("jmDriveAfterRedTime", number(ALWAYS, digits=0)),)
     return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
 

@@ -7,8 +7,8 @@ independent of what else is in the scenario.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,11 +27,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.lanegraph.model import IntArray, MapGraph
-    from odscen.scenario.document import DrivingStyle, Flow, Scenario
+    from odscen.scenario.document import Flow, Scenario
     from odscen.scenario.profiles import Curve
     from odscen.scenario.region import Region
     from odscen.scenario.supply import Usable
     from odscen.scenario.trips import Trips
+
+
+_AS_USUAL = Actor(id="anybody", category=Category.CAR, spawn="anywhere")
+"""Its optional fields have the document's defaults; the others mean nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,9 @@ class RoadUser:
     They count on the pedestrian graph for pedestrians and on the lane graph for everybody else.
     ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
     of the demand: many share a goal, so their ways are found from there.
+
+    ``design`` is the actor as the document has it, for what is not decided here but acted on as it
+    is: model, style and the like. Members of flows and demand are as usual.
     """
 
     id: str
@@ -48,27 +55,15 @@ class RoadUser:
     spawn: int
     goal: int
     depart: float
-    model: str | None = None
     speed: float | None = None
-    lateral_offset: float = 0.0
-    style: DrivingStyle = "normal"
     flow: str | None = None
-    ego: bool = False
-    ignores_red: bool = False
     trip: bool = False
+    design: Actor = _AS_USUAL
 
     @property
     def person(self) -> bool:
         """Whether it moves on the pedestrian graph."""
         return self.category is Category.PEDESTRIAN
-
-
-_DESIGNED = Actor.model_fields.keys() & {one.name for one in fields(RoadUser)} - {"spawn", "goal"}
-"""Fields of an actor that a run acts on as they are."""
-
-
-def _as_designed(actor: Actor) -> dict[str, Any]:
-    return {name: getattr(actor, name) for name in _DESIGNED}
 
 
 def road_users(
@@ -83,7 +78,15 @@ def road_users(
     """
     goals = resolve_goals(scenario, graph, region=region)
     users = [
-        RoadUser(spawn=_node(graph, actor.spawn), goal=goals[actor.id], **_as_designed(actor))
+        RoadUser(
+            id=actor.id,
+            category=actor.category,
+            spawn=_node(graph, actor.spawn),
+            goal=goals[actor.id],
+            depart=actor.depart,
+            speed=actor.speed,
+            design=actor,
+        )
         for actor in scenario.actors
     ]
     if scenario.flows:

@@ -254,7 +254,7 @@ class _Writer:
             return _Way(None, str(error), length, duration)
 
     def _route(self, user: RoadUser, body: Body, path: IntArray) -> Route | Walk:
-        offset = user.lateral_offset
+        offset = user.design.lateral_offset
         if user.person:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
@@ -278,18 +278,18 @@ class _Writer:
         return driver(
             user,
             body,
-            factor=draw_factor(self._seed, user.id, user.style, user.category),
+            factor=draw_factor(self._seed, user.id, user.design.style, user.category),
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
-            electric=user.model is not None
+            electric=user.design.model is not None
             and self._assets is not None
-            and self._assets.electric(user.model),
+            and self._assets.electric(user.design.model),
         )
 
     def _body(self, user: RoadUser) -> Body:
         known = None
-        if user.model is not None and self._assets is not None:
-            known = self._assets.dimensions(user.model)
+        if user.design.model is not None and self._assets is not None:
+            known = self._assets.dimensions(user.design.model)
         return DEFAULT_BODY[user.category] if known is None else known
 
     def _planned(self, user: RoadUser, body: Body, manner: Driver, way: _Way) -> PlannedActor:
@@ -305,17 +305,17 @@ class _Writer:
             depart=user.depart,
             length=body.length,
             width=body.width,
-            x=float(graph.x[spawn]) - math.sin(hdg) * user.lateral_offset,
-            y=float(graph.y[spawn]) + math.cos(hdg) * user.lateral_offset,
+            x=float(graph.x[spawn]) - math.sin(hdg) * user.design.lateral_offset,
+            y=float(graph.y[spawn]) + math.cos(hdg) * user.design.lateral_offset,
             z=float(graph.z[spawn]),
             hdg=hdg,
             speed=user.speed,
             speed_factor=manner.speed_factor,
             route_length=way.length,
             free_flow_time=way.free_flow_time,
-            model=user.model,
+            model=user.design.model,
             flow=user.flow,
-            ego=user.ego,
+            ego=user.design.ego,
             problem=way.problem,
         )
 
