@@ -307,7 +307,7 @@ def test_a_run_whose_preparation_fails_can_be_removed(
         msg = "no way"
         raise SimulationError(msg)
 
-    monkeypatch.setattr(runs, "prepare", refuse)
+    monkeypatch.setattr(runs, "prepare_run", refuse)
     run = start(client, sampled)
     assert finished(client, run)["error"] == "no way"
     assert client.delete(f"/api/runs/{run}").status_code == 204
@@ -327,7 +327,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
 ) -> None:
     good = start(client, sampled, speed=5)
     wait_for(lambda: client.get(f"/api/runs/{good}").json()["state"] == "running" or None)
-    real = runs.prepare
+    real = runs.prepare_run
 
     def spoiled(*arguments: Any, **more: Any) -> Any:
         prepared = real(*arguments, **more)
@@ -338,7 +338,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
         object.__setattr__(prepared, "sumo_files", files)
         return prepared
 
-    monkeypatch.setattr(runs, "prepare", spoiled)
+    monkeypatch.setattr(runs, "prepare_run", spoiled)
     bad = start(client, sampled)
     seen = watch(client, bad)
     assert seen.of("end")[0]["state"] == "failed"
