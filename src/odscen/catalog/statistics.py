@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.catalog.drawing import ranges
+from odscen.catalog.drawing import Bounds, ranges
 from odscen.opendrive.model import DRIVABLE_TYPES
 from odscen.opendrive.objects import crosswalks, signal_kind, stop_lines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from odscen.catalog.drawing import Bounds
     from odscen.lanegraph.model import MapGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.model import OpenDrive

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
+from pydantic import TypeAdapter
 from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
@@ -22,6 +23,7 @@ from odscen.web import (
     scenario_routes,
 )
 from odscen.web.errors import RESPONSES, add_error_handlers, error_response
+from odscen.web.live_messages import LiveMessage
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
@@ -79,7 +81,7 @@ def create_app(
         yield
         shared.close()
 
-    app = FastAPI(
+    app = _Api(
         title="odscen",
         version=__version__,
         docs_url="/api/docs",
@@ -117,6 +119,21 @@ def create_app(
         app.get("/", include_in_schema=False)(lambda: HTMLResponse(_PLAIN))
     app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
     return app
+
+
+class _Api(FastAPI):
+    """The interface; its schema also has what goes over WebSockets."""
+
+    def openapi(self) -> dict[str, Any]:
+        """Schema of all messages, made once."""
+        if self.openapi_schema is None:
+            schemas = super().openapi()["components"]["schemas"]
+            live = TypeAdapter[object](LiveMessage).json_schema(
+                mode="serialization", ref_template="#/components/schemas/{model}"
+            )
+            schemas |= live.pop("$defs")
+            schemas["LiveMessage"] = live
+        return super().openapi()
 
 
 class _Page(StaticFiles):

@@ -9,16 +9,27 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import orjson
 from starlette.websockets import WebSocketDisconnect
 
+from odscen.categories import Category
 from odscen.sumo.snapshots import origin
+from odscen.web.live_messages import (
+    LiveActor,
+    LiveEnd,
+    LiveHello,
+    LiveIncidents,
+    LiveLights,
+    LiveState,
+)
+from odscen.web.run_messages import IncidentInfo
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
+    from odscen.results.records import Plan
+    from odscen.web.messages import Answer
     from odscen.web.runs import Active
 
 GRACE = 5.0
@@ -34,7 +45,8 @@ class LiveView:
         self._changed = asyncio.Event()
         self._ready = True
         self._gone = False
-        self._said: dict[str, Any] = {}
+        self._greeted = False
+        self._said: LiveState | None = None
         self._lights: dict[str, str] = {}
         self._incidents = 0
         self._frame = 0
@@ -76,8 +88,7 @@ class LiveView:
             else:
                 await self._changed.wait()
         if not self._gone:
-            end = {"type": "end", "state": self._run.ended, "error": self._run.error}
-            await self._send(end)
+            await self._send(LiveEnd(state=self._run.state, error=self._run.error))
             await self._socket.close()
 
     async def _wait_once(self) -> None:
@@ -95,48 +106,22 @@ class LiveView:
     async def _tell_changes(self) -> None:
         """Tell what has changed since this client was told last."""
         live, plan = self._run.live, self._run.plan
-        if plan is not None and "hello" not in self._said:
-            self._said["hello"] = True
-            await self._send(self._hello())
-        state = {"type": "state", "state": self._run.state, "speed": live.pace.speed}
-        if state != self._said.get("state"):
-            self._said["state"] = state
+        if plan is not None and not self._greeted:
+            self._greeted = True
+            await self._send(_hello(plan))
+        state = LiveState(state=self._run.state, speed=live.pace.speed)
+        if state != self._said:
+            self._said = state
             await self._send(state)
         lights, incidents = live.lights, live.incidents
         changed = {n: state for n, state in lights.items() if self._lights.get(n) != state}
         if changed:
             self._lights = lights
-            await self._send({"type": "lights", "lights": changed})
+            await self._send(LiveLights(lights=changed))
         if len(incidents) > self._incidents:
             new = incidents[self._incidents :]
             self._incidents += len(new)
-            await self._send({"type": "events", "events": new})
-
-    def _hello(self) -> dict[str, Any]:
-        plan = self._run.plan
-        if plan is None:
-            raise AssertionError
-        return {
-            "type": "hello",
-            "scenario": plan.scenario,
-            "until": plan.until,
-            "step_length": plan.step_length,
-            "origin": origin(plan),
-            "actors": [
-                {
-                    "index": index,
-                    "id": actor.id,
-                    "category": actor.category,
-                    "model": actor.model,
-                    "length": actor.length,
-                    "width": actor.width,
-                    "ego": actor.ego,
-                    "flow": actor.flow,
-                    "depart": actor.depart,
-                }
-                for index, actor in enumerate(plan.actors)
-            ],
-        }
+            await self._send(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
 
     async def _send_frame(self) -> None:
         picture = self._run.live.picture
@@ -144,8 +129,8 @@ class LiveView:
         self._ready = False
         await self._socket.send_bytes(picture.frame)
 
-    async def _send(self, message: dict[str, Any]) -> None:
-        await self._socket.send_text(orjson.dumps(message).decode())
+    async def _send(self, message: Answer) -> None:
+        await self._socket.send_text(message.model_dump_json())
 
     async def _listen(self) -> None:
         while True:
@@ -156,3 +141,27 @@ class LiveView:
                 return
             self._ready = True
             self._changed.set()
+
+
+def _hello(plan: Plan) -> LiveHello:
+    """Introduce everybody who will ever be in a frame."""
+    return LiveHello(
+        scenario=plan.scenario,
+        until=plan.until,
+        step_length=plan.step_length,
+        origin=origin(plan),
+        actors=[
+            LiveActor(
+                index=index,
+                id=actor.id,
+                category=Category(actor.category),
+                model=actor.model,
+                length=actor.length,
+                width=actor.width,
+                ego=actor.ego,
+                flow=actor.flow,
+                depart=actor.depart,
+            )
+            for index, actor in enumerate(plan.actors)
+        ],
+    )

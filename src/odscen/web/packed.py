@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry
 
 
+UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "What the client has is right."}}
+"""What a packed answer may be instead, for the schema."""
+
+
 class Packed(NamedTuple):
     """Bytes, compressed, and a tag that changes with them."""
 
@@ -33,7 +37,7 @@ def pack(content: bytes) -> Packed:
     return Packed(gzip.compress(content, 5, mtime=0), tag)
 
 
-def answer(request: Request, packed: Packed, *, media_type: str = "application/json") -> Response:
+def answer(request: Request, packed: Packed) -> Response:
     """Send it, or only say that what the browser has is still right."""
     headers = {"ETag": packed.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     if request.headers.get("if-none-match") == packed.tag:
@@ -43,7 +47,7 @@ def answer(request: Request, packed: Packed, *, media_type: str = "application/j
         headers["Content-Encoding"] = "gzip"
     else:
         content = gzip.decompress(content)
-    return Response(content, media_type=media_type, headers=headers)
+    return Response(content, media_type="application/json", headers=headers)
 
 
 @lru_cache(maxsize=8)

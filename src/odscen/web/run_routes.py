@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import orjson
 from fastapi import APIRouter, Query
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.websockets import WebSocket
 
 from odscen.errors import InputError, NotFoundError
@@ -22,11 +21,13 @@ from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
 from odscen.sumo.recorded import read_trajectories
 from odscen.web.live import LiveView
-from odscen.web.packed import answer, pack
+from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.run_messages import (
     Control,
     GoOn,
+    IncidentInfo,
     NewRun,
+    ReplayColumns,
     RunContent,
     RunCurve,
     RunCurves,
@@ -38,6 +39,7 @@ from odscen.web.run_messages import (
     RunStarted,
 )
 from odscen.web.services import Shared
+from odscen.web.summary_messages import RunSummary
 
 if TYPE_CHECKING:
     import polars as pl
@@ -98,7 +100,7 @@ def control(run: str, wish: Control, shared: Shared) -> RunInfo:
     return shared.runs.control(run, wish)
 
 
-@router.get("/{run}/report.html", response_class=Response)
+@router.get("/{run}/report.html", response_class=HTMLResponse)
 def report(run: str, shared: Shared) -> Response:
     """Report of a completed run."""
     return page_of_run(shared, run, layout.REPORT_FILE)
@@ -111,13 +113,13 @@ def page_of_run(shared: Shared, run: str, name: str) -> Response:
 
 
 @router.get("/{run}/summary")
-def summary(run: str, shared: Shared) -> dict[str, Any]:
+def summary(run: str, shared: Shared) -> RunSummary:
     """Key figures of a finished run: its ``summary.json``."""
-    path = shared.runs.kept.folder(run) / layout.SUMMARY_FILE
-    if not path.is_file():
+    shared.runs.kept.folder(run)
+    found = shared.runs.kept.summary(run)
+    if found is None:
         what = "summary of run"
         raise NotFoundError(what, run, [])
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
 
@@ -136,7 +138,8 @@ def events(run: str, shared: Shared) -> RunEvents:
         for event in events_from_json(path.read_text(encoding="utf-8"))
         if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
     ]
-    return RunEvents(events=found[:MOST_EVENTS], left_off=max(0, len(found) - MOST_EVENTS))
+    rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
+    return RunEvents(events=rows, left_off=max(0, len(found) - MOST_EVENTS))
 
 
 @router.get("/{run}/curves")
@@ -144,7 +147,7 @@ def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
     table, plan, _ = _recorded(shared, run)
     actors = actors_from_json(_kept(shared, run, layout.ACTORS_FILE).read_text(encoding="utf-8"))
-    found = run_curves(plan, actors, table, end=_sim_seconds(summary(run, shared)))
+    found = run_curves(plan, actors, table, end=summary(run, shared).sim_seconds or 0.0)
     return RunCurves(
         counts=RunCurve(**_lists(found.counts)),
         speeds=RunSpeeds(**_lists(found.speeds)),
@@ -152,7 +155,7 @@ def curves(run: str, shared: Shared) -> RunCurves:
     )
 
 
-@router.get("/{run}/trajectories")
+@router.get("/{run}/trajectories", response_model=ReplayColumns, responses=UNCHANGED)
 def trajectories(
     run: str,
     request: Request,
@@ -161,7 +164,7 @@ def trajectories(
     most: Annotated[
         int | None, Query(ge=1, description="Rows at most; fewer steps if need be.")
     ] = None,
-) -> Any:
+) -> Response:
     """Where everybody was, as columns; see ``docs/server.md``."""
     table, plan, read = _recorded(shared, run)
     if most is not None:
@@ -199,11 +202,6 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     if recorded is None:
         raise NotFoundError(what, run, [])
     return recorded.rows, plan, recorded.every
-
-
-def _sim_seconds(said: dict[str, Any]) -> float:
-    seconds = said.get("sim_seconds")
-    return float(seconds) if isinstance(seconds, int | float) else 0.0
 
 
 def _lists(columns: Counts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:

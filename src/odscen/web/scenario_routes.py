@@ -177,7 +177,11 @@ def roi(name: str, shared: Shared) -> RoiInfo:
     )
 
 
-@router.get("/{name}/download", response_class=Response)
+@router.get(
+    "/{name}/download",
+    response_model=Scenario,
+    responses={200: {"content": {"application/xml": {"schema": {"type": "string"}}}}},
+)
 def download(name: str, shared: Shared, form: Literal["json", "graphml"] = "json") -> Response:
     """Download the scenario as its document or in its graph form."""
     scenario = shared.drafts.get(name).scenario

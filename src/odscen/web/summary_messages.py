@@ -1,0 +1,100 @@
+"""What a run says of itself at its end: ``summary.json`` as it goes over the wire.
+
+Runs of earlier versions lack some fields, which then have their defaults.
+"""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from odscen.results.gridlock import Trouble
+from odscen.sumo.run_folder import RunStatus
+from odscen.web.messages import Answer
+
+
+class ActorCounts(Answer):
+    """How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
+
+    A failed run knows only how many were planned.
+    """
+
+    planned: int
+    inserted: int | None = None
+    arrived: int | None = None
+    running: int | None = None
+    waiting: int | None = None
+    teleported: int | None = None
+    collided: int | None = None
+    emergency_stopped: int | None = None
+
+
+class GridlockInfo(Answer):
+    """Where traffic got stuck: how often, and the first of the places."""
+
+    jams: int
+    jams_at_the_end: int
+    moved_on: int
+    kept_out: int
+    places: list[Trouble]
+
+
+class ExpectationInfo(Answer):
+    """An expectation, what came of it, and whether it was met."""
+
+    expectation: str
+    value: float | None
+    passed: bool
+
+
+class SliceInfo(Answer):
+    """A slice of a long run: its end, and what it took up to there; megabytes."""
+
+    time: float
+    running: int
+    steps: int
+    wall_seconds: float
+    memory_mb: float
+
+
+class SlicesInfo(Answer):
+    """Slices that are complete, up to ``time`` in seconds."""
+
+    time: float
+    done: list[SliceInfo]
+
+
+class RunSummary(Answer):
+    """Key figures of a run that has ended; seconds, metres, m/s.
+
+    ``figures`` are those of ``docs/runs.md`` by name, null where there was nothing to measure.
+    ``driven_by`` says who moved the actors, if not SUMO. ``files`` are relative to the run's
+    folder.
+    """
+
+    format: str
+    version: int
+    status: RunStatus
+    error: str | None = None
+    stopped: bool = False
+    scenario: str
+    map: str | None = None
+    map_sha256: str | None = None
+    meso: bool = False
+    driven_by: str | None = None
+    seed: int
+    until: float
+    step_length: float
+    sim_seconds: float | None = None
+    steps: int | None = None
+    wall_seconds: float
+    real_time_factor: float | None = None
+    actors: ActorCounts
+    insertion_error_max: float | None = None
+    figures: dict[str, float | None] = Field(default_factory=dict)
+    gridlock: GridlockInfo | None = None
+    expectations: list[ExpectationInfo] = Field(default_factory=list)
+    problems: list[str] = Field(default_factory=list)
+    notes: list[str] = Field(default_factory=list)
+    files: dict[str, str] = Field(default_factory=dict)
+    versions: dict[str, str] = Field(default_factory=dict)
+    slices: SlicesInfo | None = None
