@@ -3,6 +3,8 @@ from __future__ import annotations
 import inspect
 import json
 import threading
+from string import Formatter
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,11 +16,13 @@ from odscen.catalog.store import Workspace
 from odscen.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario import demand_edits, edits
+from odscen.scenario.document import Actor, Flow, Matrix, Part
+from odscen.scenario.edit_registry import EDIT_ENTRIES
 from odscen.scenario.files import dumps, loads, read_any
 from odscen.scenario.places import late_for_changes
 from odscen.scenario.region import Region, name_of, place_of
 from odscen.web.app import create_app
-from odscen.web.edits import FUNCTIONS
+from odscen.web.edits import MESSAGES, EditBase
 from tests.web.conftest import CROSSING
 
 ALL = (
@@ -115,8 +119,29 @@ def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
         for name, function in inspect.getmembers(module, inspect.isfunction)
         if not name.startswith("_") and function.__module__ == module.__name__
     }
-    assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments", "removable_segments"}
-    assert {kind for kind, _ in ALL} == set(FUNCTIONS)
+    kinds = set(EDIT_ENTRIES)
+    assert kinds == public - {"new_scenario", "eligible_segments", "removable_segments"}
+    assert {kind for kind, _ in ALL} == kinds
+    assert {get_args(message.model_fields["kind"].annotation)[0] for message in MESSAGES} == kinds
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.__name__)
+def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBase]) -> None:
+    (kind,) = get_args(message.model_fields["kind"].annotation)
+    named = {name for _, name, _, _ in Formatter().parse(EDIT_ENTRIES[kind].label) if name}
+    required = {name for name, field in message.model_fields.items() if field.is_required()}
+    assert named <= required
+
+
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [("change_actor", Actor), ("add_actor", Actor), ("change_flow", Flow), ("set_matrix", Matrix)],
+)
+def test_an_edit_of_a_part_takes_every_field_that_the_part_has(
+    kind: str, part: type[Part]
+) -> None:
+    message = next(one for one in MESSAGES if kind in get_args(one.model_fields["kind"].annotation))
+    assert part.model_fields.keys() <= message.model_fields.keys()
 
 
 def test_edits_over_the_wire_give_the_same_documents_as_in_python(
