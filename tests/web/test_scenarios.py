@@ -137,9 +137,7 @@ def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBas
     ("kind", "part"),
     [("change_actor", Actor), ("add_actor", Actor), ("change_flow", Flow), ("set_matrix", Matrix)],
 )
-def test_an_edit_of_a_part_takes_every_field_that_the_part_has(
-    kind: str, part: type[Part]
-) -> None:
+def test_an_edit_of_a_part_takes_every_field_that_the_part_has(kind: str, part: type[Part]) -> None:
     message = next(one for one in MESSAGES if kind in get_args(one.model_fields["kind"].annotation))
     assert part.model_fields.keys() <= message.model_fields.keys()
 

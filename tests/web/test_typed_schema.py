@@ -29,6 +29,7 @@ from odscen.web.map_messages import (
 )
 from odscen.web.run_messages import IncidentInfo, ReplayColumns
 from odscen.web.summary_messages import ActorCounts, RunSummary
+from tests.cli.conftest import odscen
 from tests.web.conftest import CROSSING, finished
 
 SCHEMA = create_app(Workspace(Path("nowhere"))).openapi()
@@ -134,7 +135,7 @@ def test_what_the_catalogue_has_of_a_map_is_what_the_schema_says(
 
 
 def test_columns_that_are_sent_unchecked_are_what_the_schema_says(
-    client: TestClient, workspace: Workspace, sampled: str
+    client: TestClient, sampled: str
 ) -> None:
     same(GraphColumns, client.get(f"/api/maps/{CROSSING}/graph").json())
     same(DrawingColumns, client.get(f"/api/maps/{CROSSING}/drawing").json())
@@ -162,21 +163,23 @@ def test_the_summary_of_a_long_run_with_expectations_and_one_that_failed_too(
     workspace: Workspace, sampled: str, tmp_path: Path
 ) -> None:
     path = workspace.scenarios / f"{sampled}{workflow.SUFFIX}"
-    long = workflow.run(
-        workspace,
-        path,
-        until=20,
-        slice_length=10.0,
-        expectations=["arrived >= 0", "mean_speed > 0"],
-        out=tmp_path / "long",
-    )
-    assert len(long.summary["slices"]["done"]) == 2
-    assert len(long.summary["expectations"]) == 2
-    failed = workflow.run(workspace, path, until=600, time_limit=0.01, out=tmp_path / "failed")
-    assert failed.status == "failed"
-    for result in (long, failed):
-        text = (result.folder / layout.SUMMARY_FILE).read_text(encoding="utf-8")
-        same(RunSummary, json.loads(text))
+    common = ["run", str(path), "--workspace", str(workspace.root)]
+    long = ["--until", "20", "--slice", "10", "--criticality", "--expect", "arrived>=0"]
+    failed = ["--until", "5h", "--step-length", "0.01", "--time-limit", "1"]
+    assert odscen(*common, *long, "--out", str(tmp_path / "long")).code == 0
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["demand"] = {"background": [{"id": "some", "per_km": 5}]}
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert odscen(*common, *failed, "--out", str(tmp_path / "failed")).code == 3
+    summaries = {}
+    for name in ("long", "failed"):
+        (file,) = (tmp_path / name).rglob(layout.SUMMARY_FILE)
+        summaries[name] = json.loads(file.read_text(encoding="utf-8"))
+        same(RunSummary, summaries[name])
+    assert len(summaries["long"]["slices"]["done"]) == 2
+    assert summaries["long"]["expectations"][0]["passed"]
+    assert "min_ttc" in summaries["long"]["figures"]
+    assert summaries["failed"]["actors"]["arrived"] is None
 
 
 def test_counts_of_actors_and_events_are_those_of_the_results() -> None:
@@ -198,8 +201,9 @@ def test_an_incident_is_sent_as_it_stands_in_the_file_of_events() -> None:
 @pytest.mark.parametrize("kind", ["hello", "state", "lights", "events", "end"])
 def test_the_schema_has_the_texts_of_the_live_view(kind: str) -> None:
     told = SCHEMA["components"]["schemas"]["LiveMessage"]
-    assert told["discriminator"]["mapping"][kind].removeprefix("#/components/schemas/") in (
-        SCHEMA["components"]["schemas"]
+    assert (
+        told["discriminator"]["mapping"][kind].removeprefix("#/components/schemas/")
+        in (SCHEMA["components"]["schemas"])
     )
 
 

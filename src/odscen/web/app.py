@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
 from pydantic import TypeAdapter
+from pydantic.json_schema import JsonSchemaMode
 from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from odscen import __version__
 from odscen.carla.client import Address
+from odscen.scenario.document import Scenario
 from odscen.web import (
     carla_routes,
     demand_routes,
@@ -122,18 +124,23 @@ def create_app(
 
 
 class _Api(FastAPI):
-    """The interface; its schema also has what goes over WebSockets."""
+    """The interface; its schema also has what goes over WebSockets, and scenarios as files."""
 
     def openapi(self) -> dict[str, Any]:
         """Schema of all messages, made once."""
         if self.openapi_schema is None:
             schemas = super().openapi()["components"]["schemas"]
-            live = TypeAdapter[object](LiveMessage).json_schema(
-                mode="serialization", ref_template="#/components/schemas/{model}"
-            )
-            schemas |= live.pop("$defs")
-            schemas["LiveMessage"] = live
+            schemas |= _components("LiveMessage", LiveMessage, mode="serialization")
+            schemas |= _components("Scenario", Scenario, mode="validation", suffix="-File")
         return super().openapi()
+
+
+def _components(name: str, model: Any, *, mode: JsonSchemaMode, suffix: str = "") -> dict[str, Any]:
+    """Schema of a type and of all that it is made of, by name."""
+    template = f"#/components/schemas/{{model}}{suffix}"
+    schema = TypeAdapter(model).json_schema(mode=mode, ref_template=template)
+    parts = schema.pop("$defs")
+    return {f"{part}{suffix}": one for part, one in {**parts, name: schema}.items()}
 
 
 class _Page(StaticFiles):

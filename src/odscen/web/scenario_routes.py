@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
@@ -43,6 +43,16 @@ if TYPE_CHECKING:
     from odscen.web.drafts import Draft
 
 router = APIRouter(prefix="/api/scenarios")
+
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "content": {
+            "application/json": {"schema": {"$ref": "#/components/schemas/Scenario-File"}},
+            "application/xml": {"schema": {"type": "string"}},
+        }
+    }
+}
+"""A scenario's file leaves out what has its default, which the answers of other routes do not."""
 
 
 @router.get("")
@@ -177,11 +187,7 @@ def roi(name: str, shared: Shared) -> RoiInfo:
     )
 
 
-@router.get(
-    "/{name}/download",
-    response_model=Scenario,
-    responses={200: {"content": {"application/xml": {"schema": {"type": "string"}}}}},
-)
+@router.get("/{name}/download", response_class=Response, responses=_FILE)
 def download(name: str, shared: Shared, form: Literal["json", "graphml"] = "json") -> Response:
     """Download the scenario as its document or in its graph form."""
     scenario = shared.drafts.get(name).scenario
