@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from odscen.catalog.store import Workspace
 from odscen.web.app import create_app
@@ -32,7 +33,9 @@ def schema_types() -> str:
     """The schema as TypeScript."""
     with tempfile.TemporaryDirectory(prefix="odscen-api-") as folder:
         source, target = Path(folder, "openapi.json"), Path(folder, "schema.ts")
-        source.write_text(schema_json(), encoding="utf-8")
+        schema = json.loads(schema_json())
+        names = {f"#/components/schemas/{key}": one for key, one in _components(schema).items()}
+        source.write_text(json.dumps(_spelled_out(schema, names)), encoding="utf-8")
         # Node lies beside the interpreter. What has a default may be left out of what is sent.
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
         options = ["--output", str(target), "--default-non-nullable", "false"]
@@ -46,6 +49,28 @@ def schema_types() -> str:
         if done.returncode != 0:
             sys.exit(f"openapi-typescript has failed:\n{done.stdout}{done.stderr}")
         return target.read_text(encoding="utf-8")
+
+
+def _components(schema: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = schema["components"]["schemas"]
+    return found
+
+
+def _spelled_out(value: Any, components: dict[str, Any]) -> Any:
+    """Mappings whose keys are an enumeration as objects with those keys, none of them required.
+
+    The generator knows nothing of ``propertyNames``.
+    """
+    if isinstance(value, list):
+        return [_spelled_out(one, components) for one in value]
+    if not isinstance(value, dict):
+        return value
+    value = {key: _spelled_out(one, components) for key, one in value.items()}
+    names = value.get("propertyNames")
+    keys = components.get(names["$ref"], {}).get("enum") if names and "$ref" in names else None
+    if keys is None:
+        return value
+    return {"type": "object", "properties": dict.fromkeys(keys, value["additionalProperties"])}
 
 
 def main() -> None:

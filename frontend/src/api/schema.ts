@@ -988,9 +988,14 @@ export interface components {
             begin?: number;
             /** End */
             end?: number;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Speed */
             speed?: number | null;
@@ -1033,9 +1038,14 @@ export interface components {
             end: number | null;
             /** Profile */
             profile: string | null;
-            /** Mix */
             mix: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Fill */
             fill: number | null;
@@ -1203,9 +1213,14 @@ export interface components {
             begin?: number;
             /** End */
             end?: number;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Speed */
             speed?: number | null;
@@ -1258,9 +1273,11 @@ export interface components {
          * @description What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``.
          */
         ConversionInfo: {
-            /** Counts */
             counts: {
-                [key: string]: number;
+                kept?: number;
+                repaired?: number;
+                guessed?: number;
+                lost?: number;
             };
             /** Figures */
             figures: {
@@ -1303,9 +1320,14 @@ export interface components {
         Counts: {
             /** Id */
             id: string;
-            /** Mix */
             mix: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Rows */
             rows: [
@@ -1460,7 +1482,7 @@ export interface components {
             /** Target */
             target: number[];
             /** Relation */
-            relation: (0 | 1 | 2)[];
+            relation: number[];
         };
         /**
          * EditRequest
@@ -1620,9 +1642,14 @@ export interface components {
              * @default 3600
              */
             end: number;
-            /** Mix */
             mix: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Speed */
             speed: number | null;
@@ -1687,7 +1714,7 @@ export interface components {
             /** Right Lane */
             right_lane: number[];
             /** Spawnable */
-            spawnable: (0 | 1)[];
+            spawnable: number[];
             edges: components["schemas"]["EdgeColumns"];
             /** Segments */
             segments: components["schemas"]["SegmentInfo"][];
@@ -1770,47 +1797,47 @@ export interface components {
              * X
              * @default null
              */
-            x?: number | null;
+            x?: number;
             /**
              * Y
              * @default null
              */
-            y?: number | null;
+            y?: number;
             /**
              * Lane
              * @default null
              */
-            lane?: string | null;
+            lane?: string;
             /**
              * Partner
              * @default null
              */
-            partner?: string | null;
+            partner?: string;
             /**
              * Error
              * @default null
              */
-            error?: number | null;
+            error?: number;
             /**
              * Travel Time
              * @default null
              */
-            travel_time?: number | null;
+            travel_time?: number;
             /**
              * Detail
              * @default null
              */
-            detail?: string | null;
+            detail?: string;
             /**
              * Waited
              * @default null
              */
-            waited?: number | null;
+            waited?: number;
             /**
              * Queue
              * @default null
              */
-            queue?: number | null;
+            queue?: number;
         };
         /**
          * JobInfo
@@ -1897,9 +1924,11 @@ export interface components {
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
             sumo: components["schemas"]["NetCounts"];
-            /** Report Counts */
             report_counts: {
-                [key: string]: number;
+                kept?: number;
+                repaired?: number;
+                guessed?: number;
+                lost?: number;
             };
             /** Preview */
             preview: string;
@@ -1932,9 +1961,11 @@ export interface components {
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
             sumo: components["schemas"]["NetCounts"];
-            /** Report Counts */
             report_counts: {
-                [key: string]: number;
+                kept?: number;
+                repaired?: number;
+                guessed?: number;
+                lost?: number;
             };
             /** Preview */
             preview: string;
@@ -2030,9 +2061,14 @@ export interface components {
             end: number | null;
             /** Profile */
             profile: string | null;
-            /** Mix */
             mix: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Trips */
             trips: [
@@ -2736,9 +2772,14 @@ export interface components {
             end?: number | null;
             /** Profile */
             profile?: string | null;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Fill */
             fill?: number | null;
@@ -2774,9 +2815,14 @@ export interface components {
             kind: "set_counts";
             /** Id */
             id?: string;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Rows */
             rows?: [
@@ -2853,9 +2899,14 @@ export interface components {
             end?: number | null;
             /** Profile */
             profile?: string | null;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Trips */
             trips?: [
@@ -3162,13 +3213,13 @@ export interface components {
             /** Segment */
             segment: number[];
             /** Walkable */
-            walkable: (0 | 1)[];
+            walkable: number[];
             /** Source */
             source: number[];
             /** Target */
             target: number[];
             /** Kind */
-            kind: (0 | 1 | 2 | 3)[];
+            kind: number[];
         };
         /**
          * WeatherInfo
@@ -3418,9 +3469,14 @@ export interface components {
              * @default null
              */
             profile?: string | null;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /**
              * Fill
@@ -3455,9 +3511,14 @@ export interface components {
         "Counts-File": {
             /** Id */
             id: string;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Rows */
             rows: [
@@ -3553,9 +3614,14 @@ export interface components {
              * @default 3600
              */
             end?: number;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /**
              * Speed
@@ -3635,9 +3701,14 @@ export interface components {
              * @default null
              */
             profile?: string | null;
-            /** Mix */
             mix?: {
-                [key: string]: number;
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
             };
             /** Trips */
             trips: [
@@ -4231,7 +4302,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The token is missing. */
@@ -4240,7 +4311,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The request comes from a foreign page, or for another host. */
@@ -4249,7 +4320,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description There is no such thing. */
@@ -4258,7 +4329,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description It is taken, in use, or has changed meanwhile. */
@@ -4267,7 +4338,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description Too large. */
@@ -4276,7 +4347,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description What was sent cannot be used; the message says why. */
@@ -4285,7 +4356,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "image/svg+xml": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
         };
@@ -6837,7 +6908,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The token is missing. */
@@ -6846,7 +6917,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The request comes from a foreign page, or for another host. */
@@ -6855,7 +6926,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description There is no such thing. */
@@ -6864,7 +6935,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description It is taken, in use, or has changed meanwhile. */
@@ -6873,7 +6944,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description Too large. */
@@ -6882,7 +6953,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description What was sent cannot be used; the message says why. */
@@ -6891,7 +6962,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
         };
@@ -7444,7 +7515,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The token is missing. */
@@ -7453,7 +7524,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The request comes from a foreign page, or for another host. */
@@ -7462,7 +7533,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description There is no such thing. */
@@ -7471,7 +7542,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description It is taken, in use, or has changed meanwhile. */
@@ -7480,7 +7551,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description Too large. */
@@ -7489,7 +7560,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description What was sent cannot be used; the message says why. */
@@ -7498,7 +7569,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "*/*": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
         };
@@ -7697,7 +7768,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The token is missing. */
@@ -7706,7 +7777,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The request comes from a foreign page, or for another host. */
@@ -7715,7 +7786,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description There is no such thing. */
@@ -7724,7 +7795,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description It is taken, in use, or has changed meanwhile. */
@@ -7733,7 +7804,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description Too large. */
@@ -7742,7 +7813,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description What was sent cannot be used; the message says why. */
@@ -7751,7 +7822,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "multipart/x-mixed-replace": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
         };
@@ -7782,7 +7853,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The token is missing. */
@@ -7791,7 +7862,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description The request comes from a foreign page, or for another host. */
@@ -7800,7 +7871,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description There is no such thing. */
@@ -7809,7 +7880,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description It is taken, in use, or has changed meanwhile. */
@@ -7818,7 +7889,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description Too large. */
@@ -7827,7 +7898,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
             /** @description What was sent cannot be used; the message says why. */
@@ -7836,7 +7907,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "text/html": components["schemas"]["ErrorAnswer"];
+                    "application/json": components["schemas"]["ErrorAnswer"];
                 };
             };
         };

@@ -49,11 +49,10 @@ export function Result({ info, scenario, onBack, onGoOn }: {
   );
 }
 
-const compared = (summary: Summary | null | undefined): boolean =>
-  typeof summary?.files === "object" && summary.files !== null && "parity" in summary.files;
+const compared = (summary: Summary | null): boolean => summary !== null && "parity" in summary.files;
 
 function Failure({ info }: { info: RunInfo }) {
-  const words = typeof info.error === "string" ? info.error : info.error?.message;
+  const words = info.error;
   return (
     <>
       <Alert color="red" mt="sm" title="The simulation could not go on">

@@ -1,5 +1,5 @@
 import { clock, kmh, longClock } from "../ui/words";
-import type { Summary } from "../api/runs";
+import type { RunState, Summary } from "../api/runs";
 
 export interface Figure {
   label: string;
@@ -14,7 +14,7 @@ export interface Compared extends Figure {
 
 interface Known {
   label: string;
-  path: string[];
+  path: ["sim_seconds"] | ["actors", keyof Summary["actors"]] | ["figures", string];
   say: (value: number) => string;
   /** The size of a difference, without its sign. */
   sayDifference?: (value: number) => string;
@@ -68,10 +68,10 @@ function signed(difference: number, say: (value: number) => string): string {
   return size === say(0) ? "same" : `${difference > 0 ? "+" : "−"}${size}`;
 }
 
-const ENDED = ["completed", "stopped", "failed", "interrupted"];
-export const hasEnded = (state: string): boolean => ENDED.includes(state);
+const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupted"];
+export const hasEnded = (state: RunState): boolean => ENDED.includes(state);
 
-export const STATE_WORD: Record<string, string> = {
+export const STATE_WORD: Record<RunState, string> = {
   preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
   completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
 };

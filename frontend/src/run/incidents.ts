@@ -8,7 +8,7 @@ const FRESH = 4;
 /** No more than this many, the newest, are drawn. */
 const DRAWN = 300;
 
-const KIND: Record<string, MarkKind> = {
+const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   collision: "collision", emergency_stop: "braking", teleport_start: "lifted", teleport_end: "lifted",
 };
 

@@ -7,11 +7,11 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 
 from fastapi import APIRouter
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import Response, StreamingResponse
 
 from odscen.errors import NotFoundError
 from odscen.sumo import layout
-from odscen.web.binary import Pictures
+from odscen.web.binary import HTML, PICTURES
 from odscen.web.messages import CarlaInfo
 from odscen.web.run_routes import page_of_run
 from odscen.web.runs import Active
@@ -32,18 +32,20 @@ def carla(shared: Shared) -> CarlaInfo:
     return CarlaInfo(state=found.state, address=address, message=found.message)
 
 
-@router.get("/runs/{run}/camera", response_class=Pictures)
+@router.get("/runs/{run}/camera", response_class=Response, responses=PICTURES)
 async def camera(run: str, shared: Shared) -> Response:
     """Pictures from above a run that CARLA shows, as they come; JPEG, one replacing the other."""
     active = shared.runs.active(run)
     if not active.carla:
         what = "camera of run"
         raise NotFoundError(what, run, [])
-    kind = f"{Pictures.media_type}; boundary={_BOUNDARY}"
-    return Pictures(_pictures(active), media_type=kind, headers={"Cache-Control": "no-store"})
+    kind = f"multipart/x-mixed-replace; boundary={_BOUNDARY}"
+    return StreamingResponse(
+        _pictures(active), media_type=kind, headers={"Cache-Control": "no-store"}
+    )
 
 
-@router.get("/runs/{run}/parity.html", response_class=HTMLResponse)
+@router.get("/runs/{run}/parity.html", response_class=Response, responses=HTML)
 def parity(run: str, shared: Shared) -> Response:
     """How far SUMO and CARLA agreed in a finished run."""
     return page_of_run(shared, run, layout.PARITY_FILE)

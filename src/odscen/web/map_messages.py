@@ -7,8 +7,6 @@ shape, for they are not checked on the way.
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from odscen.catalog.drawing import Bounds
@@ -19,7 +17,6 @@ from odscen.web.messages import Answer
 
 Point = tuple[float, float]
 """x and y, metres."""
-Mask = list[Literal[0, 1]]
 
 
 class MapHeader(Answer):
@@ -171,7 +168,7 @@ class EdgeColumns(Answer):
 
     source: list[int]
     target: list[int]
-    relation: list[Literal[0, 1, 2]]
+    relation: list[int]
 
 
 class WalkColumns(NodeColumns):
@@ -180,10 +177,10 @@ class WalkColumns(NodeColumns):
     ``walkable`` is 1 where the simulator can place somebody exactly.
     """
 
-    walkable: Mask
+    walkable: list[int]
     source: list[int]
     target: list[int]
-    kind: list[Literal[0, 1, 2, 3]]
+    kind: list[int]
 
 
 class SegmentInfo(Answer):
@@ -209,7 +206,7 @@ class GraphColumns(NodeColumns):
     speed_limit: list[float | None]
     left_lane: list[int]
     right_lane: list[int]
-    spawnable: Mask
+    spawnable: list[int]
     edges: EdgeColumns
     segments: list[SegmentInfo]
     walks: WalkColumns

@@ -17,7 +17,7 @@ from odscen.categories import DEFAULT_BODY
 from odscen.errors import ConflictError
 from odscen.scenario.profiles import BUILT_IN
 from odscen.sumo.signals import scenario_lights
-from odscen.web.binary import Svg
+from odscen.web.binary import SVG
 from odscen.web.map_messages import (
     ConversionInfo,
     DrawingColumns,
@@ -75,12 +75,12 @@ def show_map(name: str, shared: Shared) -> MapDetails:
     return MapDetails(**dict(_map_info(entry)), semantics=semantics, lights=known)
 
 
-@router.get("/maps/{name}/preview.svg", response_class=Svg)
+@router.get("/maps/{name}/preview.svg", response_class=Response, responses=SVG)
 def preview(name: str, shared: Shared) -> Response:
     """Drawing of the map as SVG."""
     content = shared.workspace.map(name).path("preview").read_bytes()
     headers = {"Content-Security-Policy": _DRAWING, "Cache-Control": "no-cache"}
-    return Svg(content, headers=headers)
+    return Response(content, media_type="image/svg+xml", headers=headers)
 
 
 @router.get("/maps/{name}/drawing", response_model=DrawingColumns, responses=UNCHANGED)

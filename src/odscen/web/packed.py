@@ -11,6 +11,7 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
+from odscen.web.binary import Responses
 from odscen.workflow import load_map
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry
 
 
-UNCHANGED: dict[int | str, dict[str, Any]] = {304: {"description": "What the client has is right."}}
+UNCHANGED: Responses = {304: {"description": "What the client has is right."}}
 """What a packed answer may be instead, for the schema."""
 
 

@@ -10,7 +10,7 @@ from starlette.responses import FileResponse, Response
 from odscen import demands
 from odscen.scenario.counting import place_points
 from odscen.sumo.layout import SCENARIO_FILE
-from odscen.web.binary import AnyFile
+from odscen.web.binary import ANY_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
 from odscen.workflow import read_scenario
@@ -24,7 +24,7 @@ def files(run: str, shared: Shared) -> list[RunFile]:
     return shared.runs.kept.files(run)
 
 
-@router.get("/files/{name:path}", response_class=AnyFile)
+@router.get("/files/{name:path}", response_class=Response, responses=ANY_FILE)
 def file(run: str, name: str, shared: Shared) -> Response:
     """Download one of them."""
     path = shared.runs.kept.file(run, name)

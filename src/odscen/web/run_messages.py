@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
 
 from odscen.categories import Category
 from odscen.results.records import EventKind
@@ -195,7 +196,7 @@ class RunContent(Answer):
 
 
 _One = TypeVar("_One")
-_IfKnown = Annotated[_One | None, Field(exclude_if=lambda value: value is None)]
+_IfKnown = Annotated[_One | SkipJsonSchema[None], Field(exclude_if=lambda value: value is None)]
 """Left out of the message where there is nothing to say."""
 
 

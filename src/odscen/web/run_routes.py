@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import orjson
 from fastapi import APIRouter, Query
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from odscen.errors import InputError, NotFoundError
@@ -20,6 +20,7 @@ from odscen.results.summary import actors_from_json
 from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
 from odscen.sumo.recorded import read_trajectories
+from odscen.web.binary import HTML
 from odscen.web.live import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.run_messages import (
@@ -100,7 +101,7 @@ def control(run: str, wish: Control, shared: Shared) -> RunInfo:
     return shared.runs.control(run, wish)
 
 
-@router.get("/{run}/report.html", response_class=HTMLResponse)
+@router.get("/{run}/report.html", response_class=Response, responses=HTML)
 def report(run: str, shared: Shared) -> Response:
     """Report of a completed run."""
     return page_of_run(shared, run, layout.REPORT_FILE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
@@ -22,6 +22,7 @@ from odscen.scenario.region import Place as GraphPlace
 from odscen.scenario.region import name_of, place_of
 from odscen.sumo.paths import each_path
 from odscen.sumo.people import RoadUser
+from odscen.web.binary import Responses
 from odscen.web.edits import EditRequest, apply_edit
 from odscen.web.messages import (
     CopyName,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(prefix="/api/scenarios")
 
-_FILE: dict[int | str, dict[str, Any]] = {
+_FILE: Responses = {
     200: {
         "content": {
             "application/json": {"schema": {"$ref": "#/components/schemas/Scenario-File"}},
