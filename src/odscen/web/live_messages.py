@@ -30,7 +30,10 @@ class LiveActor(Answer):
 
 
 class LiveHello(Answer):
-    """What the run is, once; ``origin`` is what is subtracted from all x and y in frames."""
+    """What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
+
+    Made by :mod:`odscen.web.live` without this class, for it may be large.
+    """
 
     type: Literal["hello"] = "hello"
     scenario: str

@@ -28,6 +28,7 @@ from odscen.web.run_messages import (
     GoOn,
     IncidentInfo,
     NewRun,
+    ReplayActor,
     ReplayColumns,
     RunContent,
     RunCurve,
@@ -171,10 +172,8 @@ def trajectories(
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
     columns = replay_columns(table, plan, every=max(1, every // read))
-    columns["actors"] = [
-        {"id": a.id, "category": a.category, "length": a.length, "width": a.width, "ego": a.ego}
-        for a in plan.actors
-    ]
+    names = tuple(ReplayActor.model_fields)
+    columns["actors"] = [{name: getattr(one, name) for name in names} for one in plan.actors]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
 
 
