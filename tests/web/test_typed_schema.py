@@ -19,16 +19,16 @@ from odscen.results.expectations import COUNTS
 from odscen.results.records import Event, EventKind, event_row
 from odscen.sumo import layout
 from odscen.web.app import create_app
-from odscen.web.live_messages import LiveMessage
-from odscen.web.map_messages import (
+from odscen.web.run_messages import IncidentInfo, ReplayColumns
+from odscen.web.wire.live_messages import LiveMessage
+from odscen.web.wire.map_messages import (
     ConversionInfo,
     DrawingColumns,
     GraphColumns,
     MapDetails,
     SemanticsInfo,
 )
-from odscen.web.run_messages import IncidentInfo, ReplayColumns
-from odscen.web.summary_messages import ActorCounts, RunSummary
+from odscen.web.wire.summary_messages import RunSummary, SummaryCounts
 from tests.cli.conftest import odscen
 from tests.web.conftest import CROSSING, finished
 
@@ -183,7 +183,7 @@ def test_the_summary_of_a_long_run_with_expectations_and_one_that_failed_too(
 
 
 def test_counts_of_actors_and_events_are_those_of_the_results() -> None:
-    assert tuple(ActorCounts.model_fields) == COUNTS
+    assert tuple(SummaryCounts.model_fields) == COUNTS
     assert tuple(IncidentInfo.model_fields) == Event._fields
     hints = get_type_hints(IncidentInfo)
     for name, hint in get_type_hints(Event).items():

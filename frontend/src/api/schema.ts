@@ -906,30 +906,6 @@ export interface components {
             ignores_red: boolean;
         };
         /**
-         * ActorCounts
-         * @description How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
-         *
-         *     A failed run knows only how many were planned.
-         */
-        ActorCounts: {
-            /** Planned */
-            planned: number;
-            /** Inserted */
-            inserted: number | null;
-            /** Arrived */
-            arrived: number | null;
-            /** Running */
-            running: number | null;
-            /** Waiting */
-            waiting: number | null;
-            /** Teleported */
-            teleported: number | null;
-            /** Collided */
-            collided: number | null;
-            /** Emergency Stopped */
-            emergency_stopped: number | null;
-        };
-        /**
          * AddActorEdit
          * @description Place an actor on a node.
          */
@@ -2583,7 +2559,7 @@ export interface components {
             wall_seconds: number;
             /** Real Time Factor */
             real_time_factor: number | null;
-            actors: components["schemas"]["ActorCounts"];
+            actors: components["schemas"]["SummaryCounts"];
             /** Insertion Error Max */
             insertion_error_max: number | null;
             /** Figures */
@@ -3139,6 +3115,30 @@ export interface components {
             ][];
         };
         /**
+         * SummaryCounts
+         * @description How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
+         *
+         *     A failed run knows only how many were planned.
+         */
+        SummaryCounts: {
+            /** Planned */
+            planned: number;
+            /** Inserted */
+            inserted: number | null;
+            /** Arrived */
+            arrived: number | null;
+            /** Running */
+            running: number | null;
+            /** Waiting */
+            waiting: number | null;
+            /** Teleported */
+            teleported: number | null;
+            /** Collided */
+            collided: number | null;
+            /** Emergency Stopped */
+            emergency_stopped: number | null;
+        };
+        /**
          * Trouble
          * @description A place where traffic got stuck.
          *
@@ -3313,6 +3313,8 @@ export interface components {
         /**
          * LiveHello
          * @description What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
+         *
+         *     Made by :mod:`odscen.web.live` without this class, for it may be large.
          */
         LiveHello: {
             /**

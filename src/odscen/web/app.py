@@ -25,10 +25,10 @@ from odscen.web import (
     scenario_routes,
 )
 from odscen.web.errors import RESPONSES, add_error_handlers, error_response
-from odscen.web.live_messages import LiveMessage
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
+from odscen.web.wire.live_messages import LiveMessage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Collection

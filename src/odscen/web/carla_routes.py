@@ -11,11 +11,11 @@ from starlette.responses import Response, StreamingResponse
 
 from odscen.errors import NotFoundError
 from odscen.sumo import layout
-from odscen.web.binary import HTML, PICTURES
 from odscen.web.messages import CarlaInfo
 from odscen.web.run_routes import page_of_run
 from odscen.web.runs import Active
 from odscen.web.services import Shared
+from odscen.web.wire.media_types import HTML, PICTURES
 
 router = APIRouter(prefix="/api")
 

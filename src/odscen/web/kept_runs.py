@@ -15,7 +15,7 @@ from odscen.sumo import layout
 from odscen.sumo.long_runs import about
 from odscen.sumo.status import going, read_status
 from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
-from odscen.web.summary_messages import RunSummary
+from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,14 +15,14 @@ import orjson
 from starlette.websockets import WebSocketDisconnect
 
 from odscen.sumo.snapshots import origin
-from odscen.web.live_messages import (
+from odscen.web.run_messages import IncidentInfo
+from odscen.web.wire.live_messages import (
     LiveActor,
     LiveEnd,
     LiveIncidents,
     LiveLights,
     LiveState,
 )
-from odscen.web.run_messages import IncidentInfo
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
@@ -145,8 +145,8 @@ class LiveView:
 def _hello(plan: Plan) -> str:
     """Introduce everybody who will ever be in a frame.
 
-    A :class:`~odscen.web.live_messages.LiveHello`, but written at once: a day in a town has tens of
-    thousands of actors, and the server does nothing else meanwhile.
+    A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
+    tens of thousands of actors, and the server does nothing else meanwhile.
     """
     names = [name for name in LiveActor.model_fields if name != "index"]
     hello = {

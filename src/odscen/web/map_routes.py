@@ -17,8 +17,17 @@ from odscen.categories import DEFAULT_BODY
 from odscen.errors import ConflictError
 from odscen.scenario.profiles import BUILT_IN
 from odscen.sumo.signals import scenario_lights
-from odscen.web.binary import SVG
-from odscen.web.map_messages import (
+from odscen.web.messages import (
+    AssetsInfo,
+    BlueprintInfo,
+    CategoryInfo,
+    JobInfo,
+    JobStarted,
+    WeatherInfo,
+)
+from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
+from odscen.web.services import Shared
+from odscen.web.wire.map_messages import (
     ConversionInfo,
     DrawingColumns,
     GraphColumns,
@@ -30,16 +39,7 @@ from odscen.web.map_messages import (
     NetCounts,
     SemanticsInfo,
 )
-from odscen.web.messages import (
-    AssetsInfo,
-    BlueprintInfo,
-    CategoryInfo,
-    JobInfo,
-    JobStarted,
-    WeatherInfo,
-)
-from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
-from odscen.web.services import Shared
+from odscen.web.wire.media_types import SVG
 from odscen.workflow import load_map
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
-from odscen.web.binary import Responses
+from odscen.web.wire.media_types import Responses
 from odscen.workflow import load_map
 
 if TYPE_CHECKING:

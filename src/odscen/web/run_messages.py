@@ -10,7 +10,7 @@ from pydantic.json_schema import SkipJsonSchema
 from odscen.categories import Category
 from odscen.results.records import EventKind
 from odscen.web.messages import Answer, Body, Name
-from odscen.web.summary_messages import RunSummary
+from odscen.web.wire.summary_messages import RunSummary
 
 RunState = Literal[
     "preparing", "running", "paused", "finishing", "completed", "stopped", "failed", "interrupted"

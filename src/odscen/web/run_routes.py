@@ -20,7 +20,6 @@ from odscen.results.summary import actors_from_json
 from odscen.results.traces import Counts, SpeedCurve
 from odscen.sumo import layout
 from odscen.sumo.recorded import read_trajectories
-from odscen.web.binary import HTML
 from odscen.web.live import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.run_messages import (
@@ -41,7 +40,8 @@ from odscen.web.run_messages import (
     RunStarted,
 )
 from odscen.web.services import Shared
-from odscen.web.summary_messages import RunSummary
+from odscen.web.wire.media_types import HTML
+from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:
     import polars as pl

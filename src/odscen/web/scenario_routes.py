@@ -22,7 +22,6 @@ from odscen.scenario.region import Place as GraphPlace
 from odscen.scenario.region import name_of, place_of
 from odscen.sumo.paths import each_path
 from odscen.sumo.people import RoadUser
-from odscen.web.binary import Responses
 from odscen.web.edits import EditRequest, apply_edit
 from odscen.web.messages import (
     CopyName,
@@ -37,6 +36,7 @@ from odscen.web.messages import (
     ScenarioState,
 )
 from odscen.web.services import Services, Shared, region_of
+from odscen.web.wire.media_types import Responses
 from odscen.workflow import SUFFIX, load_map
 
 if TYPE_CHECKING:

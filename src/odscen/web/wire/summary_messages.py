@@ -12,7 +12,7 @@ from odscen.sumo.run_folder import RunStatus
 from odscen.web.messages import Answer
 
 
-class ActorCounts(Answer):
+class SummaryCounts(Answer):
     """How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
 
     A failed run knows only how many were planned.
@@ -88,7 +88,7 @@ class RunSummary(Answer):
     steps: int | None = None
     wall_seconds: float
     real_time_factor: float | None = None
-    actors: ActorCounts
+    actors: SummaryCounts
     insertion_error_max: float | None = None
     figures: dict[str, float | None] = Field(default_factory=dict)
     gridlock: GridlockInfo | None = None
