@@ -16,7 +16,9 @@ function asked(status: number, body: unknown): [url: string, init: RequestInit][
 }
 
 test("names in an address are encoded, and files in folders keep their slashes", () => {
-  expect(address("/api/runs/{run}/report.html", { path: { run: "a b#1" } })).toBe("/api/runs/a%20b%231/report.html");
+  expect(address("/api/runs/{run}/report.html", { path: { run: "a b#1" } })).toBe(
+    "/api/runs/a%20b%231/report.html",
+  );
   expect(runs.fileUrl("r-1", "figures/a b.csv")).toBe("/api/runs/r-1/files/figures/a%20b.csv");
   expect(api.downloadUrl("s", "graphml")).toBe("/api/scenarios/s/download?form=graphml");
 });
@@ -31,9 +33,14 @@ test("what is not asked for is not in the address", async () => {
 test("a body goes out as JSON, a form as a form, and no body as none", async () => {
   const list = asked(200, {});
   await api.undo("s", 3);
-  expect(list[0]).toEqual(["/api/scenarios/s/undo", {
-    method: "POST", headers: { "Content-Type": "application/json" }, body: '{"version":3}',
-  }]);
+  expect(list[0]).toEqual([
+    "/api/scenarios/s/undo",
+    {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: '{"version":3}',
+    },
+  ]);
   await demand.table("s", 3, "od", new File(["a"], "a.csv"), null);
   const sent = list[1]?.[1].body as FormData;
   expect([sent.get("version"), sent.get("kind"), sent.has("part")]).toEqual(["3", "od", false]);

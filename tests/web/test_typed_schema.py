@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -225,3 +226,24 @@ def test_every_text_of_the_live_view_is_of_the_schema(client: TestClient, sample
     assert {"hello", "state", "lights", "end"} <= {text["type"] for text in texts}
     for text in texts:
         same(LiveMessage, text)
+
+
+def test_a_run_of_an_earlier_version_still_opens_and_one_that_cannot_be_read_is_failed(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    run = client.post("/api/runs", json={"scenario": sampled, "until": 5}).json()["run"]
+    finished(client, run)
+    old, broken = (shutil.copytree(workspace.runs / run, workspace.runs / n) for n in ("a", "b"))
+    summary = json.loads((old / layout.SUMMARY_FILE).read_text(encoding="utf-8"))
+    for name in ("gridlock", "expectations", "notes", "meso", "map_sha256"):
+        del summary[name]
+    summary["of_a_later_version"] = {"kept": True}
+    (old / layout.SUMMARY_FILE).write_text(json.dumps(summary), encoding="utf-8")
+    (broken / layout.SUMMARY_FILE).write_text("{}", encoding="utf-8")
+    rows = {row["run"]: row for row in client.get("/api/runs").json()}
+    assert rows["a"]["state"] == rows[run]["state"] == "completed"
+    assert rows["b"]["state"] == "failed"
+    assert "cannot be read" in rows["b"]["error"]
+    told = client.get("/api/runs/a").json()["summary"]
+    assert (told["gridlock"], told["notes"]) == (None, [])
+    assert client.get("/api/runs/b/summary").status_code == 404

@@ -18,12 +18,16 @@ type Method = "get" | "post" | "put" | "delete";
 type Route<M extends Method> = {
   [P in keyof paths]: paths[P][M] extends { responses: object } ? P : never;
 }[keyof paths];
-type Answers<M extends Method, P extends keyof paths> = paths[P][M] extends { responses: infer R } ? R : never;
+type Answers<M extends Method, P extends keyof paths> = paths[P][M] extends { responses: infer R }
+  ? R
+  : never;
 type Good<R> = R[keyof R & (200 | 201 | 202)];
 /** What a path answers if all is well; nothing if it answers without a body. */
 export type Answer<M extends Method, P extends keyof paths> =
   Good<Answers<M, P>> extends { content: { "application/json": infer A } } ? A : undefined;
-type Arguments<M extends Method, P extends keyof paths> = paths[P][M] extends { parameters: infer A } ? A : never;
+type Arguments<M extends Method, P extends keyof paths> = paths[P][M] extends { parameters: infer A }
+  ? A
+  : never;
 type InPath<A> = A extends { path: infer N } ? { path: N } : { path?: undefined };
 type InQuery<A> = A extends { query: infer Q }
   ? { query: Q }
@@ -74,7 +78,11 @@ async function refusal(response: Response): Promise<ApiError> {
   } catch {
     // Not one of our answers: say what we know.
   }
-  return unanswered(response.status, "http", `The server answered ${response.status} ${response.statusText}.`);
+  return unanswered(
+    response.status,
+    "http",
+    `The server answered ${response.status} ${response.statusText}.`,
+  );
 }
 
 const unanswered = (status: number, kind: string, message: string): ApiError =>
@@ -121,7 +129,8 @@ export const api = {
   job: (job: string) => call("get", "/api/jobs/{job}", { path: { job } }),
   assets: () => call("get", "/api/assets"),
   scenarios: () => call("get", "/api/scenarios"),
-  newScenario: (map: string, name?: string) => call("post", "/api/scenarios", { body: name ? { map, name } : { map } }),
+  newScenario: (map: string, name?: string) =>
+    call("post", "/api/scenarios", { body: name ? { map, name } : { map } }),
   scenario: (name: string) => call("get", "/api/scenarios/{name}", { path: { name } }),
   removeScenario: (name: string) => call("delete", "/api/scenarios/{name}", { path: { name } }),
   rename: (name: string, to: string) =>

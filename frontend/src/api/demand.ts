@@ -18,7 +18,10 @@ export type TableKind = Table["kind"];
 
 export const demand = {
   table: (name: string, version: number, kind: TableKind, file: File, part: string | null) => {
-    const fields = { version: String(version), kind, file, part } satisfies Record<keyof Omit<Table, "day">, unknown>;
+    const fields = { version: String(version), kind, file, part } satisfies Record<
+      keyof Omit<Table, "day">,
+      unknown
+    >;
     return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
   },
   day: (name: string, version: number, day: "weekday" | "weekend", trips: number) =>

@@ -5,7 +5,15 @@ type Schemas = components["schemas"];
 
 export type Category = Schemas["Category"];
 /** The order of the interface. */
-export const CATEGORIES: readonly Category[] = ["car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"];
+export const CATEGORIES: readonly Category[] = [
+  "car",
+  "van",
+  "truck",
+  "bus",
+  "motorcycle",
+  "bicycle",
+  "pedestrian",
+];
 
 export type MapStatistics = Schemas["MapStatistics"];
 export type Bounds = MapStatistics["bounds"];
@@ -38,4 +46,7 @@ export type Edit = Schemas["EditRequest"]["edits"][number];
 /** Arguments of one kind of edit. */
 export type EditOf<K extends Edit["kind"]> = Extract<Edit, { kind: K }>;
 /** Fields that an edit changes, without those that say what is changed. */
-export type FieldsOf<K extends Edit["kind"], Subject extends keyof EditOf<K>> = Omit<EditOf<K>, "kind" | Subject>;
+export type FieldsOf<K extends Edit["kind"], Subject extends keyof EditOf<K>> = Omit<
+  EditOf<K>,
+  "kind" | Subject
+>;
