@@ -11,7 +11,7 @@ DOCS := .venv/docs-ready
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test regression test-page chromium allocator page check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -41,7 +41,12 @@ allocator:
 	@PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q libtcmalloc_minimal.so.4 || \
 	$(PYTHON) -m tools.debian libtcmalloc-minimal4 "with which SUMO is faster"
 
+# The page's types of all messages, from what the server says of itself; see docs/server.md.
+api: $(READY) $(MODULES)
+	$(BIN)/python -m tools.api_schema
+
 check: $(READY) $(MODULES)
+	$(BIN)/python -m tools.api_schema --check
 	$(NPM) run check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

@@ -22,11 +22,13 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from odscen import demands, workflow
+from odscen.app import demands
+from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
 from odscen.scenario.demand.day_profiles import DAY, curve
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Flow
 from odscen.scenario.edits.demand_edits import set_clock
+from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.folder.layout import RECORDED
 from odscen.sumo.folder.recorded import recorded_files
 from odscen.workspace.shipped import shipped_maps
@@ -64,7 +66,7 @@ def main(
         start = time.perf_counter()
         subprocess.run([*run, "--out", str(folder / "alone")], check=True, capture_output=True)
         alone = time.perf_counter() - start
-        target = folder / "killed" / scenario.name.removesuffix(workflow.SUFFIX)
+        target = folder / "killed" / scenario.name.removesuffix(SUFFIX)
         command = run = [*run, "--out", str(target.parent)]
         resume = [*cli, "resume", str(target), *options]
         expected = results(folder / "alone" / target.name)
@@ -93,8 +95,8 @@ def main(
 
 def traffic(workspace: Workspace, name: str, hours: float) -> Path:
     """Write a scenario of flows from places that sampling has chosen."""
-    (path,) = workflow.generate(workspace, map_name=name, seed=1, fill=0.5)
-    sampled = workflow.read_scenario(path)
+    (path,) = generate(workspace, settings=GenerationSettings(map_name=name, seed=1, fill=0.5))
+    sampled = read_scenario(path)
     flows = tuple(
         Flow(
             id=f"flow{i}", spawn=actor.spawn, per_hour=PER_HOUR / FLOWS, end=hours * 3600.0,
@@ -123,8 +125,8 @@ def morning(workspace: Workspace, name: str, hours: float, trips: float) -> Path
     )
     simulation = scenario.simulation.model_copy(update={"duration": hours * 3600.0})
     scenario = scenario.model_copy(update={"demand": demand, "simulation": simulation})
-    path = workspace.scenarios / f"morning{workflow.SUFFIX}"
-    return workflow.write_scenario(scenario, path)
+    path = workspace.scenarios / f"morning{SUFFIX}"
+    return write_scenario(scenario, path)
 
 
 def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:

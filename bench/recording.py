@@ -19,7 +19,7 @@ from bench.common import without_output
 from odscen.results.records.run_records import Plan, PlannedActor
 from odscen.sumo.folder import layout
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
-from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
+from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 
 VEHICLES = 1500
 CROSSINGS = 20
@@ -93,7 +93,7 @@ def prepare(folder: Path, binaries: Path) -> None:
         capture_output=True,
     )  # fmt: skip
     (sumo_folder / layout.ROUTES_FILE).write_text(_routes(net), encoding="utf-8")
-    settings = RunSettings(until=SECONDS, step_length=0.5, seed=1, measures=True)
+    settings = SumocfgSettings(until=SECONDS, step_length=0.5, seed=1, measures=True)
     (sumo_folder / layout.CONFIG_FILE).write_text(sumo_config(settings), encoding="utf-8")
     measures = measures_xml(interval_of(SECONDS), emissions=True)
     (sumo_folder / layout.MEASURES_FILE).write_text(measures, encoding="utf-8")

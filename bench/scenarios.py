@@ -14,10 +14,12 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from bench.common import shared_maps
-from odscen import workflow
+from odscen.app import runs
+from odscen.app.scenarios import generate
 from odscen.cli.map_commands import names_for
 from odscen.results.measures.summary import ActorOutcome, actors_from_json
 from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 
@@ -46,10 +48,13 @@ def main() -> None:
         failed: Counter[str] = Counter()
         for index, entry in enumerate(entries):
             count = COUNT // len(entries) + (index < COUNT % len(entries))
-            paths = workflow.generate(
-                workspace, map_name=entry.name, count=count, seed=1000 * index, config=config
+            paths = generate(
+                workspace,
+                settings=GenerationSettings(
+                    map_name=entry.name, count=count, seed=1000 * index, config=config
+                ),
             )
-            results = workflow.run(workspace, paths, processes=os.cpu_count() or 1)
+            results = runs.run(workspace, paths, processes=os.cpu_count() or 1)
             scenarios[entry.name] += len(paths)
             for result in results:
                 if result.status == "failed":

@@ -1,17 +1,24 @@
 import { expect, test } from "vitest";
 
-import type { MapInfo } from "../src/api/types";
-import { coverage, type Entry, grouped } from "../src/catalogue/conversion";
+import type { ConversionReport, MapInfo } from "../src/api/types";
+import { coverage, grouped } from "../src/catalogue/conversion";
 import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
 import { hashOf, parseRoute } from "../src/ui/route";
 import { clock, length, mapFacts, modelWord } from "../src/ui/words";
 
+type Entry = ConversionReport["entries"][number];
 const map = (name: string, junctions: number): MapInfo => ({
-  name, sha256: "", graph: {}, report_counts: null, preview: "",
+  name, sha256: "", source: "", opendrive: { version: "1.7", rule: "RHT" }, report_counts: {}, preview: "",
+  graph: {
+    spacing: 2, nodes: 1, successor_edges: 0, left_edges: 0, right_edges: 0, segments: 1, pedestrian_nodes: 0,
+    pedestrian_edges: 0,
+  },
+  sumo: { net_file: "", edges: 0, lanes: 0, junctions: 0, tl_logics: 0, crossings: 0, walking_areas: 0 },
   statistics: {
-    bounds: [0, 0, 1200, 800], road_length: 1, driving_lane_length: 33_345, roads: 1, junctions,
-    crosswalks: 1, traffic_lights: 0, stop_signs: 0, speed_limit_min: 13.9, speed_limit_max: 13.9, rule: "RHT",
+    bounds: [0, 0, 1200, 800], road_length: 1, connecting_road_length: 0, driving_lane_length: 33_345, roads: 1, junctions,
+    crosswalks: 1, traffic_lights: 0, pedestrian_lights: 0, stop_signs: 0, yield_signs: 0, stop_lines: 0,
+    speed_limit_min: 13.9, speed_limit_max: 13.9, rule: "RHT",
   },
 });
 
@@ -51,7 +58,7 @@ test("only maps that have all that is wished for are shown", () => {
 });
 
 test("a conversion report says the same of many places once, what was lost first", () => {
-  const entry = (fate: string, element: string, reason: string): Entry => ({ fate, element, reason });
+  const entry = (fate: Entry["fate"], element: string, reason: string): Entry => ({ fate, element, reason });
   const report = {
     counts: {}, figures: { driving_road_length: 300, driving_road_covered: 299.9, driving_junction_length: 100, driving_junction_covered: 100 },
     entries: [

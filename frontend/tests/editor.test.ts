@@ -1,6 +1,6 @@
 import { afterEach, expect, test, vi } from "vitest";
 
-import type { Actor, Flow, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
+import type { Actor, Edit, Flow, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
 import { boundsOfProblem, inFrame, nearestOne, ofProblem, sceneActors, sceneFlows, segmentStyles, wrongOnes } from "../src/editor/scene";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
@@ -17,7 +17,7 @@ const flow = (id: string, spawn: string): Flow => ({
   id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null, profile: null,
 });
 const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
-  name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
+  format: "odscen-scenario", version: 1, name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
   environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows,
   demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
   signals: { control: "fixed", junctions: [] },
@@ -33,6 +33,7 @@ const walks = {
 const columns: GraphColumns = {
   spacing: 2, lane_keys: ["1.0.-1"], lane_types: ["driving"], lane_junctions: [null], first_node: [0, 3], lane: [0, 0, 0],
   s: [0, 2, 4], x: [0, 2, 4], y: [0, 0, 0], hdg: [0, 0, 0], width: [3, 3, 3], segment: [0, 1, 2],
+  left_lane: [-1, -1, -1], right_lane: [-1, -1, -1],
   speed_limit: [13.889, null, null], spawnable: [1, 1, 0],
   segments: ["a", "b", "c"].map((id) => ({ id, kind: "road", neighbours: [] })),
   edges: { source: [], target: [], relation: [] }, walks,
@@ -130,7 +131,7 @@ test("of a long table only what is in sight is drawn", () => {
 });
 
 const state = (version: number, ...ids: string[]): ScenarioState => ({
-  name: "s", version, document: scenario(ids.map((id) => actor(id))), problems: [],
+  name: "s", version, document: scenario(ids.map((id) => actor(id))), problems: [], label: "", undo: null, redo: null,
 });
 
 function answers(...list: [number, unknown][]): { url: string; body: unknown }[] {
@@ -144,12 +145,14 @@ function answers(...list: [number, unknown][]): { url: string; body: unknown }[]
 }
 afterEach(() => vi.unstubAllGlobals());
 
+const add: Edit = { kind: "add_actor", category: "car", spawn: "1.0.-1.0" };
+
 test("changes go out one at a time, each with the version before it", async () => {
   const asked = answers([200, state(1)], [200, state(2, "a")], [200, state(3, "a", "b")]);
   const store = createEditorStore("s");
   await store.getState().load();
   const { edit } = store.getState();
-  await Promise.all([edit({ kind: "add_actor" }), edit({ kind: "add_actor" })]);
+  await Promise.all([edit(add), edit(add)]);
   expect(asked.slice(1).map((one) => (one.body as { version: number }).version)).toEqual([1, 2]);
   expect(store.getState()).toMatchObject({ saving: "saved", selection: ["b"] });
 });
@@ -158,7 +161,7 @@ test("a refusal is told and changes nothing", async () => {
   answers([200, state(1)], [422, { error: { kind: "ScenarioError", message: "the node is taken" } }]);
   const store = createEditorStore("s");
   await store.getState().load();
-  expect(await store.getState().edit({ kind: "add_actor" })).toBeNull();
+  expect(await store.getState().edit(add)).toBeNull();
   expect(store.getState()).toMatchObject({ refusal: { message: "the node is taken", again: null }, saving: "saved" });
   expect(store.getState().scenario?.version).toBe(1);
 });
@@ -169,10 +172,10 @@ test("what another tab has done is loaded; one's own change can be made again on
     [200, state(6, "x", "y")]);
   const store = createEditorStore("s");
   await store.getState().load();
-  await store.getState().edit({ kind: "add_actor" });
+  await store.getState().edit(add);
   expect(store.getState().scenario?.version).toBe(5);
   await store.getState().refusal?.again?.();
-  expect(asked[3].body).toEqual({ version: 5, edits: [{ kind: "add_actor" }] });
+  expect(asked[3].body).toEqual({ version: 5, edits: [add] });
   expect(store.getState()).toMatchObject({ refusal: null, selection: ["y"] });
 });
 

@@ -1,7 +1,9 @@
 import { expect, test } from "vitest";
 
 import { hasEnded, keyFigures } from "../src/run/figures";
+import { FIGURES } from "./figures";
 import { Crowd, decodeFrame } from "../src/run/frames";
+import { summary } from "./messages";
 
 const frame = (...numbers: number[]): ArrayBuffer => new Float32Array(numbers).buffer;
 const two = frame(7, 3.5, 2, 1.25, 4, 11, 100, 200, 1.5, 8, 1, 12, -5, 6, 0, 1, 0);
@@ -23,7 +25,7 @@ test("a frame that does not add up is refused", () => {
 
 test("who has not been introduced is not drawn, the others have their true size", () => {
   const crowd = new Crowd();
-  crowd.introduce([{ index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25 }]);
+  crowd.introduce([{ index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25, ego: false }]);
   const moving = crowd.arrange(decodeFrame(two), null, "walker");
   expect(moving.count).toBe(1);
   expect([...moving.pose.subarray(0, 5)]).toEqual([-5, 6, 0, 0.5, 0.25]);
@@ -34,19 +36,19 @@ test("who has not been introduced is not drawn, the others have their true size"
 
 test("who has left the road is followed no more", () => {
   const crowd = new Crowd();
-  crowd.introduce([{ index: 11, id: "car-1", category: "car", length: 5, width: 2 }]);
+  crowd.introduce([{ index: 11, id: "car-1", category: "car", length: 5, width: 2, ego: true }]);
   expect(crowd.arrange(decodeFrame(two), "car-1", null).ego).toBe(0);
   expect(crowd.arrange(decodeFrame(frame(8, 4, 0, 1, 5)), "car-1", null).ego).toBe(-1);
 });
 
 test("key figures that a run has not are left out", () => {
-  const figures = keyFigures({ actors: { planned: 3, arrived: 2 }, figures: { mean_speed: 10, mean_delay: null } });
-  expect(figures).toEqual([
-    { label: "Planned", value: "3" }, { label: "Arrived", value: "2" }, { label: "Mean speed", value: "36 km/h" }]);
-  expect(keyFigures({})).toEqual([]);
+  const some = summary({ figures: { mean_speed: 10, mean_delay: null } }, { planned: 3, arrived: 2 });
+  expect(keyFigures(some, FIGURES).map(({ label, value }) => [label, value])).toEqual([
+    ["Arrived", "2"], ["Mean speed", "36.0 km/h"]]);
+  expect(keyFigures(summary(), FIGURES)).toEqual([]);
 });
 
 test("only final states end a run", () => {
-  expect(["completed", "stopped", "failed"].every(hasEnded)).toBe(true);
-  expect(["preparing", "running", "paused", "finishing"].some(hasEnded)).toBe(false);
+  expect((["completed", "stopped", "failed"] as const).every(hasEnded)).toBe(true);
+  expect((["preparing", "running", "paused", "finishing"] as const).some(hasEnded)).toBe(false);
 });

@@ -13,6 +13,7 @@ function example(): GraphColumns {
     speed_limit: x.map(() => null), spawnable: x.map(() => 1),
     first_node: [0, 4, 8], lane: [0, 0, 0, 0, 1, 1, 1, 1], s: x, x, y: [0, 0, 0, 0, -3, -3, -3, -3],
     hdg: x.map(() => 0), width: x.map(() => 3), segment: [0, 0, 1, 1, 0, 0, 1, 1],
+    left_lane: [-1, -1, -1, -1, 0, 1, 2, 3], right_lane: [4, 5, 6, 7, -1, -1, -1, -1],
     segments: [{ id: "r1-0", kind: "road", neighbours: [1] }, { id: "r1-1", kind: "road", neighbours: [0] }],
     edges: { source: [0], target: [1], relation: [0] },
     walks: {

@@ -1,11 +1,13 @@
 import { expect, test } from "vitest";
 
-import type { ReplayColumns } from "../src/api/runs";
+import type { Incident, ReplayColumns } from "../src/api/runs";
 import { compared } from "../src/run/figures";
+import { FIGURES } from "./figures";
 import { marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
 import { hashOf, parseRoute } from "../src/ui/route";
+import { summary } from "./messages";
 
 const columns = (): ReplayColumns => ({
   times: [0, 1, 2],
@@ -66,7 +68,7 @@ test("the moment is the last one that is not later", () => {
   expect([-1, 0, 0.99, 1, 5].map((time) => momentAt([0, 1, 2], time))).toEqual([0, 0, 0, 1, 2]);
 });
 
-const crash = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
+const crash: Incident = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
 
 test("incidents are told in words and marked from when they happen", () => {
   const categories = new Map([["car-1", "car"], ["x7", "bicycle"]] as const);
@@ -78,11 +80,12 @@ test("incidents are told in words and marked from when they happen", () => {
 });
 
 test("two runs are compared figure by figure", () => {
-  const before = { sim_seconds: 60, actors: { arrived: 5, collided: 0 }, figures: { mean_speed: 10, mean_delay: 1.5 } };
-  const now = { sim_seconds: 60, actors: { arrived: 3, collided: 1 }, figures: { mean_speed: 10.5, mean_delay: null } };
-  const found = Object.fromEntries(compared(now, before).map((one) => [one.label, one.difference]));
+  const before = summary({ sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } }, { arrived: 5, collided: 0 });
+  const now = summary({ sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } }, { arrived: 3, collided: 1 });
+  const found = Object.fromEntries(compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]));
   expect(found).toEqual({
-    "Simulated time": "same", "Arrived": "−2", "In collisions": "+1", "Mean speed": "+1.8 km/h", "Mean delay": "–",
+    "Simulated time": ["same", null], "Arrived": ["−2", false], "In collisions": ["+1", false],
+    "Mean speed": ["+1.8 km/h", true], "Mean delay": ["–", null],
   });
 });
 

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, expect
 
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.edits import demand_edits, scenario_edits
-from odscen.workflow import SUFFIX, load_map
 from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage

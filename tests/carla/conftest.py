@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from odscen import workflow
+from odscen.app.scenarios import generate
+from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.workspace.store import Workspace
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -52,8 +53,11 @@ def sample(workspace: Workspace) -> Sample:
 
     def sampled(xodr: Path, *, seed: int = 1, fill: float = 0.2, segments: int = 12) -> Path:
         workspace.add_map(xodr)
-        [path] = workflow.generate(
-            workspace, map_name=xodr.stem, seed=seed, fill=fill, roi_segments=segments
+        [path] = generate(
+            workspace,
+            settings=GenerationSettings(
+                map_name=xodr.stem, seed=seed, fill=fill, roi_segments=segments
+            ),
         )
         return path
 

@@ -14,7 +14,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from odscen.carla.client import Address
-from odscen.carla.cosim import CosimOptions, cosim
+from odscen.carla.cosim import cosim
+from odscen.carla.cosim_options import CosimOptions
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample, lights_of_sumo_alone
 from tests.carla.observer import Frame, Observer
@@ -140,8 +142,7 @@ def mirrored(
                 path,
                 CosimOptions(Address(server.host, server.port), tick=STEP / TICKS),
                 out=tmp_path,
-                until=SECONDS,
-                step_length=STEP,
+                settings=RunSettings(until=SECONDS, step_length=STEP),
             )
         assert result.status == "completed"
         assert (report.error, report.refused, report.left_behind) == (None, [], [])

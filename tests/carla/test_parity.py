@@ -9,7 +9,9 @@ import polars as pl
 import pytest
 
 from odscen.carla.client import Address
-from odscen.carla.cosim import CosimOptions, cosim
+from odscen.carla.cosim import cosim
+from odscen.carla.cosim_options import CosimOptions
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.in_step import Step
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
@@ -41,7 +43,9 @@ def test_what_somebody_else_does_to_the_mirror_is_in_the_comparison(
             return True
 
         options = CosimOptions(address=address, on_step=interfere)
-        result, report = cosim(workspace, path, options, out=tmp_path, until=6.0)
+        result, report = cosim(
+            workspace, path, options, out=tmp_path, settings=RunSettings(until=6.0)
+        )
         assert report.error is None
     folder = result.folder
     figures = json.loads((folder / "parity.json").read_text(encoding="utf-8"))

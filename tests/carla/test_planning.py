@@ -8,7 +8,7 @@ import pytest
 from odscen.base.errors import CarlaError, InputError
 from odscen.carla.batch import Batch
 from odscen.carla.blueprints import Shape, choose_blueprints
-from odscen.carla.cosim import CosimOptions
+from odscen.carla.cosim_options import CosimOptions
 from odscen.carla.environment import vehicle_lights
 from odscen.carla.light_heads import Heads
 from odscen.carla.mirror import BRAKE, FOG, LEFT, LIFTS, LOW_BEAM, POSITION, RIGHT, Mirror, between

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from odscen import workflow
+from odscen.app import runs
 from odscen.base.errors import InputError
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
 from odscen.regression.measure import FigureKey
 from odscen.results.measures.comparison import compare_figure
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen
 from tests.regression.conftest import ROOT
@@ -54,7 +55,7 @@ def sides(tmp_path_factory):
     other.write_text(json.dumps(changed))
     for side, path in (("a", SCENARIO), ("b", other)):
         for seed in (1, 2, 3):
-            workflow.run(store, [path], out=root / side / str(seed), seed=seed)
+            runs.run(store, [path], out=root / side / str(seed), settings=RunSettings(seed=seed))
             (root / side / str(seed) / "signal_crossing").rename(root / side / f"seed-{seed}")
     return root / "a", root / "b"
 
@@ -82,7 +83,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     store = Workspace.open(a.parent / "workspace")
     result = compare_runs(read_runs(a, store), read_runs(b, store))
     page = comparison_page(result)
-    assert "junction j10001: waiting time" in page
+    assert "junction j10001: stopped delay" in page
     # Every figure that differs has a dot, and a bar as there are three runs a side.
     run_rows = [row for row in result.rows if row.key.kind == "run"]
     differing = sum(bool(row.difference.relative) for row in run_rows)
@@ -95,7 +96,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     waiting = next(
         row for row in result.rows if row.key == FigureKey("junction", "j10001", "waiting_time")
     )
-    words = f"time {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
+    words = f"delay {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
     assert re.search(rf'class="d[01]"><title>j10001: [a-z ]*{re.escape(words)}', page)
     diagram = page[page.index('id="diagram"') :]
     assert all(f'class="dots side-{side}"' in diagram for side in "ab")
@@ -111,7 +112,9 @@ def test_a_page_of_runs_that_are_the_same_says_so(sides):
 def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
     store = Workspace.open(tmp_path / "workspace")
     store.add_map(ROOT / "maps" / "signal_crossing.xodr")
-    (done,) = workflow.run(store, [SCENARIO], out=tmp_path, seed=1, slice_length=100.0)
+    (done,) = runs.run(
+        store, [SCENARIO], out=tmp_path, settings=RunSettings(seed=1, slice_length=100.0)
+    )
     assert "trajectory_parts" in done.summary["files"]
     sliced, whole = read_runs(done.folder), read_runs(sides[0] / "seed-1")
     assert sliced.places

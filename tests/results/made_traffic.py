@@ -2,8 +2,8 @@
 
 import polars as pl
 
-from odscen.results.measures.lane_places import LanePlaces
-from odscen.results.measures.traffic import traffic_figures
+from odscen.results.by_place.lane_places import LanePlaces
+from odscen.results.by_place.traffic import traffic_figures
 
 INTERVAL = 900.0
 PLACES = LanePlaces.of(

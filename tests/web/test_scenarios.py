@@ -3,21 +3,26 @@ from __future__ import annotations
 import inspect
 import json
 import threading
+from string import Formatter
+from typing import get_args
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX, check_scenario
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.scenario_document import Actor, Flow, Matrix, Part
 from odscen.scenario.edits import demand_edits, scenario_edits
+from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
 from odscen.scenario.placing.spawn_room import late_for_changes
 from odscen.web.application import create_app
-from odscen.web.edit_messages import FUNCTIONS
+from odscen.web.edit_messages import MESSAGES, EditBase
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
@@ -72,7 +77,7 @@ def new(client: TestClient) -> str:
 @pytest.fixture
 def places(workspace: Workspace) -> dict[str, str]:
     """Node names for the placeholders above: spawns far apart, a goal, and a walk."""
-    loaded = workflow.load_map(workspace.map(CROSSING))
+    loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
     region = Region.of(graph, ["j10001", "r1", "r2", "r3"])
     inside = [
@@ -116,14 +121,33 @@ def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
         for name, function in inspect.getmembers(module, inspect.isfunction)
         if not name.startswith("_") and function.__module__ == module.__name__
     }
-    assert set(FUNCTIONS) == public - {"new_scenario", "eligible_segments", "removable_segments"}
-    assert {kind for kind, _ in ALL} == set(FUNCTIONS)
+    kinds = set(EDIT_ENTRIES)
+    assert kinds == public - {"new_scenario", "eligible_segments", "removable_segments"}
+    assert {kind for kind, _ in ALL} == kinds
+    assert {get_args(message.model_fields["kind"].annotation)[0] for message in MESSAGES} == kinds
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.__name__)
+def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBase]) -> None:
+    (kind,) = get_args(message.model_fields["kind"].annotation)
+    named = {name for _, name, _, _ in Formatter().parse(EDIT_ENTRIES[kind].label) if name}
+    required = {name for name, field in message.model_fields.items() if field.is_required()}
+    assert named <= required
+
+
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [("change_actor", Actor), ("add_actor", Actor), ("change_flow", Flow), ("set_matrix", Matrix)],
+)
+def test_an_edit_of_a_part_takes_every_field_that_the_part_has(kind: str, part: type[Part]) -> None:
+    message = next(one for one in MESSAGES if kind in get_args(one.model_fields["kind"].annotation))
+    assert part.model_fields.keys() <= message.model_fields.keys()
 
 
 def test_edits_over_the_wire_give_the_same_documents_as_in_python(
     client: TestClient, workspace: Workspace, new: str, places: dict[str, str]
 ) -> None:
-    loaded = workflow.load_map(workspace.map(CROSSING))
+    loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
     ours = scenario_edits.new_scenario(graph, name="mine")
     state = client.get(f"/api/scenarios/{new}").json()
@@ -140,7 +164,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         file = workspace.scenarios / "mine.scenario.json"
         assert file.read_text(encoding="utf-8") == dumps(ours), kind
         assert loads(json.dumps(state["document"])) == ours
-        checked = workflow.check_scenario(workspace, ours)
+        checked = check_scenario(workspace, ours)
         assert [p["code"] for p in state["problems"]] == [p.code for p in checked]
 
 
@@ -314,10 +338,10 @@ def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
     client: TestClient, workspace: Workspace
 ) -> None:
     (town,) = (path for path in shipped_maps() if path.stem == "town_5x5")
-    graph = workflow.load_map(workspace.add_map(town)).sumo.graph
+    graph = load_map(workspace.add_map(town)).sumo.graph
     scenario = scenario_edits.new_scenario(graph, name="town", roi=graph.segments.ids)
     workspace.scenarios.mkdir(exist_ok=True)
-    (workspace.scenarios / f"town{workflow.SUFFIX}").write_text(dumps(scenario))
+    (workspace.scenarios / f"town{SUFFIX}").write_text(dumps(scenario))
     router = Region.of(graph, scenario.roi).router
     late = np.flatnonzero(late_for_changes(graph.lanes, DEFAULT_BODY[Category.CAR]))
     found = 0
@@ -337,8 +361,8 @@ def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
 def test_goals_ways_and_neighbours_are_those_of_the_graph(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
-    scenario = loads((workspace.scenarios / f"{sampled}{workflow.SUFFIX}").read_text())
-    graph = workflow.load_map(workspace.map(CROSSING)).sumo.graph
+    scenario = loads((workspace.scenarios / f"{sampled}{SUFFIX}").read_text())
+    graph = load_map(workspace.map(CROSSING)).sumo.graph
     region = Region.of(graph, scenario.roi)
     for category in ("car", "pedestrian"):
         actor = next(a for a in scenario.actors if a.category == category)

@@ -1,15 +1,12 @@
-import { ask } from "./client";
+import { address, call } from "./client";
+import type { components } from "./schema";
 
 /** Whether runs can be shown in CARLA, and what to do about it, in the server's words. */
-export interface CarlaInfo {
-  state: "connected" | "absent" | "wrong_version";
-  address: string;
-  message: string;
-}
+export type CarlaInfo = components["schemas"]["CarlaInfo"];
 
 export const carla = {
-  info: () => ask<CarlaInfo>("/carla"),
+  info: () => call("get", "/api/carla"),
   /** Pictures that replace each other as they come; for an `img`. */
-  cameraUrl: (run: string) => `/api/runs/${encodeURIComponent(run)}/camera`,
-  comparisonUrl: (run: string) => `/api/runs/${encodeURIComponent(run)}/parity.html`,
+  cameraUrl: (run: string) => address("/api/runs/{run}/camera", { path: { run } }),
+  comparisonUrl: (run: string) => address("/api/runs/{run}/parity.html", { path: { run } }),
 };

@@ -1,78 +1,29 @@
-import { ask, send } from "./client";
-import type { Category, ScenarioState } from "./types";
+import { call, form } from "./client";
+import type { components } from "./schema";
 
-/** Relative shares; they need not sum to one. */
-export type Mix = Partial<Record<Category, number>>;
+type Schemas = components["schemas"];
 
-export interface Zone {
-  id: string;
-  segments: string[];
-}
-
-export interface Profile {
-  id: string;
-  /** Relative shares of equal slices of the day, from midnight on. */
-  shares: number[];
-}
-
-interface Window {
-  id: string;
-  begin: number;
-  /** Null is the end of the run. */
-  end: number | null;
-  profile: string | null;
-  mix: Mix;
-}
-
-export interface Matrix extends Window {
-  trips: [from: string, to: string, number: number][];
-}
-
-export interface Counts {
-  id: string;
-  mix: Mix;
-  rows: [place: string, begin: number, end: number, number: number][];
-}
-
+export type Demand = Schemas["Demand"];
+export type Zone = Schemas["Zone"];
+export type Matrix = Schemas["Matrix"];
+export type Counts = Schemas["Counts"];
 /** One of the three amounts is not null. */
-export interface Background extends Window {
-  fill: number | null;
-  per_km: number | null;
-  trips: number | null;
-}
+export type Background = Schemas["Background"];
+/** Relative shares; they need not sum to one. */
+export type Mix = Counts["mix"];
 
-export interface Demand {
-  /** Time of day at the start, seconds after midnight. */
-  clock: number;
-  zones: Zone[];
-  profiles: Profile[];
-  matrices: Matrix[];
-  counts: Counts[];
-  background: Background[];
-}
-
+type Table = Schemas["Body_table_api_scenarios__name__demand_table_post"];
 /** What can be read from a table. */
-export type TableKind = "od" | "counts" | "profile" | "zones";
-
-export interface DayMade {
-  scenario: ScenarioState;
-  trips: number;
-  peak_trips: number;
-  volume: number;
-  capacity: number;
-}
-
-const at = (name: string): string => `/scenarios/${encodeURIComponent(name)}/demand`;
+export type TableKind = Table["kind"];
 
 export const demand = {
-  table: (name: string, version: number, kind: TableKind, file: File, part: string | null): Promise<ScenarioState> => {
-    const form = new FormData();
-    form.append("version", String(version));
-    form.append("kind", kind);
-    form.append("file", file);
-    if (part) form.append("part", part);
-    return ask<ScenarioState>(`${at(name)}/table`, { method: "POST", body: form });
+  table: (name: string, version: number, kind: TableKind, file: File, part: string | null) => {
+    const fields = { version: String(version), kind, file, part } satisfies Record<
+      keyof Omit<Table, "day">,
+      unknown
+    >;
+    return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
   },
   day: (name: string, version: number, day: "weekday" | "weekend", trips: number) =>
-    send<DayMade>("POST", `${at(name)}/day`, { version, day, trips }),
+    call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body: { version, day, trips } }),
 };

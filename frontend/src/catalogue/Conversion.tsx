@@ -1,7 +1,7 @@
 import { Alert, Anchor, Loader, Modal, Text, Title } from "@mantine/core";
 import { useCallback } from "react";
 
-import { conversionReport, reportPath } from "../api/maps";
+import { conversionReport, reportUrl } from "../api/maps";
 import { useLoaded } from "../ui/useLoaded";
 import { coverage, type Finding, type Group, grouped } from "./conversion";
 
@@ -27,7 +27,7 @@ function Body({ map }: { map: string }) {
       {driving !== null && <Text><b>{driving} %</b> of the lanes can be driven on in the simulation.</Text>}
       {walking !== null && <Text><b>{walking} %</b> of the footways can be walked on.</Text>}
       {grouped(value).map((group) => <Section key={group.fate} group={group} />)}
-      <Anchor href={`/api${reportPath(map)}`} target="_blank" rel="noreferrer" size="sm">Everything in detail, for experts (JSON)</Anchor>
+      <Anchor href={reportUrl(map)} target="_blank" rel="noreferrer" size="sm">Everything in detail, for experts (JSON)</Anchor>
     </>
   );
 }

@@ -1,15 +1,4 @@
-/** What became of one element of a map; `fate` is kept, repaired, guessed or lost. */
-export interface Entry {
-  fate: string;
-  element: string;
-  reason: string;
-}
-
-export interface ConversionReport {
-  counts: Record<string, number>;
-  figures: Record<string, number>;
-  entries: Entry[];
-}
+import type { ConversionReport, Fate } from "../api/types";
 
 /** Entries that say the same of several elements. */
 export interface Finding {
@@ -18,12 +7,12 @@ export interface Finding {
 }
 
 export interface Group {
-  fate: string;
+  fate: Fate;
   title: string;
   findings: Finding[];
 }
 
-const TITLES: [fate: string, title: string][] = [
+const TITLES: [fate: Fate, title: string][] = [
   ["lost", "Could not be used"],
   ["repaired", "Was repaired"],
   ["guessed", "Was adapted or filled in"],

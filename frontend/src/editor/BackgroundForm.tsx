@@ -1,7 +1,7 @@
 import { Select } from "@mantine/core";
 
 import type { Background } from "../api/demand";
-import type { Edit } from "../api/types";
+import type { Edit, FieldsOf } from "../api/types";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { AMOUNTS, amountOf } from "./demand";
@@ -12,7 +12,7 @@ export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
   background: Background; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
 }) {
   const amount = amountOf(background);
-  const change = (fields: object): void => onEdit({ kind: "set_background", background: background.id, ...fields });
+  const change = (fields: FieldsOf<"set_background", "background">): void => onEdit({ kind: "set_background", background: background.id, ...fields });
   return (
     <PartCard name={background.id} what="Background traffic" onRemove={onRemove}>
       <Select label="How much" data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))} value={amount.key} allowDeselect={false}

@@ -2,7 +2,7 @@ import { ActionIcon, Button, Collapse, Group, Text } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 
 import type { Counts, Matrix, Mix, Zone } from "../api/demand";
-import type { Edit } from "../api/types";
+import type { Edit, FieldsOf } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { count, span } from "../ui/words";
 import { Committed } from "./Committed";
@@ -57,7 +57,7 @@ export function MixFold({ mix, people, onChange }: { mix: Mix; people?: boolean;
 export function MatrixForm({ matrix, profiles, onEdit, onRemove }: {
   matrix: Matrix; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
 }) {
-  const change = (fields: object): void => onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
+  const change = (fields: FieldsOf<"set_matrix", "matrix">): void => onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
   const when = matrix.end === null ? "until the end of the run" : `from ${span(matrix.begin, matrix.end).replace("–", " to ")} h of the run`;
   const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}, ${when}`;
   return (

@@ -44,7 +44,7 @@ export function RunStep({ name, version, document, lights, blocked, empty, busy,
         <div>
           <Text size="sm" fw={500}>Traffic lights change</Text>
           <SegmentedControl fullWidth data={CONTROLS} value={control} aria-label="Traffic lights change"
-            onChange={(value) => onEdit({ kind: "set_signal_control", control: value })} />
+            onChange={(value) => onEdit({ kind: "set_signal_control", control: value === "actuated" ? value : "fixed" })} />
           <Text size="xs" c="dimmed" mt={4}>{control === "fixed"
             ? "Every light keeps its own times." : "A green lasts longer while vehicles still come."}</Text>
         </div>

@@ -80,7 +80,6 @@ export function TableForm({ store, demand: known, roads }: {
 
 /** All reasons for a refusal; each begins with a capital letter. */
 function problemsOf(error: unknown): string[] {
-  const body = error instanceof ApiError ? error.body : null;
-  const told = body?.problems?.map((one) => typeof one === "string" ? one : one.message) ?? [];
+  const told = error instanceof ApiError ? error.body.problems : [];
   return (told.length > 0 ? told : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
 }

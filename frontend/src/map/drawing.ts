@@ -1,23 +1,6 @@
-import type { Bounds } from "../api/types";
+import type { Bounds, PackedDrawing, PackedLines } from "../api/types";
 
-/** Lines as they are stored: centimetres, each point relative to the one before. */
-export interface PackedLines {
-  sizes: number[];
-  steps: number[];
-}
-
-export interface PackedDrawing {
-  name: string;
-  bounds: Bounds;
-  areas: [level: number, kind: string, rings: PackedLines][];
-  marks: [level: number, color: string, width: number, dash: [number, number] | null, lines: PackedLines][];
-  symbols: [kind: string, x: number, y: number, hdg: number, text: string][];
-  crosswalks: PackedLines;
-  bars: PackedLines;
-  stop_lines: PackedLines;
-  parking_spaces: PackedLines;
-  buildings: PackedLines;
-}
+export type { PackedDrawing, PackedLines };
 
 /** Many polylines or rings: line `k` is `xy[2 * start[k]]` up to `xy[2 * start[k + 1]]`. */
 export interface Lines {

@@ -29,7 +29,7 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>
               <Table.Td>{one.finished ? when(one.finished) : "now"}</Table.Td>
-              <Table.Td>{STATE_WORD[one.state] ?? one.state}</Table.Td>
+              <Table.Td>{STATE_WORD[one.state]}</Table.Td>
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
                   {one.run === current ? <Text size="sm" fw={600}>shown</Text>

@@ -1,7 +1,7 @@
 import { Alert, Button, Group, Progress, Table, Text, Title } from "@mantine/core";
 import { useState } from "react";
 
-import { type RunInfo, runs, type SliceDone, type Summary } from "../api/runs";
+import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { hoursMinutes, span } from "../ui/words";
 
@@ -11,7 +11,7 @@ export function Interrupted({ info, onBack, onGoOn }: { info: RunInfo; onBack: (
   const { progress, slices } = info;
   const until = progress?.until ?? 0;
   const kept = slices?.time ?? 0;
-  const words = typeof info.error === "string" ? info.error : info.error?.message;
+  const words = info.error;
   const goOn = (): void => {
     setBusy(true);
     runs.goOn(info.run).then(onGoOn, (error: unknown) => { setBusy(false); tellError(error); });
@@ -46,7 +46,7 @@ export function SafeSlices({ info }: { info: RunInfo }) {
 
 /** The parts of a long run that has ended, one row each. */
 export function SliceTable({ summary }: { summary: Summary }) {
-  const done = slicesOf(summary);
+  const done = summary.slices?.done ?? [];
   if (done.length === 0) return null;
   return (
     <details className="words" style={{ marginTop: 18 }}>
@@ -67,9 +67,4 @@ export function SliceTable({ summary }: { summary: Summary }) {
       </Table>
     </details>
   );
-}
-
-function slicesOf(summary: Summary): SliceDone[] {
-  const { slices } = summary as { slices?: { done?: SliceDone[] } };
-  return slices?.done ?? [];
 }

@@ -112,7 +112,7 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
                   ? <div className="map-hint" role="status"><span className="waiting"><Loader size={16} aria-hidden="true" />{crowd
                     ? "Getting ready, step 2 of 2: starting the simulation …" : "Getting ready, step 1 of 2: planning everybody’s way …"}</span></div>
                   : followed && <div className="map-hint" role="status">{now.there ? `Following ${followed}. Click on the empty map to stop.` : `${followed} is not on the road now.`}</div>}
-                <Legend categories={kinds} ego={(known?.egos().length ?? 0) > 0} lights={mode === "live" && (map?.lights?.length ?? 0) > 0} lamps={mode === "live"} marks={marks} />
+                <Legend categories={kinds} ego={(known?.egos().length ?? 0) > 0} lights={mode === "live" && (map?.lights.length ?? 0) > 0} lamps={mode === "live"} marks={marks} />
               </MapCanvas>
             : <div className="empty"><Loader aria-label="Loading the map" /></div>}
         </div>

@@ -1,6 +1,6 @@
 import { Button, Group, Progress, Select, Text } from "@mantine/core";
 
-import { type Incident, type RunInfo, runs } from "../api/runs";
+import { type Action, type Incident, type RunInfo, runs, type RunState } from "../api/runs";
 import { MARK_COLOR } from "../map/colors";
 import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
 import { tellError } from "../ui/notices";
@@ -16,10 +16,10 @@ const LONG = 3600;
 
 /** Steers a run that goes on, and says how far it is. */
 export function LiveStrip({ info, now, onBack, learn }: {
-  info: RunInfo; now: Now; onBack: () => void; learn: (state: string, speed?: number | null) => void;
+  info: RunInfo; now: Now; onBack: () => void; learn: (state: RunState, speed?: number | null) => void;
 }) {
   const { run, state } = info;
-  const control = (action: string, speed?: number | null): void => {
+  const control = (action: Action, speed?: number | null): void => {
     runs.control(run, action, speed).then((told) => learn(told.state, told.speed), tellError);
   };
   const going = state === "running" || state === "paused";
@@ -40,7 +40,7 @@ export function LiveStrip({ info, now, onBack, learn }: {
       </Group>
       <div className="time-line">
         <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="How much of the run is over" />
-        <Text size="sm" mt={4}>{STATE_WORD[state] ?? state}{left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}</Text>
+        <Text size="sm" mt={4}>{STATE_WORD[state]}{left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}</Text>
       </div>
       <Shown label="Time" value={longClock(now.time, until)} />
       <Shown label="Times real speed" value={now.pace.toFixed(1)} />

@@ -1,15 +1,9 @@
-import { CATEGORIES, type Category } from "../api/types";
+import type { LiveActor } from "../api/runs";
+import { CATEGORIES } from "../api/types";
 import type { Moving } from "../map/scene";
 
 /** A road user as the server introduces it, once. */
-export interface Introduced {
-  index: number;
-  id: string;
-  category: Category;
-  length: number;
-  width: number;
-  ego?: boolean;
-}
+export type Introduced = Pick<LiveActor, "index" | "id" | "category" | "length" | "width" | "ego">;
 
 /** One moment of a run; `rows` holds six numbers for each: index, x, y, hdg, speed, flags. */
 export interface Frame {

@@ -1,4 +1,4 @@
-import type { MapInfo } from "../api/types";
+import type { MapDetails } from "../api/types";
 
 /** A lamp on the map and its colour now. */
 export interface Lamp {
@@ -11,9 +11,9 @@ const COLOR: Record<string, string> = { r: "#ff3b30", y: "#ffc400", u: "#ffc400"
 const RANK = "GgyurR";
 
 /** Colour of every signal: where one shows several movements, the one that may go most. */
-export function lamps(map: MapInfo, states: ReadonlyMap<string, string>): Lamp[] {
+export function lamps(map: MapDetails, states: ReadonlyMap<string, string>): Lamp[] {
   const letter = new Map<string, string>();
-  for (const light of map.lights ?? []) {
+  for (const light of map.lights) {
     const state = states.get(light.id) ?? "";
     light.signals.forEach((signals, n) => {
       for (const id of signals) {
@@ -22,7 +22,7 @@ export function lamps(map: MapInfo, states: ReadonlyMap<string, string>): Lamp[]
       }
     });
   }
-  return (map.semantics?.signals ?? []).flatMap(({ id, x, y }) => {
+  return map.semantics.signals.flatMap(({ id, x, y }) => {
     const color = COLOR[letter.get(id) ?? ""];
     return color ? [{ x, y, color }] : [];
   });

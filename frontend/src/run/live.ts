@@ -1,22 +1,13 @@
-import { type Incident, runs } from "../api/runs";
-import { Crowd, decodeFrame, type Frame, type Introduced } from "./frames";
+import { type Incident, type LiveMessage, runs, type RunState } from "../api/runs";
+import { Crowd, decodeFrame, type Frame } from "./frames";
 
 export interface LiveEvents {
   onFrame: (frame: Frame, crowd: Crowd) => void;
   onLights: (lights: Record<string, string>) => void;
-  onState: (state: string, speed?: number | null) => void;
+  onState: (state: RunState, speed?: number | null) => void;
   onIncidents: (incidents: Incident[]) => void;
   /** Everybody who will ever be on the road is known. */
   onIntroduced: (crowd: Crowd) => void;
-}
-
-interface Message {
-  origin?: [number, number];
-  actors?: Introduced[];
-  lights?: Record<string, string>;
-  state?: string;
-  speed?: number | null;
-  events?: Incident[];
 }
 
 /** Listens to a run; the newest frame is drawn with the next picture, then the next one is asked for. */
@@ -41,15 +32,17 @@ export class Live {
   }
 
   private read(text: string): void {
-    const message = JSON.parse(text) as Message;
-    if (message.origin) this.crowd.origin = message.origin;
-    if (message.actors) {
-      this.crowd.introduce(message.actors);
-      this.events.onIntroduced(this.crowd);
+    const message = JSON.parse(text) as LiveMessage;
+    switch (message.type) {
+      case "hello":
+        this.crowd.origin = message.origin;
+        this.crowd.introduce(message.actors);
+        return this.events.onIntroduced(this.crowd);
+      case "lights": return this.events.onLights(message.lights);
+      case "events": return this.events.onIncidents(message.events);
+      case "state": return this.events.onState(message.state, message.speed);
+      case "end": return this.events.onState(message.state);
     }
-    if (message.lights) this.events.onLights(message.lights);
-    if (message.events) this.events.onIncidents(message.events);
-    if (message.state) this.events.onState(message.state, message.speed);
   }
 
   private take(data: ArrayBuffer): void {

@@ -1,8 +1,8 @@
 import { useCallback, useEffect, useMemo, useState } from "react";
 
 import { api } from "../api/client";
-import { type RunInfo, runs } from "../api/runs";
-import type { Bounds, MapInfo } from "../api/types";
+import { type RunInfo, runs, type RunState } from "../api/runs";
+import type { Bounds, MapDetails } from "../api/types";
 import { insideRows, segmentsBounds } from "../editor/scene";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
@@ -17,7 +17,7 @@ export interface Run {
   info: RunInfo | null;
   failure: string | null;
   /** What the live picture tells sooner than one asks. */
-  learn: (state: string, speed?: number | null) => void;
+  learn: (state: RunState, speed?: number | null) => void;
 }
 
 /** How a run stands; asked rarely, as the picture comes by itself. */
@@ -41,13 +41,13 @@ export function useRun(run: string): Run {
     const timer = setInterval(ask, POLL);
     return () => { current = false; clearInterval(timer); };
   }, [run, ended, complete]);
-  const learn = useCallback((state: string, speed?: number | null) => setInfo((old) =>
+  const learn = useCallback((state: RunState, speed?: number | null) => setInfo((old) =>
     old && { ...old, state, speed: speed === undefined ? old.speed : speed }), []);
   return { info, failure, learn };
 }
 
 export interface Ground {
-  map: MapInfo | null;
+  map: MapDetails | null;
   drawing: PackedDrawing | null;
   loaded: LoadedGraph | null;
   scene: Scene;
@@ -58,7 +58,7 @@ export interface Ground {
 
 /** The map below a run; of the scenario, which may be gone, only its region. */
 export function useGround(name: string | null, scenario: string): Ground {
-  const [map, setMap] = useState<MapInfo | null>(null);
+  const [map, setMap] = useState<MapDetails | null>(null);
   const [drawing, setDrawing] = useState<PackedDrawing | null>(null);
   const [loaded, setLoaded] = useState<LoadedGraph | null>(null);
   const [roi, setRoi] = useState<string[] | null>(null);

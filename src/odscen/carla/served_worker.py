@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError
 from odscen.carla.client import Address
-from odscen.carla.cosim import CosimOptions, cosim
+from odscen.carla.cosim import cosim
+from odscen.carla.cosim_options import CosimOptions
 from odscen.carla.served_run import ServedJob
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import (
@@ -76,9 +77,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
             on_step=page.on_step,
             on_picture=lambda jpeg: send(ShotMessage(len(jpeg)), jpeg),
         ),
-        seed=job.seed,
-        until=job.until,
-        step_length=job.step_length,
+        settings=job.settings,
         progress=lambda message: send(message, b""),
     )
     troubles = [report.error, *report.left_behind, result.summary["error"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from odscen.carla.cosim import CosimReport
     from odscen.carla.native_run import NativeOptions
+    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.run_jobs import RunResult
     from odscen.sumo.worker.protocol import Progress
 
@@ -99,13 +101,15 @@ def cosim(
     Exit code 0: completed; 2: bad input; 3: the run or the server failed; 130: interrupted.
     """
     from odscen.carla.client import Address
-    from odscen.carla.cosim import CosimOptions
     from odscen.carla.cosim import cosim as run_cosim
+    from odscen.carla.cosim_options import CosimOptions
     from odscen.carla.native_run import NativeOptions
     from odscen.carla.nearby import Nearby
     from odscen.carla.pictures import Wish
+    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.workspace.store import Workspace
 
+    settings = RunSettings(seed=seed, until=until, step_length=step_length, weather=weather)
     options = CosimOptions(
         address=Address.parse(carla, timeout=timeout),
         tick=tick,
@@ -125,10 +129,9 @@ def cosim(
                 physics=physics,
                 pictures=options.pictures,
             ),
+            # CARLA's ticks are its steps.
+            replace(settings, step_length=None),
             out=out,
-            seed=seed,
-            until=until,
-            weather=weather,
             workspace=workspace,
             as_json=as_json,
         )
@@ -141,11 +144,8 @@ def cosim(
             Workspace.open(workspace),
             scenario,
             options,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            step_length=step_length,
-            weather=weather,
             progress=follow,
         )
     _show(result, report, as_json=as_json)
@@ -155,11 +155,9 @@ def cosim(
 def _run_native(
     scenario: Path,
     options: NativeOptions,
+    settings: RunSettings,
     *,
     out: Path | None,
-    seed: int | None,
-    until: float | None,
-    weather: bool,
     workspace: Path | None,
     as_json: bool,
 ) -> NoReturn:
@@ -172,10 +170,8 @@ def _run_native(
             Workspace.open(workspace),
             scenario,
             options,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            weather=weather,
             progress=lambda message: step(
                 f"{message.time:.0f} s, {message.running} on the road", message.share
             ),
@@ -193,14 +189,14 @@ def _run_native(
     if report.interrupted:
         log("Interrupted; what CARLA did so far is kept.")
     log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
-    failed = result.status == "failed"
+    failed = result.status is RunStatus.FAILED
     raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
 
 
 def _exit_code(result: RunResult, report: CosimReport) -> int:
     from odscen.carla.cosim import INTERRUPTED
 
-    if result.status == "failed" or report.error or report.left_behind:
+    if result.status is RunStatus.FAILED or report.error or report.left_behind:
         return 3
     return INTERRUPTED if report.interrupted else result.exit_code
 

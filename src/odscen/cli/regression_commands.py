@@ -38,12 +38,12 @@ def gate(
     Exit code 0: all as it should be; 1: something differs or falls short; 2: bad input; 3: a run
     failed.
     """
+    from odscen.base.text_files import write_text
     from odscen.regression.gates import run_suite
     from odscen.regression.junit import junit_xml
     from odscen.regression.suite import read_suite
     from odscen.regression.suite_page import suite_page
     from odscen.regression.suite_words import to_dict
-    from odscen.workflow import write_text
     from odscen.workspace.store import Workspace
 
     read = read_suite(suite)
@@ -95,9 +95,9 @@ def compare(
     as_json: JsonOption = False,
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
+    from odscen.base.text_files import write_text
     from odscen.regression.compare import compare_runs, read_runs
     from odscen.regression.comparison_page import comparison_page
-    from odscen.workflow import write_text
     from odscen.workspace.store import Workspace
 
     # The page draws the map, if the workspace has it.

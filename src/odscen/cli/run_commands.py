@@ -12,11 +12,12 @@ import typer
 from odscen.base.durations import clock, parse_duration
 from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from odscen.sumo.realize.realization import SliceLength
+    from odscen.sumo.realize.run_settings import SliceLength
     from odscen.sumo.runner.run_jobs import RunJob, RunResult
     from odscen.sumo.worker.protocol import Progress
 
@@ -121,34 +122,38 @@ def run(
 
     Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input; 3: a run failed.
     """
-    from odscen import workflow
+    from odscen.app import runs
+    from odscen.app.scenarios import scenario_files
     from odscen.results.measures.expectations import parse_expectation
     from odscen.sumo.realize.recording import Recording, parse_recording
+    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.workspace.store import Workspace
 
     recording = Recording() if trajectories is None else parse_recording(trajectories)
     slice_length: SliceLength = "auto" if slice_ == "auto" else None
     if slice_ not in ("auto", "none"):
         slice_length = parse_duration(slice_)
-    expectations = [parse_expectation(text) for text in expect or ()]
-    paths = workflow.scenario_files(scenarios)
+    settings = RunSettings(
+        seed=seed,
+        until=until,
+        step_length=step_length,
+        weather=weather,
+        recording=replace(recording, emissions=emissions, criticality=criticality),
+        meso=meso,
+        slice_length=slice_length,
+        time_limit=time_limit,
+        expectations=tuple(parse_expectation(text) for text in expect or ()),
+    )
+    paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
     with _hint(out or store.runs), progress("running") as step:
-        results = workflow.run(
+        results = runs.run(
             store,
             paths,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            step_length=step_length,
-            weather=weather,
-            expectations=expectations,
             processes=jobs,
-            time_limit=time_limit,
             progress=_follow(step, len(paths)),
-            recording=replace(recording, emissions=emissions, criticality=criticality),
-            meso=meso,
-            slice_length=slice_length,
             tell=log,
         )
     show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
@@ -167,7 +172,7 @@ def resume(
 
     Exit codes as of ``run``.
     """
-    from odscen import workflow
+    from odscen.app import runs
     from odscen.workspace.store import Workspace
 
     with progress("resuming") as step:
@@ -175,7 +180,7 @@ def resume(
         def follow(message: Progress) -> None:
             step(_words(run.name, message), message.time / message.until)
 
-        result = workflow.resume(
+        result = runs.resume(
             Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
         )
     show_results([result], as_json=as_json, several=False)
@@ -200,7 +205,7 @@ def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) 
             if not verdict["passed"]:
                 has = f"{verdict['expectation']} (is {verdict['value']})"
                 log(f"{result.folder.name}: failed: {has}")
-        if result.status == "failed":
+        if result.status is RunStatus.FAILED:
             log(f"{result.folder.name}: {result.summary['error']}")
         else:
             log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.base.arrays import ranges
+from odscen.base.arrays import Bounds, ranges
 from odscen.opendrive.objects import crosswalks, signal_kind, stop_lines
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 

@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
 from odscen.base.errors import InputError, in_file
+from odscen.base.text_files import write_text
 from odscen.regression.measure import FigureKey
 from odscen.results.records.run_records import json_with_rows
-from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from odscen.regression.measure import Measured, PlaceKind
+    from odscen.regression.measure import Measured
+    from odscen.results.measures.figure import FigureKind
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.run_settings import RunSettings
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -31,7 +33,7 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
-_KINDS: tuple[PlaceKind, ...] = ("segment", "junction", "actor")
+_KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
 """What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""
@@ -48,9 +50,7 @@ class Baseline:
     figures: dict[FigureKey, tuple[float | None, ...]]
 
 
-def fingerprint(
-    scenario: Scenario, map_sha256: str, *, until: float | None, step_length: float | None
-) -> Fingerprint:
+def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> Fingerprint:
     """Fingerprint of what a scenario is run from.
 
     The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
@@ -58,8 +58,8 @@ def fingerprint(
     """
     # What has its default value is left out: a field that a later version adds changes nothing.
     document = scenario.model_dump(mode="json", exclude_defaults=True)
-    settings = {"duration": until, "step_length": step_length}
-    given = {name: value for name, value in settings.items() if value is not None}
+    wished = {"duration": settings.until, "step_length": settings.step_length}
+    given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)

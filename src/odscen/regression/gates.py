@@ -6,11 +6,15 @@ import hashlib
 import shutil
 import tempfile
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
+from odscen.app.runs import check_run, run_all
+from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, in_file
+from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.regression.baseline import (
     baseline_of,
     changed_inputs,
@@ -21,27 +25,37 @@ from odscen.regression.baseline import (
 from odscen.regression.measure import measure
 from odscen.regression.verdict import hold_against
 from odscen.results.measures.expectations import evaluate, needs_criticality
-from odscen.scenario.document.problems import refuse_errors
+from odscen.results.records.outcomes import RunStatus
 from odscen.sumo.realize.recording import Recording
-from odscen.sumo.runner.prepare import prepare, write_report
-from odscen.sumo.runner.run_jobs import RunJob, run_many
-from odscen.workflow import check_scenario, load_map, read_scenario
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.asset_catalogue import shipped_assets
 from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from odscen.app.runs import CheckedRun
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
     from odscen.regression.verdict import BaselineVerdict
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import RunResult
+    from odscen.sumo.runner.run_jobs import RunJob, RunResult
     from odscen.sumo.worker.protocol import Progress
     from odscen.workspace.store import MapEntry, Workspace
 
-Status = Literal["passed", "failed", "error"]
+
+class CaseStatus(StrEnum):
+    """Verdict on a scenario of a suite; ``error`` if a run of it failed."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    ERROR = "error"
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return "run failed" if self is CaseStatus.ERROR else self.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +94,11 @@ class CaseResult:
     updated: bool = False
 
     @property
-    def status(self) -> Status:
+    def status(self) -> CaseStatus:
         """``error`` if a run failed, ``failed`` if one fell short, else ``passed``."""
         if any(run.error for run in self.runs):
-            return "error"
-        return "failed" if self.problems else "passed"
+            return CaseStatus.ERROR
+        return CaseStatus.FAILED if self.problems else CaseStatus.PASSED
 
     @property
     def wall_seconds(self) -> float:
@@ -103,16 +117,15 @@ class SuiteResult:
     def exit_code(self) -> int:
         """0 all passed; 1 something differs or falls short; 3 a run failed."""
         found = {case.status for case in self.cases}
-        return 3 if "error" in found else 1 if "failed" in found else 0
+        return 3 if CaseStatus.ERROR in found else 1 if CaseStatus.FAILED in found else 0
 
 
 @dataclass(slots=True)
 class _Loaded:
-    """A case with its scenario on the map that it will run on."""
+    """A case with its scenario on the map that it will run on; ``run`` is without a seed."""
 
     case: Case
-    scenario: Scenario
-    entry: MapEntry
+    run: CheckedRun
     made_of: Fingerprint
     baseline: Baseline | None
     runs: dict[int, SeedResult] = field(default_factory=dict)
@@ -147,13 +160,14 @@ def run_suite(
     jobs: dict[str, tuple[_Loaded, int]] = {}
     with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
         root = out or Path(temporary)
-        run_jobs = []
+        runs = []
         for case in loaded:
             for seed in case.case.seeds:
                 name = f"{case.case.name}/seed-{seed}"
                 jobs[name] = case, seed
-                run_jobs.append(RunJob(name, _preparer(case, seed), root / name))
-        follow = _Follow(len(run_jobs), progress)
+                settings = replace(case.run.settings, seed=seed)
+                runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
+        follow = _Follow(len(runs), progress)
 
         def done(job: RunJob, result: RunResult) -> None:
             case, seed = jobs[job.name]
@@ -162,19 +176,8 @@ def run_suite(
                 shutil.rmtree(result.folder)
             follow.done(job)
 
-        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-            if out is not None:
-                loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-                write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
-
-        run_many(
-            run_jobs,
-            processes=processes,
-            progress=follow.step,
-            done=done,
-            time_limit=suite.time_limit,
-            finish=finish,
-        )
+        keep = out is not None
+        run_all(runs, processes=processes, reports=keep, progress=follow.step, done=done)
     return SuiteResult(suite, tuple(_judge(case, update=update_baseline) for case in loaded))
 
 
@@ -212,12 +215,12 @@ def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_L
             # The suite names the map to test on; a baseline knows if it is not the one of before.
             reference = scenario.map.model_copy(update={"sha256": entry.sha256})
             scenario = scenario.model_copy(update={"map": reference})
-            refuse_errors(check_scenario(workspace, scenario))
-        made_of = fingerprint(
-            scenario, entry.sha256, until=case.until, step_length=case.step_length
-        )
+            settings = _settings(case, suite)
+            run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
+        made_of = fingerprint(scenario, entry.sha256, settings)
         baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
-        loaded.append(_Loaded(case, scenario, entry, made_of, baseline))
+        run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
+        loaded.append(_Loaded(case, run, made_of, baseline))
     return loaded
 
 
@@ -239,19 +242,16 @@ def _map_of(workspace: Workspace, scenario: Scenario, maps: Mapping[str, Path]) 
             return entry
     free = name not in workspace.map_names()
     own = name if free else f"{name[:50]}-{sha256[:8]}"
-    return workspace.add_map(maps[name], name=own, spacing=scenario.map.spacing)
+    settings = ConversionSettings(spacing=scenario.map.spacing)
+    return workspace.add_map(maps[name], name=own, settings=settings)
 
 
-def _preparer(loaded: _Loaded, seed: int) -> Callable[[], Any]:
-    return lambda: prepare(
-        loaded.scenario,
-        load_map(loaded.entry).sumo,
-        loaded.entry.path("net"),
-        shipped_assets(),
-        seed=seed,
-        until=loaded.case.until,
-        step_length=loaded.case.step_length,
-        recording=Recording(criticality=needs_criticality(loaded.case.expectations)),
+def _settings(case: Case, suite: Suite) -> RunSettings:
+    return RunSettings(
+        until=case.until,
+        step_length=case.step_length,
+        recording=Recording(criticality=needs_criticality(case.expectations)),
+        time_limit=suite.time_limit,
     )
 
 
@@ -264,7 +264,7 @@ def _seed_result(loaded: _Loaded, seed: int, result: RunResult) -> SeedResult:
         if not verdict.passed
     ]
     error = None
-    if result.status == "failed":
+    if result.status is RunStatus.FAILED:
         error = f"seed {seed}: the run failed: {summary['error']}"
         missed = []
     figures = measure(result.folder, summary)
@@ -278,13 +278,13 @@ def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
     problems += [missed for run in runs for missed in run.missed]
     figures = {run.seed: run.figures for run in runs if not run.error}
     if case.baseline is None or (update and len(figures) < len(runs)):
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
     if update:
         write_baseline(baseline_of(figures, loaded.made_of), case.baseline, scenario=case.name)
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems), updated=True)
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems), updated=True)
     if loaded.baseline is None:
         problems.append(f"there is no baseline {case.baseline}; write it with --update-baseline")
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
     unknown = sorted(figures.keys() - set(loaded.baseline.seeds))
     if unknown:
         listed = ", ".join(map(str, unknown))
@@ -292,4 +292,4 @@ def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
     verdict = hold_against(loaded.baseline, figures, case.tolerances)
     inputs = changed_inputs(loaded.baseline.fingerprint, loaded.made_of)
     problems += [change.words for change in verdict.failing]
-    return CaseResult(case, loaded.entry.name, runs, inputs, verdict, tuple(problems))
+    return CaseResult(case, loaded.run.entry.name, runs, inputs, verdict, tuple(problems))

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
+from pydantic import TypeAdapter
+from pydantic.json_schema import JsonSchemaMode
 from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from odscen import __version__
 from odscen.carla.client import Address
+from odscen.scenario.document.scenario_document import Scenario
 from odscen.web import (
     carla_routes,
     demand_routes,
+    figure_routes,
     map_routes,
     result_routes,
     run_routes,
@@ -25,6 +29,7 @@ from odscen.web.error_answers import RESPONSES, add_error_handlers, error_respon
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
+from odscen.web.wire.live_messages import LiveMessage
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Collection
@@ -79,7 +84,7 @@ def create_app(
         yield
         shared.close()
 
-    app = FastAPI(
+    app = _Api(
         title="odscen",
         version=__version__,
         docs_url="/api/docs",
@@ -102,6 +107,7 @@ def create_app(
         demand_routes,
         run_routes,
         result_routes,
+        figure_routes,
         carla_routes,
     ):
         app.include_router(routes.router)
@@ -117,6 +123,26 @@ def create_app(
         app.get("/", include_in_schema=False)(lambda: HTMLResponse(_PLAIN))
     app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
     return app
+
+
+class _Api(FastAPI):
+    """The interface; its schema also has what goes over WebSockets, and scenarios as files."""
+
+    def openapi(self) -> dict[str, Any]:
+        """Schema of all messages, made once."""
+        if self.openapi_schema is None:
+            schemas = super().openapi()["components"]["schemas"]
+            schemas |= _components("LiveMessage", LiveMessage, mode="serialization")
+            schemas |= _components("Scenario", Scenario, mode="validation", suffix="-File")
+        return super().openapi()
+
+
+def _components(name: str, model: Any, *, mode: JsonSchemaMode, suffix: str = "") -> dict[str, Any]:
+    """Schema of a type and of all that it is made of, by name."""
+    template = f"#/components/schemas/{{model}}{suffix}"
+    schema = TypeAdapter(model).json_schema(mode=mode, ref_template=template)
+    parts = schema.pop("$defs")
+    return {f"{part}{suffix}": one for part, one in {**parts, name: schema}.items()}
 
 
 class _BuiltPage(StaticFiles):

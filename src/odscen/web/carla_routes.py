@@ -15,6 +15,7 @@ from odscen.web.active_runs import Active
 from odscen.web.messages import CarlaInfo
 from odscen.web.run_routes import page_of_run
 from odscen.web.services import Shared
+from odscen.web.wire.media_types import HTML, PICTURES
 
 router = APIRouter(prefix="/api")
 
@@ -31,7 +32,7 @@ def carla(shared: Shared) -> CarlaInfo:
     return CarlaInfo(state=found.state, address=address, message=found.message)
 
 
-@router.get("/runs/{run}/camera", response_class=Response)
+@router.get("/runs/{run}/camera", response_class=Response, responses=PICTURES)
 async def camera(run: str, shared: Shared) -> Response:
     """Pictures from above a run that CARLA shows, as they come; JPEG, one replacing the other."""
     active = shared.runs.active(run)
@@ -44,7 +45,7 @@ async def camera(run: str, shared: Shared) -> Response:
     )
 
 
-@router.get("/runs/{run}/parity.html", response_class=Response)
+@router.get("/runs/{run}/parity.html", response_class=Response, responses=HTML)
 def parity(run: str, shared: Shared) -> Response:
     """How far SUMO and CARLA agreed in a finished run."""
     return page_of_run(shared, run, layout.PARITY_FILE)

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import (
     ConflictError,
     InputError,
@@ -20,11 +21,11 @@ from odscen.base.errors import (
     ScenarioError,
     WorkspaceError,
 )
+from odscen.base.text_files import write_text
 from odscen.scenario.document.json_form import dumps
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
-from odscen.workflow import SUFFIX, write_text
 from odscen.workspace.store import check_name
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Edits by name: each function of :mod:`odscen.scenario.edits` as a message.
+"""Edits by name: every entry of :mod:`odscen.scenario.edits.edit_registry` as a message.
 
 The messages are made from the functions' signatures, so that there is no second list to keep: kind
 is the function's name, the other fields are its arguments. What the server knows itself (the
@@ -10,78 +10,26 @@ from __future__ import annotations
 import inspect
 import operator
 from functools import reduce
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from odscen.base.categories import Category
-from odscen.lanegraph.graphs import MapGraph
-from odscen.scenario.checks.signal_timing import Light
-from odscen.scenario.document.scenario_document import (
-    Actor,
-    Background,
-    Control,
-    Counts,
-    Flow,
-    Identifier,
-    JunctionTiming,
-    Matrix,
-    Part,
-    Scenario,
-    Simulation,
+from odscen.scenario.document import scenario_document
+from odscen.scenario.edits import (
+    scenario_edits,  # noqa: F401 - enter their edits
 )
-from odscen.scenario.edits import demand_edits, scenario_edits
-from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
-    from odscen.workflow import LoadedMap
+    from odscen.app.maps import LoadedMap
+    from odscen.scenario.document.scenario_document import Part, Scenario
 
-_KNOWN = {"scenario", "graph", "lights", "usable"}
-_FIELDS_OF: Mapping[str, type[Part]] = {
-    "add_actor": Actor,
-    "change_actor": Actor,
-    "add_flow": Flow,
-    "change_flow": Flow,
-    "set_timing": JunctionTiming,
-    "set_simulation": Simulation,
-    "set_matrix": Matrix,
-    "set_counts": Counts,
-    "set_background": Background,
-}
-"""Whose fields an edit with ``**fields`` takes."""
-_WORDS: Mapping[str, str] = {
-    "add_actor": "Add {category}",
-    "add_flow": "Add a stream",
-    "change_actor": "Change {actor}",
-    "change_flow": "Change {flow}",
-    "clear_timing": "Timing of light {junction} as in the map",
-    "copy_actors": "Copy road users",
-    "fill_roi": "Fill the region at random",
-    "grow_roi": "Add segment {segment}",
-    "move_actor": "Move {actor}",
-    "remove_actors": "Remove road users",
-    "remove_demand": "Remove {part}",
-    "remove_flow": "Remove {flow}",
-    "rename": "Rename to {name}",
-    "set_background": "Background traffic {background}",
-    "set_clock": "Change the time of day at the start",
-    "set_counts": "Counts {counts}",
-    "set_ego": "Choose the vehicle under test",
-    "set_environment": "Change weather and time",
-    "set_goal": "Goal of {actor}",
-    "set_matrix": "Trips {matrix}",
-    "set_profile": "Day profile {profile}",
-    "set_seed": "Change the seed",
-    "set_signal_control": "Traffic lights {control}",
-    "set_simulation": "Change the run's settings",
-    "set_timing": "Timing of light {junction}",
-    "set_zone": "Zone {zone}",
-    "shrink_roi": "Remove segment {segment}",
-}
-"""What undo and redo call an edit; in braces what the edit always has."""
-
+_KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
+"""Arguments that the server has itself, and the names of their types, which need no message."""
+_JSON = {"Iterable": list, "Sequence": list, "Mapping": dict}
+"""JSON has lists and objects; an Iterable would be read only when it is used."""
 
 MOST_EDITS = 5000
 """Edits in one request."""
@@ -102,7 +50,7 @@ class EditBase(BaseModel):
     @property
     def label(self) -> str:
         """The edit in words, for undo and redo."""
-        return _WORDS[self.kind].format(**self.arguments)
+        return EDIT_ENTRIES[self.kind].label.format(**self.arguments)
 
 
 def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenario:
@@ -113,54 +61,26 @@ def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenari
     InputError
         If a rule forbids it.
     """
-    function = FUNCTIONS[edit.kind]
+    function = EDIT_ENTRIES[edit.kind].function
     known = {"graph": loaded.sumo.graph, "lights": loaded.lights, "usable": loaded.usable}
     ours = {name: known[name] for name in inspect.signature(function).parameters if name in known}
     return function(scenario, **ours, **edit.arguments)
 
 
-def _functions() -> dict[str, Callable[..., Scenario]]:
-    found: dict[str, Callable[..., Scenario]] = {}
-    members = (
-        (module, *member)
-        for module in (scenario_edits, demand_edits)
-        for member in inspect.getmembers(module, inspect.isfunction)
-    )
-    for module, name, function in members:
-        if name.startswith("_") or function.__module__ != module.__name__:
-            continue
-        signature = inspect.signature(function)
-        if next(iter(signature.parameters)) == "scenario" and (
-            signature.return_annotation == "Scenario"
-        ):
-            found[name] = function
-    return found
-
-
 def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
-    # JSON has lists and objects; an Iterable would be read only when it is used.
-    types = {"Iterable": list, "Sequence": list, "Mapping": dict, "MapGraph": MapGraph}
-    hints = get_type_hints(
-        function,
-        localns={
-            **types,
-            "Light": Light,
-            "Usable": Usable,
-            "Category": Category,
-            "Control": Control,
-            "Identifier": Identifier,
-        },
-    )
+    names = {**vars(scenario_document), **dict.fromkeys(_KNOWN.values(), object), **_JSON}
+    hints = get_type_hints(function, localns=names, include_extras=True)
     fields: dict[str, Any] = {"kind": (Literal[name], ...)}
     for parameter in inspect.signature(function).parameters.values():
         if parameter.name in _KNOWN:
             continue
+        hint = hints[parameter.name]
         if parameter.kind is parameter.VAR_KEYWORD:
-            for key, field in _FIELDS_OF[name].model_fields.items():
-                fields.setdefault(key, (Optional[field.annotation], None))  # noqa: UP045
-            continue
-        default = ... if parameter.default is parameter.empty else parameter.default
-        fields[parameter.name] = (hints[parameter.name], default)
+            _, part = get_args(hint)
+            fields = {**_optional_fields(part), **fields}
+        else:
+            default = ... if parameter.default is parameter.empty else parameter.default
+            fields[parameter.name] = (hint, default)
     doc = inspect.getdoc(function) or name
     title = "".join(word.capitalize() for word in name.split("_"))
     model: type[EditBase] = create_model(
@@ -169,8 +89,21 @@ def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
     return model
 
 
-FUNCTIONS = _functions()
-MESSAGES = tuple(_message(name, function) for name, function in FUNCTIONS.items())
+def _optional_fields(part: type[Part]) -> dict[str, Any]:
+    """Fields of a part of the document, none of which must be given.
+
+    Whether a value is possible is for the edit to say, in its own words.
+    """
+    left_out = Field(default=None, json_schema_extra=_without_default)
+    return {name: (field.annotation, left_out) for name, field in part.model_fields.items()}
+
+
+def _without_default(schema: dict[str, Any]) -> None:
+    """A field that is left out keeps its value; there is nothing that stands in for it."""
+    schema.pop("default", None)
+
+
+MESSAGES = tuple(_message(name, entry.function) for name, entry in EDIT_ENTRIES.items())
 
 if TYPE_CHECKING:
     AnyEdit = EditBase

@@ -83,5 +83,5 @@ def _status(error: OdscenError) -> int:
 
 
 def _response(status: int, info: ErrorInfo) -> Response:
-    body = orjson.dumps(ErrorAnswer(error=info).model_dump(exclude_none=True))
+    body = orjson.dumps(ErrorAnswer(error=info).model_dump())
     return Response(body, status_code=status, media_type="application/json")

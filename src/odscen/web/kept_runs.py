@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
 
 from odscen.base.durations import clock
 from odscen.base.errors import NotFoundError
@@ -12,6 +14,7 @@ from odscen.sumo.folder import layout
 from odscen.sumo.folder.run_status import going, read_status
 from odscen.sumo.runner.long_runs import about
 from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
+from odscen.web.wire.summary_messages import RunSummary
 from odscen.workspace.store import check_name
 
 if TYPE_CHECKING:
@@ -53,28 +56,30 @@ class KeptRuns:
     def info(self, run: str) -> RunInfo:
         """What a run says of itself."""
         folder = self.folder(run)
+        summary = self.summary(run)
         if read_status(folder) is not None or not (folder / layout.SUMMARY_FILE).is_file():
-            return _unfinished(folder, self.summary(run))
-        summary = self.summary(run) or {}
-        failed = summary.get("status") != "completed"
+            return _unfinished(folder, summary)
+        state: RunState = "failed"
+        if summary is not None and summary.status == "completed":
+            state = "stopped" if summary.stopped else "completed"
         return RunInfo(
             run=run,
-            state="failed" if failed else "stopped" if summary.get("stopped") else "completed",
-            scenario=str(summary.get("scenario", run)),
-            map=summary.get("map"),
+            state=state,
+            scenario=run if summary is None else summary.scenario,
+            map=None if summary is None else summary.map,
             summary=summary,
-            error=summary.get("error"),
+            error=f"{layout.SUMMARY_FILE} cannot be read" if summary is None else summary.error,
             finished=self.end_time(run),
         )
 
-    def summary(self, run: str) -> dict[str, Any] | None:
-        """Key figures; ``None`` until there are some."""
+    def summary(self, run: str) -> RunSummary | None:
+        """Key figures; ``None`` until there are some, or if they cannot be read."""
         try:
-            text = (self._runs / run / layout.SUMMARY_FILE).read_text(encoding="utf-8")
-            summary: dict[str, Any] = json.loads(text)
-        except (OSError, ValueError):
+            return RunSummary.model_validate_json(
+                (self._runs / run / layout.SUMMARY_FILE).read_bytes()
+            )
+        except (OSError, ValidationError):
             return None
-        return summary
 
     def end_time(self, run: str) -> float | None:
         """When the summary was written, seconds since 1970."""
@@ -138,14 +143,14 @@ def _shown(folder: Path) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
-def _unfinished(folder: Path, summary: dict[str, Any] | None) -> RunInfo:
+def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
     """Describe a run in slices that has not ended, from what it last said of itself."""
     status = read_status(folder) or {}
     at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))
     state: RunState = going(folder) or "interrupted"
     told = f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} goes on."
-    if summary is not None and summary.get("error"):
-        told = f"{told}\n{summary['error']}"
+    if summary is not None and summary.error:
+        told = f"{told}\n{summary.error}"
     return RunInfo(
         run=folder.name,
         state=state,

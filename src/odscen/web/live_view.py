@@ -9,17 +9,27 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import orjson
 from starlette.websockets import WebSocketDisconnect
 
 from odscen.sumo.worker.snapshots import origin
+from odscen.web.run_messages import IncidentInfo
+from odscen.web.wire.live_messages import (
+    LiveActor,
+    LiveEnd,
+    LiveIncidents,
+    LiveLights,
+    LiveState,
+)
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
+    from odscen.results.records.run_records import Plan
     from odscen.web.active_runs import Active
+    from odscen.web.messages import Answer
 
 GRACE = 5.0
 """Wall seconds after the end of a run in which a client may still ask for the last frame."""
@@ -34,7 +44,8 @@ class LiveView:
         self._changed = asyncio.Event()
         self._ready = True
         self._gone = False
-        self._said: dict[str, Any] = {}
+        self._greeted = False
+        self._said: LiveState | None = None
         self._lights: dict[str, str] = {}
         self._incidents = 0
         self._frame = 0
@@ -76,8 +87,7 @@ class LiveView:
             else:
                 await self._changed.wait()
         if not self._gone:
-            end = {"type": "end", "state": self._run.ended, "error": self._run.error}
-            await self._send(end)
+            await self._send(LiveEnd(state=self._run.state, error=self._run.error))
             await self._socket.close()
 
     async def _wait_once(self) -> None:
@@ -95,48 +105,22 @@ class LiveView:
     async def _tell_changes(self) -> None:
         """Tell what has changed since this client was told last."""
         live, plan = self._run.live, self._run.plan
-        if plan is not None and "hello" not in self._said:
-            self._said["hello"] = True
-            await self._send(self._hello())
-        state = {"type": "state", "state": self._run.state, "speed": live.pace.speed}
-        if state != self._said.get("state"):
-            self._said["state"] = state
+        if plan is not None and not self._greeted:
+            self._greeted = True
+            await self._socket.send_text(_hello(plan))
+        state = LiveState(state=self._run.state, speed=live.pace.speed)
+        if state != self._said:
+            self._said = state
             await self._send(state)
         lights, incidents = live.lights, live.incidents
         changed = {n: state for n, state in lights.items() if self._lights.get(n) != state}
         if changed:
             self._lights = lights
-            await self._send({"type": "lights", "lights": changed})
+            await self._send(LiveLights(lights=changed))
         if len(incidents) > self._incidents:
             new = incidents[self._incidents :]
             self._incidents += len(new)
-            await self._send({"type": "events", "events": new})
-
-    def _hello(self) -> dict[str, Any]:
-        plan = self._run.plan
-        if plan is None:
-            raise AssertionError
-        return {
-            "type": "hello",
-            "scenario": plan.scenario,
-            "until": plan.until,
-            "step_length": plan.step_length,
-            "origin": origin(plan),
-            "actors": [
-                {
-                    "index": index,
-                    "id": actor.id,
-                    "category": actor.category,
-                    "model": actor.model,
-                    "length": actor.length,
-                    "width": actor.width,
-                    "ego": actor.ego,
-                    "flow": actor.flow,
-                    "depart": actor.depart,
-                }
-                for index, actor in enumerate(plan.actors)
-            ],
-        }
+            await self._send(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
 
     async def _send_frame(self) -> None:
         picture = self._run.live.picture
@@ -144,8 +128,8 @@ class LiveView:
         self._ready = False
         await self._socket.send_bytes(picture.frame)
 
-    async def _send(self, message: dict[str, Any]) -> None:
-        await self._socket.send_text(orjson.dumps(message).decode())
+    async def _send(self, message: Answer) -> None:
+        await self._socket.send_text(message.model_dump_json())
 
     async def _listen(self) -> None:
         while True:
@@ -156,3 +140,24 @@ class LiveView:
                 return
             self._ready = True
             self._changed.set()
+
+
+def _hello(plan: Plan) -> str:
+    """Introduce everybody who will ever be in a frame.
+
+    A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
+    tens of thousands of actors, and the server does nothing else meanwhile.
+    """
+    names = [name for name in LiveActor.model_fields if name != "index"]
+    hello = {
+        "type": "hello",
+        "scenario": plan.scenario,
+        "until": plan.until,
+        "step_length": plan.step_length,
+        "origin": origin(plan),
+        "actors": [
+            {"index": index, **{name: getattr(actor, name) for name in names}}
+            for index, actor in enumerate(plan.actors)
+        ],
+    }
+    return orjson.dumps(hello).decode()

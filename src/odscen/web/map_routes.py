@@ -5,12 +5,13 @@ from __future__ import annotations
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
+from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import ConflictError
 from odscen.scenario.demand.day_profiles import BUILT_IN
@@ -21,14 +22,23 @@ from odscen.web.messages import (
     CategoryInfo,
     JobInfo,
     JobStarted,
-    LightInfo,
-    MapDetails,
-    MapInfo,
     WeatherInfo,
 )
-from odscen.web.packed import answer, packed_drawing, packed_graph
+from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
-from odscen.workflow import load_map
+from odscen.web.wire.map_messages import (
+    ConversionInfo,
+    DrawingColumns,
+    GraphColumns,
+    GraphCounts,
+    LightInfo,
+    MapDetails,
+    MapHeader,
+    MapInfo,
+    NetCounts,
+    SemanticsInfo,
+)
+from odscen.web.wire.media_types import SVG
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import check_name, name_from_file
 
@@ -44,7 +54,7 @@ _DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 @router.get("/maps")
 def list_maps(shared: Shared) -> list[MapInfo]:
     """All maps of the catalogue, by name."""
-    return [MapInfo(**_map_fields(entry)) for entry in shared.workspace.maps()]
+    return [_map_info(entry) for entry in shared.workspace.maps()]
 
 
 @router.get("/maps/{name}")
@@ -61,11 +71,11 @@ def show_map(name: str, shared: Shared) -> MapDetails:
         )
         for light, seen in zip(lights, scenario_lights(lights), strict=True)
     ]
-    fields = _map_fields(entry)
-    return MapDetails(**fields, semantics=entry.info["semantics"], lights=known)
+    semantics = SemanticsInfo.model_validate(entry.info["semantics"])
+    return MapDetails(**dict(_map_info(entry)), semantics=semantics, lights=known)
 
 
-@router.get("/maps/{name}/preview.svg", response_class=Response)
+@router.get("/maps/{name}/preview.svg", response_class=Response, responses=SVG)
 def preview(name: str, shared: Shared) -> Response:
     """Drawing of the map as SVG."""
     content = shared.workspace.map(name).path("preview").read_bytes()
@@ -73,23 +83,22 @@ def preview(name: str, shared: Shared) -> Response:
     return Response(content, media_type="image/svg+xml", headers=headers)
 
 
-@router.get("/maps/{name}/drawing")
-def drawing(name: str, request: Request, shared: Shared) -> Any:
+@router.get("/maps/{name}/drawing", response_model=DrawingColumns, responses=UNCHANGED)
+def drawing(name: str, request: Request, shared: Shared) -> Response:
     """What is drawn of the map, see ``docs/drawings.md``."""
     return answer(request, packed_drawing(shared.workspace.map(name)))
 
 
-@router.get("/maps/{name}/graph")
-def graph(name: str, request: Request, shared: Shared) -> Any:
+@router.get("/maps/{name}/graph", response_model=GraphColumns, responses=UNCHANGED)
+def graph(name: str, request: Request, shared: Shared) -> Response:
     """Lane graph, segments and pedestrian graph as columns, see ``docs/server.md``."""
     return answer(request, packed_graph(shared.workspace.map(name)))
 
 
 @router.get("/maps/{name}/report")
-def report(name: str, shared: Shared) -> dict[str, Any]:
+def report(name: str, shared: Shared) -> ConversionInfo:
     """What became of each element of the map on the way to SUMO."""
-    found: dict[str, Any] = shared.workspace.map(name).info["report"]
-    return found
+    return ConversionInfo.model_validate(shared.workspace.map(name).info["report"])
 
 
 @router.post("/maps", status_code=202)
@@ -192,12 +201,16 @@ def _refuse_other(shared: Shared, name: str, source: Path) -> None:
         raise ConflictError(msg)
 
 
-def _map_fields(entry: MapEntry) -> dict[str, Any]:
+def _map_info(entry: MapEntry) -> MapInfo:
     info = entry.info
-    keys = ("sha256", "source", "opendrive", "statistics", "graph", "sumo")
-    return {
-        "name": entry.name,
-        **{key: info[key] for key in keys},
-        "report_counts": info["report"]["counts"],
-        "preview": f"/api/maps/{entry.name}/preview.svg",
-    }
+    return MapInfo(
+        name=entry.name,
+        sha256=entry.sha256,
+        source=info["source"],
+        opendrive=MapHeader.model_validate(info["opendrive"]),
+        statistics=info["statistics"],
+        graph=GraphCounts.model_validate(info["graph"]),
+        sumo=NetCounts.model_validate(info["sumo"]),
+        report_counts=info["report"]["counts"],
+        preview=f"/api/maps/{entry.name}/preview.svg",
+    )

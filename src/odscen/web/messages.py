@@ -5,27 +5,28 @@ Field names are those of the documents; units are SI; positions are in the OpenD
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from odscen.base.categories import Category
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.workspace.asset_catalogue import Age, TimeOfDay
 
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Version = Annotated[int, Field(ge=0, lt=2**53)]
 
 
-class Body(BaseModel):
+class RequestBody(BaseModel):
     """Base of what a client sends: unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Answer(BaseModel):
-    """Base of what the server sends."""
+    """Base of what the server sends: nothing is left out, whatever has a default."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, json_schema_serialization_defaults_required=True)
 
 
 class ErrorInfo(Answer):
@@ -53,40 +54,6 @@ class Health(Answer):
     workspace: str
 
 
-class MapInfo(Answer):
-    """A map of the catalogue; see ``map.json`` for the fields within."""
-
-    name: str
-    sha256: str
-    source: str
-    opendrive: dict[str, Any]
-    statistics: dict[str, Any]
-    graph: dict[str, Any]
-    sumo: dict[str, Any]
-    report_counts: dict[str, int]
-    preview: str
-
-
-class MapDetails(MapInfo):
-    """The same with what the map means, and its traffic lights."""
-
-    semantics: Any
-    lights: list[LightInfo]
-
-
-class LightInfo(Answer):
-    """A traffic light: its SUMO id, by which live states are told, and what scenarios call it.
-
-    ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
-    of its state, the OpenDRIVE signals that show it.
-    """
-
-    id: str
-    names: list[str]
-    green: list[float]
-    signals: list[list[str]]
-
-
 class JobStarted(Answer):
     """Work has been taken on; ask for the job."""
 
@@ -110,7 +77,7 @@ class BlueprintInfo(Answer):
     id: str
     category: Category
     special_type: str
-    age: str | None
+    age: Age | None
     length: float
     width: float
     height: float
@@ -130,7 +97,7 @@ class WeatherInfo(Answer):
 
     name: str
     kind: str
-    time_of_day: str
+    time_of_day: TimeOfDay
     parameters: dict[str, float]
 
 
@@ -179,26 +146,26 @@ class ScenarioState(Answer):
     redo: str | None
 
 
-class NewScenario(Body):
+class NewScenario(RequestBody):
     """Start a scenario on a map; a free name is found if none is given."""
 
     map: Name
     name: Name | None = None
 
 
-class OfVersion(Body):
+class OfVersion(RequestBody):
     """What is asked for holds for this version only."""
 
     version: Version
 
 
-class NewName(Body):
+class NewName(RequestBody):
     """Another name."""
 
     name: Name
 
 
-class CopyName(Body):
+class CopyName(RequestBody):
     """Name of a copy; made from the original's if not given."""
 
     name: Name | None = None
@@ -249,12 +216,9 @@ class DayMade(Answer):
     capacity: float
 
 
-class WholeDay(Body):
+class WholeDay(RequestBody):
     """Give a scenario a day of traffic on its whole map."""
 
     version: Version
     day: Literal["weekday", "weekend"] = "weekday"
     trips: Annotated[float, Field(ge=1, le=1e6)] = 51_000.0
-
-
-MapDetails.model_rebuild()

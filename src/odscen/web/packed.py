@@ -11,13 +11,18 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
-from odscen.workflow import load_map
+from odscen.app.maps import load_map
+from odscen.web.wire.media_types import Responses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from starlette.requests import Request
 
     from odscen.workspace.store import MapEntry
+
+
+UNCHANGED: Responses = {304: {"description": "What the client has is right."}}
+"""What a packed answer may be instead, for the schema."""
 
 
 class Packed(NamedTuple):
@@ -33,7 +38,7 @@ def pack(content: bytes) -> Packed:
     return Packed(gzip.compress(content, 5, mtime=0), tag)
 
 
-def answer(request: Request, packed: Packed, *, media_type: str = "application/json") -> Response:
+def answer(request: Request, packed: Packed) -> Response:
     """Send it, or only say that what the browser has is still right."""
     headers = {"ETag": packed.tag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     if request.headers.get("if-none-match") == packed.tag:
@@ -43,7 +48,7 @@ def answer(request: Request, packed: Packed, *, media_type: str = "application/j
         headers["Content-Encoding"] = "gzip"
     else:
         content = gzip.decompress(content)
-    return Response(content, media_type=media_type, headers=headers)
+    return Response(content, media_type="application/json", headers=headers)
 
 
 @lru_cache(maxsize=8)

@@ -7,12 +7,13 @@ from pathlib import PurePosixPath
 from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
-from odscen import demands
+from odscen.app import demands
+from odscen.app.scenarios import read_scenario
 from odscen.scenario.demand.count_stations import place_points
 from odscen.sumo.folder.layout import SCENARIO_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
-from odscen.workflow import read_scenario
+from odscen.web.wire.media_types import ANY_FILE
 
 router = APIRouter(prefix="/api/runs/{run}")
 
@@ -23,7 +24,7 @@ def files(run: str, shared: Shared) -> list[RunFile]:
     return shared.runs.kept.files(run)
 
 
-@router.get("/files/{name:path}", response_class=Response)
+@router.get("/files/{name:path}", response_class=Response, responses=ANY_FILE)
 def file(run: str, name: str, shared: Shared) -> Response:
     """Download one of them."""
     path = shared.runs.kept.file(run, name)

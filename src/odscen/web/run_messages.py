@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
 
-from odscen.web.messages import Answer, Body, Name
+from odscen.base.categories import Category
+from odscen.results.records.run_records import EventKind
+from odscen.web.messages import Answer, Name, RequestBody
+from odscen.web.wire.summary_messages import RunSummary
 
 RunState = Literal[
     "preparing", "running", "paused", "finishing", "completed", "stopped", "failed", "interrupted"
 ]
 
 
-class NewRun(Body):
+class NewRun(RequestBody):
     """Run a scenario as it is now.
 
     ``until``, ``seed`` and ``step_length`` stand in for the scenario's own. ``speed`` is in
@@ -34,7 +38,7 @@ class NewRun(Body):
     carla: bool = False
 
 
-class GoOn(Body):
+class GoOn(RequestBody):
     """Go on with an interrupted run; ``speed`` as in :class:`NewRun`."""
 
     speed: Annotated[float, Field(ge=0.01, le=1000)] | None = None
@@ -70,7 +74,7 @@ class RunStarted(Answer):
     run: str
 
 
-class RunControl(Body):
+class RunControl(RequestBody):
     """Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
 
     ``interrupt`` ends a long run at once, so that it can go on later.
@@ -106,7 +110,7 @@ class RunInfo(Answer):
     map: str | None
     speed: float | None = None
     progress: RunProgress | None = None
-    summary: dict[str, Any] | None = None
+    summary: RunSummary | None = None
     error: str | None = None
     finished: float | None = None
     carla: bool = False
@@ -191,8 +195,62 @@ class RunContent(Answer):
     counts: int
 
 
+_One = TypeVar("_One")
+_IfKnown = Annotated[_One | SkipJsonSchema[None], Field(exclude_if=lambda value: value is None)]
+"""Left out of the message where there is nothing to say."""
+
+
+class IncidentInfo(Answer):
+    """Something that happened to ``actor``; see :class:`~odscen.results.records.run_records.Event`.
+
+    What there is nothing to say of is left out.
+    """
+
+    model_config = ConfigDict(json_schema_serialization_defaults_required=False)
+
+    time: float
+    kind: EventKind
+    actor: str
+    x: _IfKnown[float] = None
+    y: _IfKnown[float] = None
+    lane: _IfKnown[str] = None
+    partner: _IfKnown[str] = None
+    error: _IfKnown[float] = None
+    travel_time: _IfKnown[float] = None
+    detail: _IfKnown[str] = None
+    waited: _IfKnown[float] = None
+    queue: _IfKnown[int] = None
+
+
 class RunEvents(Answer):
     """Incidents of a finished run, as the live view tells them; ``left_off`` were too many."""
 
-    events: list[dict[str, Any]]
+    events: list[IncidentInfo]
     left_off: int
+
+
+class ReplayActor(Answer):
+    """Somebody in a recording; metres."""
+
+    id: str
+    category: Category
+    length: float
+    width: float
+    ego: bool
+
+
+class ReplayColumns(Answer):
+    """Who was where: rows ``first[i]`` up to ``first[i + 1]`` belong to ``times[i]``, seconds.
+
+    Per row who it was (a row of ``actors``), the centre of the body (metres), its heading (radians)
+    and its speed (m/s).
+    """
+
+    times: list[float]
+    first: list[int]
+    actor: list[int]
+    x: list[float]
+    y: list[float]
+    hdg: list[float]
+    speed: list[float]
+    actors: list[ReplayActor]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import orjson
 from fastapi import APIRouter, Query
@@ -22,10 +21,13 @@ from odscen.results.records.traces import ActorCounts, SpeedCurve
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_trajectories
 from odscen.web.live_view import LiveView
-from odscen.web.packed import answer, pack
+from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.run_messages import (
     GoOn,
+    IncidentInfo,
     NewRun,
+    ReplayActor,
+    ReplayColumns,
     RunContent,
     RunControl,
     RunCurve,
@@ -38,6 +40,8 @@ from odscen.web.run_messages import (
     RunStarted,
 )
 from odscen.web.services import Shared
+from odscen.web.wire.media_types import HTML
+from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:
     import polars as pl
@@ -98,7 +102,7 @@ def control(run: str, wish: RunControl, shared: Shared) -> RunInfo:
     return shared.runs.control(run, wish)
 
 
-@router.get("/{run}/report.html", response_class=Response)
+@router.get("/{run}/report.html", response_class=Response, responses=HTML)
 def report(run: str, shared: Shared) -> Response:
     """Report of a completed run."""
     return page_of_run(shared, run, layout.REPORT_FILE)
@@ -111,13 +115,13 @@ def page_of_run(shared: Shared, run: str, name: str) -> Response:
 
 
 @router.get("/{run}/summary")
-def summary(run: str, shared: Shared) -> dict[str, Any]:
+def summary(run: str, shared: Shared) -> RunSummary:
     """Key figures of a finished run: its ``summary.json``."""
-    path = shared.runs.kept.folder(run) / layout.SUMMARY_FILE
-    if not path.is_file():
+    shared.runs.kept.folder(run)
+    found = shared.runs.kept.summary(run)
+    if found is None:
         what = "summary of run"
         raise NotFoundError(what, run, [])
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return found
 
 
@@ -136,7 +140,8 @@ def events(run: str, shared: Shared) -> RunEvents:
         for event in events_from_json(path.read_text(encoding="utf-8"))
         if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
     ]
-    return RunEvents(events=found[:MOST_EVENTS], left_off=max(0, len(found) - MOST_EVENTS))
+    rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
+    return RunEvents(events=rows, left_off=max(0, len(found) - MOST_EVENTS))
 
 
 @router.get("/{run}/curves")
@@ -144,7 +149,7 @@ def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
     table, plan, _ = _recorded(shared, run)
     actors = actors_from_json(_kept(shared, run, layout.ACTORS_FILE).read_text(encoding="utf-8"))
-    found = run_curves(plan, actors, table, end=_sim_seconds(summary(run, shared)))
+    found = run_curves(plan, actors, table, end=summary(run, shared).sim_seconds or 0.0)
     return RunCurves(
         counts=RunCurve(**_lists(found.counts)),
         speeds=RunSpeeds(**_lists(found.speeds)),
@@ -152,7 +157,7 @@ def curves(run: str, shared: Shared) -> RunCurves:
     )
 
 
-@router.get("/{run}/trajectories")
+@router.get("/{run}/trajectories", response_model=ReplayColumns, responses=UNCHANGED)
 def trajectories(
     run: str,
     request: Request,
@@ -161,16 +166,14 @@ def trajectories(
     most: Annotated[
         int | None, Query(ge=1, description="Rows at most; fewer steps if need be.")
     ] = None,
-) -> Any:
+) -> Response:
     """Where everybody was, as columns; see ``docs/server.md``."""
     table, plan, read = _recorded(shared, run)
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
     columns = replay_columns(table, plan, every=max(1, every // read))
-    columns["actors"] = [
-        {"id": a.id, "category": a.category, "length": a.length, "width": a.width, "ego": a.ego}
-        for a in plan.actors
-    ]
+    names = tuple(ReplayActor.model_fields)
+    columns["actors"] = [{name: getattr(one, name) for name in names} for one in plan.actors]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
 
 
@@ -199,11 +202,6 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     if recorded is None:
         raise NotFoundError(what, run, [])
     return recorded.rows, plan, recorded.every
-
-
-def _sim_seconds(said: dict[str, Any]) -> float:
-    seconds = said.get("sim_seconds")
-    return float(seconds) if isinstance(seconds, int | float) else 0.0
 
 
 def _lists(columns: ActorCounts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
 from odscen.lanegraph.shortest_paths import Router
@@ -36,7 +38,7 @@ from odscen.web.messages import (
     ScenarioState,
 )
 from odscen.web.services import Services, Shared, region_of
-from odscen.workflow import SUFFIX, load_map
+from odscen.web.wire.media_types import Responses
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
@@ -44,6 +46,16 @@ if TYPE_CHECKING:
     from odscen.web.drafts import Draft
 
 router = APIRouter(prefix="/api/scenarios")
+
+_FILE: Responses = {
+    200: {
+        "content": {
+            "application/json": {"schema": {"$ref": "#/components/schemas/Scenario-File"}},
+            "application/xml": {"schema": {"type": "string"}},
+        }
+    }
+}
+"""A scenario's file leaves out what has its default, which the answers of other routes do not."""
 
 
 @router.get("")
@@ -178,7 +190,7 @@ def roi(name: str, shared: Shared) -> RoiInfo:
     )
 
 
-@router.get("/{name}/download", response_class=Response)
+@router.get("/{name}/download", response_class=Response, responses=_FILE)
 def download(name: str, shared: Shared, form: Literal["json", "graphml"] = "json") -> Response:
     """Download the scenario as its document or in its graph form."""
     scenario = shared.drafts.get(name).scenario

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from odscen.app.maps import LoadedMap, map_of
 from odscen.scenario.placing.region import Region
 from odscen.web.active_runs import Runs
 from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
-from odscen.workflow import LoadedMap, load_map
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Services:
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""
-        return load_map(self.workspace.map_for(scenario.map.name, scenario.map.sha256))
+        return map_of(self.workspace, scenario)
 
     def close(self) -> None:
         """End everything that goes on."""

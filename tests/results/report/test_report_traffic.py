@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from odscen.drawing.map_drawing import Lines
-from odscen.results.measures.traffic import TrafficFigures, traffic_figures
+from odscen.results.by_place.traffic import TrafficFigures, traffic_figures
 from odscen.results.report.place_shapes import PlaceShapes
 from odscen.results.report.report_corridor import NONE_RECORDED, CorridorTraces, corridor_section
 from odscen.results.report.report_emissions import emission_section

@@ -7,12 +7,13 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.measures.corridors import busiest_corridor, corridor_along, way_between
-from odscen.results.measures.traffic import over_run
+from odscen.results.by_place.corridors import busiest_corridor, corridor_along, way_between
+from odscen.results.by_place.traffic import over_run
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_corridor import NONE_RECORDED
 from odscen.sumo.outputs.corridor_traces import corridor_traces
 from odscen.sumo.outputs.measured import read_figures
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.sumo.runner.test_on_maps import built, net_file, sampled
@@ -25,7 +26,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("corridor")
     scenario = sampled(NAME, fill=0.2)
     run_prepared(
-        prepare(scenario, built(NAME).sumo, net_file(NAME, folder), until=240.0), folder / "run"
+        prepare(
+            scenario, built(NAME).sumo, net_file(NAME, folder), settings=RunSettings(until=240.0)
+        ),
+        folder / "run",
     )
     return folder / "run"
 

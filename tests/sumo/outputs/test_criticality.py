@@ -9,10 +9,13 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.results.measures.conflicts import SEEN_TTC, conflict_figures
+from odscen.results.measures import safety
+from odscen.results.measures.conflicts import SEEN_TTC
+from odscen.results.measures.figure import RunData
+from odscen.results.measures.registry import figure_values
 from odscen.sumo.folder.recorded import read_conflicts, read_trajectories
 from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.sumocfg import RunSettings, sumo_config
+from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from tests.sumo.conftest import LENGTH, UNTIL
 
@@ -21,7 +24,7 @@ col = pl.col
 
 def watched(prepared: PreparedRun) -> PreparedRun:
     """The same run with an SSM device in every vehicle."""
-    settings = RunSettings(
+    settings = SumocfgSettings(
         until=UNTIL,
         step_length=prepared.plan.step_length,
         seed=prepared.plan.seed,
@@ -47,9 +50,8 @@ def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     figures = result.summary["figures"]
     conflicts = read_conflicts(result.folder)
     assert conflicts is not None
-    assert {name: figures[name] for name in conflict_figures(conflicts)} == pytest.approx(
-        conflict_figures(conflicts)
-    )
+    found = figure_values(RunData(conflicts=conflicts), safety.FIGURES)
+    assert {name: figures[name] for name in found} == pytest.approx(found)
     return result.folder
 
 

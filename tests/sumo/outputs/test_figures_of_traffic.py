@@ -17,10 +17,11 @@ import pytest
 import sumo
 from lxml import etree
 
-from odscen.results.measures.queues import queue_lengths
-from odscen.results.measures.run_traffic import traffic_of_run
-from odscen.results.measures.traffic import TrafficFigures, over_run, traffic_figures
-from odscen.results.measures.traffic_sums import intervals
+from odscen.results.by_place.queues import queue_lengths
+from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
+from odscen.results.by_place.traffic_sums import intervals
+from odscen.results.measures.figure import RunData
+from odscen.results.measures.registry import figure_values
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.trip_table import trip_table
 from odscen.sumo.realize.measure_files import measures_xml
@@ -206,7 +207,7 @@ def test_queues_are_those_who_stand_at_one_time(run):
 
 
 def test_figures_of_the_run_are_ratios_of_its_trips(run):
-    found = traffic_of_run(run.figures, run.trips)
+    found = figure_values(RunData(traffic=run.figures, trips=run.trips))
     trips = [
         (float(trip.get("duration")), float(trip.get("timeLoss")))
         for trip in etree.parse(run.folder / "trips.xml").getroot()

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.scenario.document.scenario_document import Actor
 from odscen.sumo.realize.driving import KINDS, STYLES, Driver, draw_factor, driver, number
+from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import (
     BRAKING,
     NO_EFFECT,
@@ -23,10 +25,11 @@ from tests.sumo.conftest import BIN
 
 
 def made(category: Category = Category.CAR, **changes: Any) -> Driver:
-    values: dict[str, Any] = {
-        "style": "normal", "factor": 1.0, "speed": None, "limit": 13.89, "weather": NO_EFFECT,
-    }  # fmt: skip
-    return driver(category, DEFAULT_BODY[category], **{**values, **changes})
+    fields = {name: changes.pop(name) for name in Actor.model_fields if name in changes}
+    design = Actor(id="one", category=category, spawn="1.0.-1.0", **fields)
+    user = RoadUser("one", category, 0, 1, depart=0.0, speed=design.speed, design=design)
+    values: dict[str, Any] = {"factor": 1.0, "limit": 13.89, "weather": NO_EFFECT}
+    return driver(user, DEFAULT_BODY[category], **{**values, **changes})
 
 
 def test_a_normal_car_in_good_weather_is_sumos_own() -> None:

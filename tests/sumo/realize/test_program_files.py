@@ -28,6 +28,7 @@ from odscen.scenario.document.scenario_document import Signals
 from odscen.scenario.edits import scenario_edits
 from odscen.sumo.realize.program_files import scenario_lights, signals_xml
 from odscen.sumo.realize.realization import realize
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared, write_sumo_files
@@ -196,7 +197,9 @@ def timed(**fields: Any) -> Scenario:
 
 def states(folder: Path, one: Scenario, *, until: float) -> list[tuple[str, str]]:
     """Program and state of the light in each second, from plain SUMO on the exported files."""
-    prepared = prepare(one, crossing().sumo, net_file(folder), until=until, step_length=1.0)
+    prepared = prepare(
+        one, crossing().sumo, net_file(folder), settings=RunSettings(until=until, step_length=1.0)
+    )
     write_sumo_files(prepared.sumo_files, prepared.net, folder, link=False)
     (light,) = crossing().table.lights
     watch = f'<timedEvent type="SaveTLSStates" source="{light.id}" dest="states.xml"/>'

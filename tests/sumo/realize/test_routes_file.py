@@ -23,6 +23,7 @@ from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import peak_share, town_day, ways_in
 from odscen.sumo.realize.passages import planned_passages
 from odscen.sumo.realize.realization import everybody, realize
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_tools import run_tool
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.runner.prepare import prepare
@@ -45,7 +46,7 @@ def arms(name: str) -> list[str]:
 
 
 def planned(scenario: Scenario, name: str = CROSSING, **options: Any) -> tuple[PlannedActor, ...]:
-    return realize(scenario, built(name).sumo, **options).plan.actors
+    return realize(scenario, built(name).sumo, settings=RunSettings(**options)).plan.actors
 
 
 def segment(name: str, node: str | None) -> str:

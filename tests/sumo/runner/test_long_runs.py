@@ -17,6 +17,7 @@ from odscen.sumo.folder.layout import RECORDED
 from odscen.sumo.folder.parts import check_room
 from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
 from odscen.sumo.realize import forecast
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner import worker_process
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
@@ -55,7 +56,8 @@ def killed(
 def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     long: PreparedRun, tmp_path: Path
 ) -> None:
-    result = run_prepared(long, tmp_path / "run", expectations=[parse_expectation("inserted==90")])
+    settings = RunSettings(expectations=(parse_expectation("inserted==90"),))
+    result = run_prepared(replace(long, settings=settings), tmp_path / "run")
     assert result.exit_code == 0
     assert result.summary["actors"]["arrived"] + result.summary["actors"]["running"] == 90
     assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]

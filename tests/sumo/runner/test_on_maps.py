@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.reports import write_report
 from odscen.base.categories import Category
 from odscen.convert.building.network import build_network
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -24,9 +25,10 @@ from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 from odscen.scenario.edits.scenario_edits import add_actor
 from odscen.scenario.sampling.sampler import sample_scenario
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap, pos_per_metre
 from odscen.sumo.realize.usable import usable_places
-from odscen.sumo.runner.prepare import prepare, write_report
+from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.workspace.asset_catalogue import shipped_assets
 from tests.sumo.conftest import BIN
@@ -70,7 +72,11 @@ def sampled(name: str, *, seed: int = 1, fill: float = 0.4) -> Scenario:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_sampled_actors_start_in_their_places_and_arrive(name: str, tmp_path: Path) -> None:
     prepared = prepare(
-        sampled(name), built(name).sumo, net_file(name, tmp_path), shipped_assets(), until=1800
+        sampled(name),
+        built(name).sumo,
+        net_file(name, tmp_path),
+        shipped_assets(),
+        settings=RunSettings(until=1800),
     )
     result = run_prepared(prepared, tmp_path / "run")
     assert result.status == "completed", result.summary["error"]

@@ -35,7 +35,7 @@ class SpeedShares(NamedTuple):
     share: FloatArray
 
 
-class RunCurves(NamedTuple):
+class CurveTable(NamedTuple):
     """What a run looked like over time; speeds are of vehicles only."""
 
     counts: ActorCounts
@@ -64,7 +64,7 @@ def speed_shares(speeds: FloatArray) -> SpeedShares:
 
 def run_curves(
     plan: Plan, actors: Sequence[ActorOutcome], trajectories: pl.DataFrame, *, end: float
-) -> RunCurves:
+) -> CurveTable:
     """Curves of one run that lasted ``end`` simulated seconds.
 
     Parameters
@@ -75,7 +75,7 @@ def run_curves(
     end = max(end, 1.0)
     traces = tidy(trajectories, {actor.id: actor.category for actor in plan.actors})
     vehicles = traces.filter(traces["category"] != "pedestrian")
-    return RunCurves(
+    return CurveTable(
         presence(actors, end=end),
         speed_over_time(vehicles, end=end, width=bin_width(end)),
         speed_shares(vehicles["speed"].to_numpy()),

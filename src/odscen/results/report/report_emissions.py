@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, number
-from odscen.results.measures.traffic import over_run
+from odscen.results.by_place.traffic import over_run
 from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.plots import Series
 from odscen.results.report.report_figures import Card, card_grid
@@ -14,7 +14,7 @@ from odscen.results.report.report_flow import column, network_chart
 if TYPE_CHECKING:
     import polars as pl
 
-    from odscen.results.measures.traffic import TrafficFigures
+    from odscen.results.by_place.traffic import TrafficFigures
 
 SHOWN = 12
 

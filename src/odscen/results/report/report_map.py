@@ -12,7 +12,7 @@ from odscen.drawing.map_sheet import length_text, round_length
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.records.run_records import EventKind
 from odscen.results.records.traces import speed_by_place, thinned_paths
-from odscen.results.report.report_trouble import trouble_rings
+from odscen.results.report.report_trouble import incident_rings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Bounds, FloatArray
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.results.measures.gridlock import Trouble
+    from odscen.results.measures.gridlock import Incident
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.records.traces import Paths, SpeedCells
@@ -56,7 +56,7 @@ def run_map(
     events: Sequence[Event],
     drawing: MapDrawing | None,
     *,
-    trouble: Sequence[Trouble] = (),
+    incidents: Sequence[Incident] = (),
 ) -> Markup | None:
     """Build the figure: controls, drawing, legend; ``None`` if nothing has a place.
 
@@ -70,8 +70,8 @@ def run_map(
         What became of them and what happened.
     drawing
         The map to draw below the ways, if there is one.
-    trouble
-        Places where traffic got stuck, in the order of the report's table.
+    incidents
+        In the order of the report's table.
     """
     paths = thinned_paths(traces)
     spawns = np.array([(actor.x, actor.y) for actor in plan.actors]).reshape(-1, 2)
@@ -92,7 +92,7 @@ def run_map(
     layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
-    layers += [rings] if (rings := trouble_rings(trouble, extent / 400.0)) else []
+    layers += [rings] if (rings := incident_rings(incidents, extent / 400.0)) else []
     svg = element(
         "svg",
         element("title", "Map of the run: the ways of all actors"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, join, number, path_data
-from odscen.results.measures.traffic import over_run
+from odscen.results.by_place.traffic import over_run
 from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.plots import legend
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.measures.traffic import TrafficFigures
+    from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.report.place_shapes import PlaceShapes
 
 LEVELS = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
 from odscen.base.categories import Category
 
@@ -36,10 +36,21 @@ Mix = dict[Category, Annotated[float, Field(gt=0)]]
 """Share of each category; shares are relative, they need not sum to one."""
 
 
+_ANY_NAME = WithJsonSchema(
+    {"type": "object", "additionalProperties": {"type": "number"}}, mode="serialization"
+)
+"""Whoever reads a document need not know which names can be written."""
+
+
 class Part(BaseModel):
     """Base of all parts of the document: frozen, unknown fields refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        json_schema_serialization_defaults_required=True,
+    )
 
 
 class MapReference(Part):
@@ -54,7 +65,7 @@ class Environment(Part):
     """Weather and time of day: a preset of the asset catalogue and single values that differ."""
 
     preset: Label = "ClearNoon"
-    parameters: dict[Label, float] = Field(default_factory=dict)
+    parameters: Annotated[dict[Label, float], _ANY_NAME] = Field(default_factory=dict)
     affects_driving: bool = True
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.demand_checks import demand_problems
@@ -19,6 +19,7 @@ from odscen.scenario.document.scenario_document import (
     Zone,
 )
 from odscen.scenario.document.validation import validated
+from odscen.scenario.edits.edit_registry import edit
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
@@ -29,11 +30,13 @@ if TYPE_CHECKING:
 _Part = TypeVar("_Part", bound=Zone | Profile | Matrix | Counts | Background)
 
 
+@edit("Change the time of day at the start")
 def set_clock(scenario: Scenario, *, clock: float) -> Scenario:
     """Set the time of day at the start of the run, seconds after midnight."""
     return _changed(scenario, clock=clock)
 
 
+@edit("Zone {zone}")
 def set_zone(
     scenario: Scenario, graph: MapGraph, *, zone: Identifier, segments: Sequence[str]
 ) -> Scenario:
@@ -42,6 +45,7 @@ def set_zone(
     return _checked(_changed(scenario, zones=_put(scenario.demand.zones, part)), graph)
 
 
+@edit("Day profile {profile}")
 def set_profile(
     scenario: Scenario, graph: MapGraph, *, profile: Identifier, shares: Sequence[float]
 ) -> Scenario:
@@ -50,8 +54,9 @@ def set_profile(
     return _checked(_changed(scenario, profiles=_put(scenario.demand.profiles, part)), graph)
 
 
+@edit("Trips {matrix}")
 def set_matrix(
-    scenario: Scenario, graph: MapGraph, *, matrix: Identifier, **fields: Any
+    scenario: Scenario, graph: MapGraph, *, matrix: Identifier, **fields: Annotated[Any, Matrix]
 ) -> Scenario:
     """Add trips from where to where, or change those of that name.
 
@@ -71,8 +76,9 @@ def set_matrix(
     return _checked(_changed(scenario, matrices=_put(old, part)), graph)
 
 
+@edit("Counts {counts}")
 def set_counts(
-    scenario: Scenario, graph: MapGraph, *, counts: Identifier, **fields: Any
+    scenario: Scenario, graph: MapGraph, *, counts: Identifier, **fields: Annotated[Any, Counts]
 ) -> Scenario:
     """Add counts that traffic is to reproduce, or change those of that name.
 
@@ -95,8 +101,13 @@ def set_counts(
     return _checked(_changed(scenario, counts=_put(old, part)), graph)
 
 
+@edit("Background traffic {background}")
 def set_background(
-    scenario: Scenario, graph: MapGraph, *, background: Identifier, **fields: Any
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    background: Identifier,
+    **fields: Annotated[Any, Background],
 ) -> Scenario:
     """Add background traffic, or change that of this name.
 
@@ -115,6 +126,7 @@ def set_background(
     return _checked(_changed(scenario, background=_put(old, part)), graph)
 
 
+@edit("Remove {part}")
 def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario:
     """Remove a zone, profile, matrix, set of counts or background traffic by its name.
 

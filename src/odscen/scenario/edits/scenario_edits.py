@@ -10,7 +10,7 @@ that overlap, is left to :func:`odscen.scenario.checks.scenario_checks.check`.
 from __future__ import annotations
 
 from itertools import count
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.base.ids import SegmentId
@@ -30,6 +30,7 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
 )
 from odscen.scenario.document.validation import validated
+from odscen.scenario.edits.edit_registry import edit
 from odscen.scenario.placing.region import Region, on_foot
 from odscen.scenario.sampling.sampler import sample_scenario
 
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from odscen.base.categories import Category
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.checks.signal_timing import Light
-    from odscen.scenario.document.scenario_document import Control
+    from odscen.scenario.document.scenario_document import Control, Simulation
     from odscen.scenario.placing.usable_nodes import Usable
 
 _One = TypeVar("_One", bound=Actor | Flow)
@@ -76,22 +77,26 @@ def new_scenario(
     return scenario
 
 
+@edit("Rename to {name}")
 def rename(scenario: Scenario, *, name: str, description: str | None = None) -> Scenario:
     """Give the scenario another name and, if given, another description."""
     changes = {"name": name} if description is None else {"name": name, "description": description}
     return _with(scenario, **changes)
 
 
+@edit("Change the seed")
 def set_seed(scenario: Scenario, *, seed: int) -> Scenario:
     """Set the random seed of the open goals and of the run."""
     return _with(scenario, seed=seed)
 
 
-def set_simulation(scenario: Scenario, **fields: Any) -> Scenario:
+@edit("Change the run's settings")
+def set_simulation(scenario: Scenario, **fields: Annotated[Any, Simulation]) -> Scenario:
     """Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`."""
     return _with(scenario, simulation=_changed(scenario.simulation, fields))
 
 
+@edit("Change weather and time")
 def set_environment(
     scenario: Scenario,
     *,
@@ -111,13 +116,18 @@ def set_environment(
     return _with(scenario, environment=environment)
 
 
+@edit("Traffic lights {control}")
 def set_signal_control(scenario: Scenario, *, control: Control) -> Scenario:
     """Say how all traffic lights are run that have no control of their own."""
     return _with(scenario, signals=_changed(scenario.signals, {"control": control}))
 
 
+@edit("Timing of light {junction}")
 def set_timing(
-    scenario: Scenario, lights: Sequence[Light], junction: str, **fields: Any
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    **fields: Annotated[Any, JunctionTiming],
 ) -> Scenario:
     """Change how the traffic light of one junction is timed.
 
@@ -145,6 +155,7 @@ def set_timing(
     return _with(scenario, signals=signals)
 
 
+@edit("Timing of light {junction} as in the map")
 def clear_timing(scenario: Scenario, junction: str) -> Scenario:
     """Give the traffic light of one junction back to the map's program.
 
@@ -174,6 +185,7 @@ def removable_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, 
     return removable(graph.segments, scenario.roi)
 
 
+@edit("Add segment {segment}")
 def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     """Add a segment to the region of interest (R29).
 
@@ -194,6 +206,7 @@ def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     return _with(scenario, roi=(*scenario.roi, segment))
 
 
+@edit("Remove segment {segment}")
 def shrink_roi(
     scenario: Scenario, graph: MapGraph, segment: str, *, with_actors: bool = False
 ) -> Scenario:
@@ -232,14 +245,15 @@ def shrink_roi(
     )
 
 
+@edit("Add {category}")
 def add_actor(
     scenario: Scenario,
     graph: MapGraph,
     *,
-    category: Category | str,
+    category: Category,
     spawn: str,
     id: str | None = None,  # noqa: A002 - the document's word
-    **fields: Any,
+    **fields: Annotated[Any, Actor],
 ) -> Scenario:
     """Place an actor on a node.
 
@@ -264,6 +278,7 @@ def add_actor(
     return _only_ego(changed, actor.id) if actor.ego else changed
 
 
+@edit("Move {actor}")
 def move_actor(scenario: Scenario, graph: MapGraph, actor: str, *, spawn: str) -> Scenario:
     """Place an actor on another node; a goal that cannot be reached from there is opened."""
     index = _index(scenario.actors, actor)
@@ -277,6 +292,7 @@ def move_actor(scenario: Scenario, graph: MapGraph, actor: str, *, spawn: str) -
     return moved
 
 
+@edit("Goal of {actor}")
 def set_goal(scenario: Scenario, graph: MapGraph, actor: str, *, goal: str | None) -> Scenario:
     """Set the goal of an actor; ``None`` leaves it to the seed.
 
@@ -291,7 +307,8 @@ def set_goal(scenario: Scenario, graph: MapGraph, actor: str, *, goal: str | Non
     return changed
 
 
-def change_actor(scenario: Scenario, actor: str, **fields: Any) -> Scenario:
+@edit("Change {actor}")
+def change_actor(scenario: Scenario, actor: str, **fields: Annotated[Any, Actor]) -> Scenario:
     """Change fields of an actor that have no rule on the graph, for example ``speed`` or ``style``.
 
     A new category drops the model, unless one is given with it. For ``spawn``, ``goal`` and ``ego``
@@ -320,12 +337,14 @@ def change_actor(scenario: Scenario, actor: str, **fields: Any) -> Scenario:
     return changed
 
 
+@edit("Remove road users")
 def remove_actors(scenario: Scenario, actors: Iterable[str]) -> Scenario:
     """Remove actors by id."""
     gone = {scenario.actors[_index(scenario.actors, actor)].id for actor in actors}
     return _with(scenario, actors=tuple(one for one in scenario.actors if one.id not in gone))
 
 
+@edit("Copy road users")
 def copy_actors(scenario: Scenario, graph: MapGraph, copies: Mapping[str, str]) -> Scenario:
     """Copy actors to other nodes; ``copies`` maps the node of each copy to the actor's id.
 
@@ -340,6 +359,7 @@ def copy_actors(scenario: Scenario, graph: MapGraph, copies: Mapping[str, str]) 
     return scenario
 
 
+@edit("Fill the region at random")
 def fill_roi(
     scenario: Scenario, graph: MapGraph, usable: Usable, *, share: float, seed: int | None = None
 ) -> Scenario:
@@ -374,6 +394,7 @@ def fill_roi(
     return _with(scenario, actors=free)
 
 
+@edit("Choose the vehicle under test")
 def set_ego(scenario: Scenario, actor: str | None) -> Scenario:
     """Make one vehicle the ego, and no other; ``None`` leaves none (R42).
 
@@ -393,6 +414,7 @@ def set_ego(scenario: Scenario, actor: str | None) -> Scenario:
     return _only_ego(scenario, actor)
 
 
+@edit("Add a stream")
 def add_flow(
     scenario: Scenario,
     graph: MapGraph,
@@ -400,7 +422,7 @@ def add_flow(
     spawn: str,
     per_hour: float,
     id: str | None = None,  # noqa: A002 - the document's word
-    **fields: Any,
+    **fields: Annotated[Any, Flow],
 ) -> Scenario:
     """Put a flow on a node (R44); ``fields`` are further fields of ``Flow``."""
     fields |= {"spawn": spawn, "per_hour": per_hour, "id": id or _free_id(scenario, "flow")}
@@ -410,7 +432,10 @@ def add_flow(
     return changed
 
 
-def change_flow(scenario: Scenario, graph: MapGraph, flow: str, **fields: Any) -> Scenario:
+@edit("Change {flow}")
+def change_flow(
+    scenario: Scenario, graph: MapGraph, flow: str, **fields: Annotated[Any, Flow]
+) -> Scenario:
     """Change any fields of a flow."""
     index = _index(scenario.flows, flow)
     new = _changed(scenario.flows[index], fields)
@@ -419,6 +444,7 @@ def change_flow(scenario: Scenario, graph: MapGraph, flow: str, **fields: Any) -
     return changed
 
 
+@edit("Remove {flow}")
 def remove_flow(scenario: Scenario, flow: str) -> Scenario:
     """Remove a flow."""
     index = _index(scenario.flows, flow)

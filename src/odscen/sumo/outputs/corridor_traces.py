@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.results.measures.corridors import junctions_of
+from odscen.results.by_place.corridors import junctions_of
 from odscen.results.report.report_corridor import NONE_RECORDED, CorridorTraces
 from odscen.sumo.folder.recorded import trajectory_files
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray, Int32Array
-    from odscen.results.measures.corridors import Corridor
+    from odscen.results.by_place.corridors import Corridor
     from odscen.sumo.realize.sumo_map import SumoMap
 
 WINDOWS = (3600.0, 1800.0, 900.0, 600.0, 300.0)

@@ -53,12 +53,8 @@ def road_users(
             spawn=_node(graph, actor.spawn),
             goal=goals[actor.id],
             depart=actor.depart,
-            model=actor.model,
             speed=actor.speed,
-            lateral_offset=actor.lateral_offset,
-            style=actor.style,
-            ego=actor.ego,
-            ignores_red=actor.ignores_red,
+            design=actor,
         )
         for actor in scenario.actors
     ]

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
+from odscen.scenario.document.scenario_document import Actor
 
-if TYPE_CHECKING:
-    from odscen.scenario.document.scenario_document import DrivingStyle
+_DEFAULT_DESIGN = Actor(id="any", category=Category.CAR, spawn="any")
+"""Its optional fields have the document's defaults; the others mean nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class RoadUser:
     """One vehicle or person with everything decided; ``spawn`` and ``goal`` are node indices.
 
-    They count on the pedestrian graph for pedestrians and on the lane graph for everybody else.
+    They count on the pedestrian graph for pedestrians and on the lane graph for vehicles.
     ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
-    of the demand: many share a goal, so their ways are found from there.
+    of the demand: many share a goal, so their paths are found from there.
+
+    ``design`` is the actor as the document has it, for what is not decided here but acted on as it
+    is: model, style and the like. Members of flows and demand have the defaults.
     """
 
     id: str
@@ -25,14 +28,10 @@ class RoadUser:
     spawn: int
     goal: int
     depart: float
-    model: str | None = None
     speed: float | None = None
-    lateral_offset: float = 0.0
-    style: DrivingStyle = "normal"
     flow: str | None = None
-    ego: bool = False
-    ignores_red: bool = False
     trip: bool = False
+    design: Actor = _DEFAULT_DESIGN
 
     @property
     def person(self) -> bool:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import Int32Array
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.sumo.realize.road_net import RoadNet, RoadNetLane
-    from odscen.sumo.realize.route_planner import NodePositions
+    from odscen.sumo.realize.route_planner import NodePositions, RouteRepair
 
 
 ALONG = 0.5
@@ -33,7 +33,7 @@ class Walk:
     depart_pos: float
     depart_pos_lat: float
     arrival_pos: float
-    repairs: tuple[str, ...] = ()
+    repairs: tuple[RouteRepair, ...] = ()
 
 
 class WalkPlanner:

@@ -5,30 +5,35 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
-from odscen.results.measures.expectations import COUNTS, evaluate
-from odscen.results.measures.gridlock import find_trouble, trouble_summary
-from odscen.results.measures.summary import actor_counts, actors_from_json, key_figures
-from odscen.results.measures.traffic import TABLES
+from odscen.results.by_place.traffic import TABLES
+from odscen.results.measures.expectations import evaluate
+from odscen.results.measures.figure import SummaryPart
+from odscen.results.measures.gridlock import find_incidents, incident_summary
+from odscen.results.measures.registry import COUNTS, figure_values
+from odscen.results.measures.summary import actors_from_json
+from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import events_from_json, rounded
 from odscen.sumo.folder import layout
-from odscen.sumo.outputs.measured import write_figures
+from odscen.sumo.outputs.measured import read_run_data, write_figures
+from odscen.sumo.realize.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from odscen.results.measures.expectations import Expectation
-    from odscen.results.measures.lane_places import LanePlaces
+    from odscen.results.by_place.lane_places import LanePlaces
     from odscen.results.records.run_records import Plan
     from odscen.sumo.realize.forecast import Forecast
+    from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.worker_process import Ended
 
-RunStatus = Literal["completed", "failed"]
+Finish = Callable[["Path", Mapping[str, Any]], None]
+"""Called with the folder and the summary of a run that has completed: the place for a report."""
 
 FORMAT = "odscen-run"
 VERSION = 1
@@ -47,6 +52,8 @@ class PreparedRun:
         :func:`odscen.sumo.realize.realization.realize`.
     net
         SUMO network file of the map.
+    settings
+        How it is run; ``plan`` and ``sumo_files`` were made by the same.
     scenario_json
         The scenario document, kept in the run folder.
     problems, notes
@@ -62,6 +69,7 @@ class PreparedRun:
     plan: Plan
     sumo_files: Mapping[str, str]
     net: Path
+    settings: RunSettings = AS_DESIGNED
     scenario_json: str | None = None
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -80,8 +88,7 @@ class RunResult:
     @property
     def status(self) -> RunStatus:
         """``completed`` if the simulation ended by itself, whatever became of the actors."""
-        status: RunStatus = self.summary["status"]
-        return status
+        return RunStatus(self.summary["status"])
 
     @property
     def expectations_met(self) -> bool:
@@ -91,7 +98,7 @@ class RunResult:
     @property
     def exit_code(self) -> int:
         """0 completed, 1 completed with failed expectations, 3 failed."""
-        if self.status == "failed":
+        if self.status is RunStatus.FAILED:
             return 3
         return 0 if self.expectations_met else 1
 
@@ -132,9 +139,7 @@ def write_sumo_files(files: Mapping[str, str], net: Path, folder: Path, *, link:
     shutil.copyfile(net, target)
 
 
-def make_summary(
-    prepared: PreparedRun, folder: Path, ended: Ended, expectations: Sequence[Expectation]
-) -> dict[str, Any]:
+def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str, Any]:
     """What ``summary.json`` says of a run that has ended, well or badly."""
     plan, done = prepared.plan, ended.done
     # A long run may have been in the hands of several processes.
@@ -142,7 +147,7 @@ def make_summary(
     summary: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
-        "status": "completed" if done else "failed",
+        "status": RunStatus.COMPLETED if done else RunStatus.FAILED,
         "error": ended.error,
         "stopped": bool(done and done.stopped),
         "scenario": plan.scenario,
@@ -163,18 +168,18 @@ def make_summary(
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
         meso = bool(prepared.about.get("meso"))
-        traffic = write_figures(folder, end=done.sim_seconds, meso=meso)
-        figures = key_figures(outcomes) | rounded(traffic)
-        summary["actors"] = actor_counts(outcomes)
-        summary["insertion_error_max"] = figures["insertion_error_max"]
-        summary["figures"] = figures
+        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso)
+        write_figures(folder, data)
+        summary["actors"] = figure_values(data, part=SummaryPart.ACTORS)
+        summary["figures"] = rounded(figure_values(data))
+        summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
         events = events_from_json(text)
-        trouble = find_trouble(plan, outcomes, events, end=done.sim_seconds)
-        summary["gridlock"] = trouble_summary(trouble)
+        incidents = find_incidents(plan, outcomes, events, end=done.sim_seconds)
+        summary["gridlock"] = incident_summary(incidents)
     summary["expectations"] = [
         {"expectation": v.expectation, "value": v.value, "passed": v.passed}
-        for v in evaluate(expectations, summary)
+        for v in evaluate(prepared.settings.expectations, summary)
     ]
     summary["problems"] = list(prepared.problems)
     summary["notes"] = list(prepared.notes)

@@ -27,8 +27,8 @@ delay and waiting of a movement
     last edge by lane, that of the edges before it all together.
 
 A junction or movement that nobody got into, though somebody stood all the time, has no delay per
-vehicle and level F. Places are defined in :mod:`odscen.results.measures.lane_places`, levels of
-service in :mod:`odscen.results.measures.level_of_service`.
+vehicle and level F. Places are defined in :mod:`odscen.results.by_place.lane_places`, levels of
+service in :mod:`odscen.results.by_place.level_of_service`.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
-from odscen.results.measures.level_of_service import junction_level, street_level
-from odscen.results.measures.traffic_sums import (
+from odscen.results.by_place.level_of_service import junction_level, street_level
+from odscen.results.by_place.traffic_sums import (
     INTERVAL,
     SUMS,
     intervals,
@@ -51,7 +51,7 @@ from odscen.results.measures.traffic_sums import (
 if TYPE_CHECKING:
     import polars as pl
 
-    from odscen.results.measures.lane_places import LanePlaces
+    from odscen.results.by_place.lane_places import LanePlaces
 
 TableName = Literal["network", "segments", "junctions", "movements"]
 TABLES: tuple[TableName, ...] = get_args(TableName)
@@ -111,7 +111,7 @@ def traffic_figures(
     end
         When the run ended, s.
     queues
-        From :func:`odscen.results.measures.queues.queue_lengths`; if there are trajectories.
+        From :func:`odscen.results.by_place.queues.queue_lengths`; if there are trajectories.
     """
     clock = intervals(lanes, end)
     lanes = summable(lanes)

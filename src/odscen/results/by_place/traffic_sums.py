@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.results.measures.lane_places import LanePlaces
+    from odscen.results.by_place.lane_places import LanePlaces
 
 EMISSIONS = ("co2", "co", "hc", "nox", "pmx", "fuel")
 """Columns of emissions and fuel, grams."""

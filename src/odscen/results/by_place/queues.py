@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.measures.traffic_sums import INTERVAL
+from odscen.results.by_place.traffic_sums import INTERVAL
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from odscen.results.measures.lane_places import LanePlaces
+    from odscen.results.by_place.lane_places import LanePlaces
 
 STANDS = 0.1
 """m/s; slower counts as standing, as in SUMO's ``waitingTime``."""
@@ -32,7 +32,7 @@ def queue_lengths(
         As recorded, see docs/runs.md.
     clock
         ``begin`` and ``end`` of each interval, from
-        :func:`odscen.results.measures.traffic_sums.intervals`.
+        :func:`odscen.results.by_place.traffic_sums.intervals`.
 
     Returns
     -------

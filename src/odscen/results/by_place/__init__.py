@@ -1,0 +1,1 @@
+"""What happened where: sums over lanes by segment, junction and movement, and corridors."""

@@ -1,0 +1,79 @@
+"""The texts of the live view, told apart by ``type``; see ``docs/server.md``.
+
+They go over a WebSocket, of which OpenAPI knows nothing: :data:`LiveMessage` is put among the
+components of the schema by :mod:`odscen.web.application`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from odscen.base.categories import Category
+from odscen.web.messages import Answer
+from odscen.web.run_messages import IncidentInfo, RunState
+
+
+class LiveActor(Answer):
+    """Somebody who will ever be in a frame, and the row by which frames name them; metres."""
+
+    index: int
+    id: str
+    category: Category
+    model: str | None
+    length: float
+    width: float
+    ego: bool
+    flow: str | None
+    depart: float
+
+
+class LiveHello(Answer):
+    """What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
+
+    Made by :mod:`odscen.web.live_view` without this class, for it may be large.
+    """
+
+    type: Literal["hello"] = "hello"
+    scenario: str
+    until: float
+    step_length: float
+    origin: tuple[float, float]
+    actors: list[LiveActor]
+
+
+class LiveState(Answer):
+    """What the run does now, and how fast it is to go; ``None`` is as fast as it can."""
+
+    type: Literal["state"] = "state"
+    state: RunState
+    speed: float | None
+
+
+class LiveLights(Answer):
+    """Traffic lights that have changed, by id: a letter per link as SUMO writes it."""
+
+    type: Literal["lights"] = "lights"
+    lights: dict[str, str]
+
+
+class LiveIncidents(Answer):
+    """What has happened since the last of these."""
+
+    type: Literal["events"] = "events"
+    events: list[IncidentInfo]
+
+
+class LiveEnd(Answer):
+    """The run has ended; nothing follows."""
+
+    type: Literal["end"] = "end"
+    state: RunState
+    error: str | None
+
+
+LiveMessage = Annotated[
+    LiveHello | LiveState | LiveLights | LiveIncidents | LiveEnd, Field(discriminator="type")
+]
+"""Any text that the server sends."""

@@ -1,0 +1,240 @@
+"""What goes over the wire about maps; see :mod:`odscen.web.messages`.
+
+The parts of ``map.json`` are sent as they are, see :mod:`odscen.workspace.map_build`. Columns are
+made by :mod:`odscen.web.packed` and :mod:`odscen.drawing.map_drawing`; here is only their
+shape: they are sent unchecked.
+"""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from odscen.base.arrays import Bounds
+from odscen.convert.model.conversion_report import ElementOutcome
+from odscen.lanegraph.map_statistics import MapStatistics
+from odscen.opendrive.objects import SignalKind
+from odscen.web.messages import Answer
+
+Point = tuple[float, float]
+"""x and y, metres."""
+
+
+class MapHeader(Answer):
+    """The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed."""
+
+    version: str
+    rule: str
+
+
+class GraphCounts(Answer):
+    """Sizes of a map's graphs; ``spacing`` of the nodes in metres."""
+
+    spacing: float
+    nodes: int
+    successor_edges: int
+    left_edges: int
+    right_edges: int
+    segments: int
+    pedestrian_nodes: int
+    pedestrian_edges: int
+
+
+class NetCounts(Answer):
+    """The SUMO network's file, and what is in it."""
+
+    net_file: str
+    edges: int
+    lanes: int
+    junctions: int
+    tl_logics: int
+    crossings: int
+    walking_areas: int
+
+
+class MapInfo(Answer):
+    """A map of the catalogue; ``report_counts`` says how many elements had which fate."""
+
+    name: str
+    sha256: str
+    source: str
+    opendrive: MapHeader
+    statistics: MapStatistics
+    graph: GraphCounts
+    sumo: NetCounts
+    report_counts: dict[ElementOutcome, int]
+    preview: str
+
+
+class CrosswalkInfo(Answer):
+    """A crosswalk: its outline, and the line along which people walk; metres."""
+
+    id: str
+    road: str
+    polygon: list[Point]
+    begin: Point = Field(alias="from")
+    end: Point = Field(alias="to")
+    width: float
+
+
+class StopLineInfo(Answer):
+    """A stop line from end to end."""
+
+    id: str
+    road: str
+    ends: list[Point]
+
+
+class SignalInfo(Answer):
+    """A light or sign; metres, ``value`` of a speed limit in m/s.
+
+    It holds for lanes from the first to the second of each pair; for all if there is none.
+    """
+
+    kind: SignalKind
+    id: str
+    road: str
+    s: float
+    t: float
+    x: float
+    y: float
+    z: float
+    orientation: str
+    lanes: list[tuple[int, int]]
+    value: float | None
+
+
+class SemanticsInfo(Answer):
+    """Where the crosswalks, stop lines, lights and signs are."""
+
+    crosswalks: list[CrosswalkInfo]
+    stop_lines: list[StopLineInfo]
+    signals: list[SignalInfo]
+
+
+class LightInfo(Answer):
+    """A traffic light: its SUMO id, by which live states are told, and what scenarios call it.
+
+    ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
+    of its state, the OpenDRIVE signals that show it.
+    """
+
+    id: str
+    names: list[str]
+    green: list[float]
+    signals: list[list[str]]
+
+
+class MapDetails(MapInfo):
+    """The same with what the map means, and its traffic lights."""
+
+    semantics: SemanticsInfo
+    lights: list[LightInfo]
+
+
+class ConversionEntry(Answer):
+    """What became of one element, and why."""
+
+    fate: ElementOutcome
+    element: str
+    reason: str
+
+
+class ConversionInfo(Answer):
+    """What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``."""
+
+    counts: dict[ElementOutcome, int]
+    figures: dict[str, float]
+    entries: list[ConversionEntry]
+
+
+class NodeColumns(Answer):
+    """Nodes of a graph, a row each: the lane that it is on, its place, and its segment.
+
+    ``first_node`` is the first row of each lane, whose names are ``lane_keys``.
+    """
+
+    lane_keys: list[str]
+    first_node: list[int]
+    lane: list[int]
+    x: list[float]
+    y: list[float]
+    hdg: list[float]
+    width: list[float]
+    segment: list[int]
+
+
+class EdgeColumns(Answer):
+    """Edges between nodes; ``relation`` 0 is successor, 1 left, 2 right."""
+
+    source: list[int]
+    target: list[int]
+    relation: list[int]
+
+
+class WalkColumns(NodeColumns):
+    """The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
+
+    ``walkable`` is 1 where the simulator can place somebody exactly.
+    """
+
+    walkable: list[int]
+    source: list[int]
+    target: list[int]
+    kind: list[int]
+
+
+class SegmentInfo(Answer):
+    """A segment and its neighbours, which are rows."""
+
+    id: str
+    kind: str
+    neighbours: list[int]
+
+
+class GraphColumns(NodeColumns):
+    """The lane graph, the segments and the pedestrian graph.
+
+    Per lane its type, and the junction that it lies in. Per node ``speed_limit`` in m/s, if there
+    is one, ``left_lane`` and ``right_lane`` (-1 if there is none), and whether it is ``spawnable``:
+    1 where the simulator can place somebody exactly.
+    """
+
+    spacing: float
+    lane_types: list[str]
+    lane_junctions: list[str | None]
+    s: list[float]
+    speed_limit: list[float | None]
+    left_lane: list[int]
+    right_lane: list[int]
+    spawnable: list[int]
+    edges: EdgeColumns
+    segments: list[SegmentInfo]
+    walks: WalkColumns
+
+
+class PackedLines(Answer):
+    """Lines or rings: how many points each has, and centimetres from each point to the next."""
+
+    sizes: list[int]
+    steps: list[int]
+
+
+class DrawingColumns(Answer):
+    """What is drawn of a map, see ``docs/drawings.md``.
+
+    Areas have a level, a kind and rings; marks a level, a colour, a width, painted and gap of
+    dashes if they are dashed, and lines; symbols a kind, x, y, heading and a text.
+    """
+
+    format: str
+    version: int
+    name: str
+    bounds: Bounds
+    areas: list[tuple[int, str, PackedLines]]
+    marks: list[tuple[int, str, float, tuple[float, float] | None, PackedLines]]
+    symbols: list[tuple[str, float, float, float, str]]
+    crosswalks: PackedLines
+    bars: PackedLines
+    stop_lines: PackedLines
+    parking_spaces: PackedLines
+    buildings: PackedLines

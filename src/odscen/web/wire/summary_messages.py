@@ -1,0 +1,98 @@
+"""What a run says of itself at its end: ``summary.json`` as it goes over the wire.
+
+Runs of earlier versions lack some fields, which then have their defaults.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pydantic import Field, create_model
+
+from odscen.results.measures.gridlock import Incident
+from odscen.results.measures.registry import COUNTS
+from odscen.results.records.outcomes import RunStatus
+from odscen.web.messages import Answer
+
+if TYPE_CHECKING:
+    SummaryCounts = Answer
+else:
+    SummaryCounts = create_model(
+        "SummaryCounts",
+        __base__=Answer,
+        __doc__="Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.",
+        planned=(int, ...),
+        **{name: (int | None, None) for name in COUNTS if name != "planned"},
+    )
+
+
+class GridlockInfo(Answer):
+    """Where traffic got stuck: how often, and the first of the places."""
+
+    jams: int
+    jams_at_the_end: int
+    moved_on: int
+    kept_out: int
+    places: list[Incident]
+
+
+class ExpectationInfo(Answer):
+    """An expectation, what came of it, and whether it was met."""
+
+    expectation: str
+    value: float | None
+    passed: bool
+
+
+class SliceInfo(Answer):
+    """A slice of a long run: its end, and what it took up to there; megabytes."""
+
+    time: float
+    running: int
+    steps: int
+    wall_seconds: float
+    memory_mb: float
+
+
+class SlicesInfo(Answer):
+    """Slices that are complete, up to ``time`` in seconds."""
+
+    time: float
+    done: list[SliceInfo]
+
+
+class RunSummary(Answer):
+    """Key figures of a run that has ended; seconds, metres, m/s.
+
+    ``figures`` are those of ``docs/runs.md`` by name, null where there was nothing to measure.
+    ``driven_by`` says who moved the actors, if not SUMO. ``files`` are relative to the run's
+    folder.
+    """
+
+    format: str
+    version: int
+    status: RunStatus
+    error: str | None = None
+    stopped: bool = False
+    scenario: str
+    map: str | None = None
+    map_sha256: str | None = None
+    meso: bool = False
+    driven_by: str | None = None
+    seed: int
+    until: float
+    step_length: float
+    sim_seconds: float | None = None
+    steps: int | None = None
+    wall_seconds: float
+    real_time_factor: float | None = None
+    actors: SummaryCounts
+    insertion_error_max: float | None = None
+    figures: dict[str, float | None] = Field(default_factory=dict)
+    gridlock: GridlockInfo | None = None
+    expectations: list[ExpectationInfo] = Field(default_factory=list)
+    problems: list[str] = Field(default_factory=list)
+    notes: list[str] = Field(default_factory=list)
+    files: dict[str, str] = Field(default_factory=dict)
+    versions: dict[str, str] = Field(default_factory=dict)
+    slices: SlicesInfo | None = None
