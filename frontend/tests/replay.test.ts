@@ -2,6 +2,7 @@ import { expect, test } from "vitest";
 
 import type { Incident, ReplayColumns } from "../src/api/runs";
 import { compared } from "../src/run/figures";
+import { FIGURES } from "./figures";
 import { marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
@@ -81,9 +82,10 @@ test("incidents are told in words and marked from when they happen", () => {
 test("two runs are compared figure by figure", () => {
   const before = summary({ sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } }, { arrived: 5, collided: 0 });
   const now = summary({ sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } }, { arrived: 3, collided: 1 });
-  const found = Object.fromEntries(compared(now, before).map((one) => [one.label, one.difference]));
+  const found = Object.fromEntries(compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]));
   expect(found).toEqual({
-    "Simulated time": "same", "Planned": "same", "Arrived": "−2", "In collisions": "+1", "Mean speed": "+1.8 km/h", "Mean delay": "–",
+    "Simulated time": ["same", null], "Arrived": ["−2", false], "In collisions": ["+1", false],
+    "Mean speed": ["+1.8 km/h", true], "Mean delay": ["–", null],
   });
 });
 

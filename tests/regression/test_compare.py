@@ -82,7 +82,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     store = Workspace.open(a.parent / "workspace")
     result = compare_runs(read_runs(a, store), read_runs(b, store))
     page = comparison_page(result)
-    assert "junction j10001: waiting time" in page
+    assert "junction j10001: stopped delay" in page
     # Every figure that differs has a dot, and a bar as there are three runs a side.
     run_rows = [row for row in result.rows if row.key.kind == "run"]
     differing = sum(bool(row.difference.relative) for row in run_rows)
@@ -95,7 +95,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     waiting = next(
         row for row in result.rows if row.key == Key("junction", "j10001", "waiting_time")
     )
-    words = f"time {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
+    words = f"delay {waiting.difference.a:.2f} s in A, {waiting.difference.b:.2f} s in B"
     assert re.search(rf'class="d[01]"><title>j10001: [a-z ]*{re.escape(words)}', page)
     diagram = page[page.index('id="diagram"') :]
     assert all(f'class="dots side-{side}"' in diagram for side in "ab")

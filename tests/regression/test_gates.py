@@ -134,7 +134,7 @@ def test_reports_say_what_failed(store, suite):
     assert "the scenario's flows" in failure.text
     page = suite_page(result)
     assert "1 of 2 scenarios failed" in page
-    assert ">planned</th>" in page
+    assert ">road users planned</th>" in page
     data = to_dict(result)
     assert data["exit_code"] == 1
     change = next(c for c in data["cases"][0]["changes"] if c["figure"] == "planned")

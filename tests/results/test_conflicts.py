@@ -3,9 +3,6 @@ import pytest
 from lxml import html
 
 from odscen.results.conflicts import (
-    SEEN_PET,
-    SEEN_TTC,
-    conflict_figures,
     conflict_table,
     conflicts_of_slices,
     walking_conflicts,
@@ -74,26 +71,6 @@ def test_a_conflict_over_the_boundary_of_two_slices_is_one():
     ]
 
 
-def test_figures_of_nobody_in_conflict_are_the_limits_of_what_is_recorded():
-    figures = conflict_figures(conflict_table([]))
-    assert figures["min_ttc"] == SEEN_TTC
-    assert figures["pedestrian_min_pet"] == SEEN_PET
-    assert figures["serious_conflicts"] == 0
-
-
-def test_figures_tell_vehicles_from_people_on_foot():
-    walking = conflict("p", "a", 1.0, 2.0, pet=0.4) | {"kind": "walking"}
-    rows = [walking, conflict("a", "b", 5.0, 6.0, ttc=1.4, pet=2.0, drac=3.1)]
-    figures = conflict_figures(conflict_table(rows))
-    assert figures == {
-        "min_ttc": 1.4,
-        "max_drac": 3.1,
-        "min_pet": 2.0,
-        "pedestrian_min_pet": 0.4,
-        "serious_conflicts": 2.0,
-    }
-
-
 @pytest.mark.parametrize("passes", [7.0, 8.5])
 def test_encroachment_after_a_walker_is_the_time_until_the_car_is_where_they_were(passes: float):
     """The walker leaves the car's path, 2 m wide and 0.25 m for the walker, at 6.25 s."""
@@ -134,8 +111,8 @@ def test_conflicts_are_told_the_worst_first():
     told = [[cell.text_content() for cell in row] for row in page.findall(".//tbody/tr")]
     assert told == [
         ["5", "c", "d", "crossing", "0.75", "", "", "3, -4"],
-        ["1", "<b>", "a", "in a line", "2.50", "", "", "3, -4"],
+        ["1", "<b>", "a", "following", "2.50", "", "", "3, -4"],
     ]
     text = page.text_content()
-    assert "1serious conflictsof 2 seen" in text
-    assert "under 3 m/s\u00b2hardest braking needed" in text
+    assert "1serious conflictsof 2 recorded" in text
+    assert "under 3 m/s\u00b2highest deceleration to avoid a crash" in text

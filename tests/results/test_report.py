@@ -99,24 +99,24 @@ def test_the_report_is_well_formed_and_says_what_happened():
     text = re.sub(r"\s+", " ", Reader(report(drawing=road())).text)
     assert "Crossing" in text
     assert "Completed, 2 of 2 expectations not met" in text
-    assert "3 actors planned" in text
+    assert "3 road users planned" in text
     assert (
-        "1 of 3 actors reached their goal; 1 was still on the way at the end; "
-        "1 never entered the road; 1 had to be teleported; 2 collided."
+        "1 of 3 road users arrived; 1 was still under way at the end; "
+        "1 was not inserted; 1 teleported; 2 collided."
     ) in text
-    assert "2 entered the road 66.7 % of the planned" in text
-    assert "1 reached their goal" in text
-    assert "2.0 cm largest start error" in text
+    assert "2 inserted 66.7 % of the planned" in text
+    assert "1 arrived 33.3 % of the planned" in text
+    assert "2 cm largest insertion error" in text
     assert "8 s a collided with b at x 30 m, y 5 m (junction)" in text
-    assert "9 s b was stuck too long and was lifted off the road" in text
-    assert "5 s p never entered the road" in text
+    assert "9 s b was gridlocked and teleported" in text
+    assert "5 s p was not inserted" in text
     assert "before bus-2: no way to its goal" in text
     assert text.count("How to read this:") == 9
 
 
 def test_the_mean_speed_counts_vehicles_only_and_in_kmh():
     text = re.sub(r"\s+", " ", Reader(report()).text)
-    assert "19.8 km/h mean speed of vehicles" in text
+    assert "19.8 km/h mean speed on the road" in text
 
 
 def test_ways_lie_in_the_frame_of_the_map():

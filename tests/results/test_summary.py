@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-import json
-
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,13 +14,11 @@ from odscen.results.records import (
     events_to_json,
 )
 from odscen.results.summary import (
-    Fates,
+    Outcomes,
     Trip,
-    actor_counts,
     actor_outcomes,
     actors_from_json,
     actors_to_json,
-    key_figures,
     outcome_row,
 )
 
@@ -54,7 +49,7 @@ EVENTS = (
 TRIPS = {"a": Trip(4.5, 1.5, 2), "b": Trip(3.0, 2.0, 1)}
 
 
-def test_each_actor_gets_its_own_fate() -> None:
+def test_each_actor_gets_its_own_outcome() -> None:
     actors = plan(planned("a"), planned("b", depart=1.0), planned("c"))
     a, b, c = actor_outcomes(actors, EVENTS, TRIPS)
     assert (a.status, a.travel_time, a.delay, a.mean_speed) == ("arrived", 16.0, 4.5, 6.25)
@@ -64,44 +59,6 @@ def test_each_actor_gets_its_own_fate() -> None:
     assert (b.status, b.depart_delay, b.arrived, b.travel_time) == ("running", 0.5, None, None)
     assert (b.teleports, b.collisions, b.emergency_stops) == (2, 1, 1)
     assert (c.status, c.inserted, c.insertion_error) == ("waiting", None, None)
-
-
-def test_counts_add_up_and_count_actors_not_events() -> None:
-    outcomes = actor_outcomes(plan(planned("a"), planned("b"), planned("c")), EVENTS)
-    counts = actor_counts(outcomes)
-    assert counts == {
-        "planned": 3, "inserted": 2, "arrived": 1, "running": 1, "waiting": 1, "teleported": 1,
-        "collided": 2, "emergency_stopped": 1,
-    }  # fmt: skip
-
-
-def test_figures_keep_vehicles_and_pedestrians_apart() -> None:
-    actors = [planned(f"v{i}") for i in range(5)] + [
-        planned("p", category="pedestrian", route_length=13.0, free_flow_time=10.0)
-    ]
-    arrivals = tuple(
-        Event(10.0 + i, EventKind.ARRIVED, actor.id, travel_time=10.0 + i)
-        for i, actor in enumerate(actors)
-    )
-    trips = {actor.id: Trip(i, 2.0 * i, i) for i, actor in enumerate(actors[:5])}
-    trips["p"] = Trip(0.5, 7.0, None)
-    figures = key_figures(actor_outcomes(plan(*actors), arrivals, trips))
-    assert figures["mean_travel_time"] == 12.0
-    assert figures["median_travel_time"] == 12.0
-    assert figures["p95_travel_time"] == pytest.approx(np.percentile([10, 11, 12, 13, 14], 95))
-    assert figures["mean_speed"] == pytest.approx(500 / 60, abs=1e-6)
-    assert (figures["mean_delay"], figures["mean_waiting_time"]) == (2.0, 4.0)
-    assert figures["mean_stops"] == 2.0
-    assert figures["pedestrian_mean_delay"] == 0.5
-    assert figures["pedestrian_mean_waiting_time"] == 7.0
-    assert figures["pedestrian_mean_travel_time"] == 15.0
-    assert figures["pedestrian_mean_speed"] == pytest.approx(13 / 15, abs=1e-6)
-
-
-def test_figures_of_nobody_are_none_and_still_json() -> None:
-    figures = key_figures(())
-    assert set(figures.values()) == {None}
-    json.dumps(figures, allow_nan=False)
 
 
 def test_plan_events_and_actors_come_back_from_their_files() -> None:
@@ -114,12 +71,12 @@ def test_plan_events_and_actors_come_back_from_their_files() -> None:
 
 def test_rows_written_down_early_are_those_of_the_outcomes() -> None:
     whole = plan(planned("a"), planned("b"), planned("never"))
-    fates = Fates(whole)
+    found = Outcomes(whole)
     for event in EVENTS:
-        fates.hear([event], TRIPS)
-        fates.settle()
+        found.hear([event], TRIPS)
+        found.settle()
     rows = [outcome_row(outcome) for outcome in actor_outcomes(whole, EVENTS, TRIPS)]
-    assert list(fates.rows()) == rows
+    assert list(found.rows()) == rows
 
 
 @given(

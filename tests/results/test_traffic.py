@@ -9,10 +9,11 @@ import pytest
 
 from odscen.results.lane_places import LanePlaces
 from odscen.results.level_of_service import junction_level, street_level
+from odscen.results.measures.figure import RunData
+from odscen.results.measures.registry import COLUMN_UNITS
 from odscen.results.queues import queue_lengths
-from odscen.results.run_traffic import TRAFFIC_FIGURES, reliability, traffic_of_run
 from odscen.results.traffic import TABLES, over_run, traffic_figures
-from odscen.results.traffic_files import COLUMN_UNITS, figures_json, write_tables
+from odscen.results.traffic_files import figures_json, write_tables
 from odscen.results.traffic_sums import intervals
 
 col = pl.col
@@ -173,7 +174,9 @@ def test_a_run_without_traffic_has_a_network_and_no_places():
     figures = traffic_figures(nobody, PLACES, end=60.0)
     assert figures.network.height == 1
     assert [getattr(figures, name).height for name in TABLES[1:]] == [0, 0, 0]
-    assert set(traffic_of_run(figures, None)) == set(TRAFFIC_FIGURES)
+    data = json.loads(figures_json(RunData(traffic=figures), figures))
+    assert data["run"]["vehicle_km"] == data["run"]["throughput"] == 0.0
+    assert data["run"]["co2_per_km"] is data["run"]["travel_time_index"] is None
 
 
 def test_levels_are_those_of_the_highway_capacity_manual():
@@ -205,22 +208,6 @@ def test_a_queue_is_who_stands_at_one_time_on_all_ways_to_a_junction():
     assert queue_lengths(steps.lazy().drop("vehicle_lane"), PLACES, clock) is None
 
 
-def test_reliability_is_that_of_vehicles_that_arrived():
-    trips = pl.DataFrame(
-        {
-            "person": [False] * 4 + [True],
-            "arrival": [1.0, 1.0, 1.0, None, 1.0],
-            "duration": [10.0, 15.0, 20.0, 500.0, 90.0],
-            "time_loss": [0.0, 5.0, 10.0, 499.0, 80.0],
-        }
-    )
-    found = reliability(trips)
-    assert found["travel_time_index"] == pytest.approx(1.5)
-    assert found["planning_time_index"] == pytest.approx(1.95)
-    assert found["buffer_index"] == pytest.approx(0.3)
-    assert set(reliability(trips.clear()).values()) == {None}
-
-
 def test_files_say_the_same_and_their_units(tmp_path):
     lanes = pl.DataFrame(
         [lane("up", seconds=10.0, distance=100.0, entered=1, departed=1, co2=5.0, nox=0.1)]
@@ -232,7 +219,7 @@ def test_files_say_the_same_and_their_units(tmp_path):
         assert table.height == getattr(figures, name).height
         words = {"segment", "junction", "movement", "control", "level"}
         assert set(table.columns) - words <= set(COLUMN_UNITS)
-    data = json.loads(figures_json(figures, traffic_of_run(figures, None)))
+    data = json.loads(figures_json(RunData(traffic=figures), figures))
     assert data["segments"][0]["co2"] == 5.0
     assert data["run"]["co2_per_km"] == 50.0
     assert data["units"]["run"]["co2_per_km"] == "g/km"

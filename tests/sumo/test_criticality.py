@@ -9,7 +9,10 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from odscen.results.conflicts import SEEN_TTC, conflict_figures
+from odscen.results.conflicts import SEEN_TTC
+from odscen.results.measures import safety
+from odscen.results.measures.figure import RunData
+from odscen.results.measures.registry import figure_values
 from odscen.sumo.config import RunSettings, sumo_config
 from odscen.sumo.recorded import read_conflicts, read_trajectories
 from odscen.sumo.recording import Recording
@@ -47,9 +50,8 @@ def whole(long: PreparedRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     figures = result.summary["figures"]
     conflicts = read_conflicts(result.folder)
     assert conflicts is not None
-    assert {name: figures[name] for name in conflict_figures(conflicts)} == pytest.approx(
-        conflict_figures(conflicts)
-    )
+    found = figure_values(RunData(conflicts=conflicts), safety.FIGURES)
+    assert {name: figures[name] for name in found} == pytest.approx(found)
     return result.folder
 
 

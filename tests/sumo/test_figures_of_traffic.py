@@ -17,8 +17,9 @@ import pytest
 import sumo
 from lxml import etree
 
+from odscen.results.measures.figure import RunData
+from odscen.results.measures.registry import figure_values
 from odscen.results.queues import queue_lengths
-from odscen.results.run_traffic import traffic_of_run
 from odscen.results.traffic import TrafficFigures, over_run, traffic_figures
 from odscen.results.traffic_sums import intervals
 from odscen.sumo.lane_places import lane_places
@@ -204,7 +205,7 @@ def test_queues_are_those_who_stand_at_one_time(run):
 
 
 def test_figures_of_the_run_are_ratios_of_its_trips(run):
-    found = traffic_of_run(run.figures, run.trips)
+    found = figure_values(RunData(traffic=run.figures, trips=run.trips))
     trips = [
         (float(trip.get("duration")), float(trip.get("timeLoss")))
         for trip in etree.parse(run.folder / "trips.xml").getroot()

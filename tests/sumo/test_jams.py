@@ -7,6 +7,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from odscen.results.outcomes import StopReason
 from odscen.results.records import EventKind, events_from_json
 from odscen.sumo import jams
 from odscen.sumo.config import RunSettings, sumo_config
@@ -30,12 +31,12 @@ class Street:
 @pytest.mark.parametrize(
     ("head", "reason"),
     [
-        (FREE._replace(onwards=False), jams.NO_WAY_ON),
-        (FREE._replace(onwards=False, beside=True), jams.WRONG_LANE),
-        (FREE._replace(light="r", open=False), jams.RED),
-        (FREE._replace(light="g", open=False), jams.GIVES_WAY),
-        (FREE._replace(open=False, people=True), jams.PEOPLE),
-        (FREE, jams.UNKNOWN),
+        (FREE._replace(onwards=False), StopReason.NO_WAY_ON),
+        (FREE._replace(onwards=False, beside=True), StopReason.WRONG_LANE),
+        (FREE._replace(light="r", open=False), StopReason.RED),
+        (FREE._replace(light="g", open=False), StopReason.GIVES_WAY),
+        (FREE._replace(open=False, people=True), StopReason.PEOPLE),
+        (FREE, StopReason.UNKNOWN),
     ],
 )
 def test_a_queue_stands_for_the_reason_of_its_head(head: Ahead, reason: str) -> None:
@@ -48,7 +49,7 @@ def test_vehicles_that_wait_for_each_other_are_a_circle() -> None:
     street = Street(
         a=FREE._replace(leader="b"), b=FREE._replace(leader="c"), c=FREE._replace(leader="b")
     )
-    assert jams.explain(street, "a") == (jams.CIRCLE, "c")  # type: ignore[arg-type]
+    assert jams.explain(street, "a") == (StopReason.CIRCLE, "c")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("until", "dissolved"), [(280.0, False), (400.0, True)])
@@ -76,7 +77,7 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
 
     events = events_from_json((tmp_path / "run" / "events.json").read_text())
     (jam,) = [event for event in events if event.kind is EventKind.JAM_BEGIN]
-    assert (jam.actor, jam.lane, jam.detail) == ("car0", "A1B1_1", jams.RED)
+    assert (jam.actor, jam.lane, jam.detail) == ("car0", "A1B1_1", StopReason.RED)
     rows = pl.read_parquet(tmp_path / "run" / "trajectories.parquet")
     assert jam.waited is not None
     stood = rows.filter(
@@ -91,11 +92,11 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
     assert (gridlock["jams_at_the_end"], gridlock["moved_on"]) == ((0, 1) if dissolved else (1, 0))
     places = {place["kind"]: place for place in gridlock["places"]}
     assert (places["jam"]["until"] is not None) == dissolved
-    assert {place["reason"] for place in places.values()} == {jams.RED}
+    assert {place["reason"] for place in places.values()} == {StopReason.RED}
     assert all(place["lane"] == "A1B1_1" for place in places.values())
     if dissolved:
-        lifted = places["moved_on"]
-        assert lifted["until"] - lifted["time"] == pytest.approx(300.0, abs=1.0)
+        teleported = places["moved_on"]
+        assert teleported["until"] - teleported["time"] == pytest.approx(300.0, abs=1.0)
 
 
 def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
@@ -117,4 +118,4 @@ def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
     assert result.status == "completed", result.summary["error"]
     (place,) = result.summary["gridlock"]["places"]
     assert (place["kind"], place["actor"]) == ("jam", "car0")
-    assert place["reason"] == jams.WRONG_LANE
+    assert place["reason"] == StopReason.WRONG_LANE

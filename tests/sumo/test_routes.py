@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from odscen.lanegraph.paths import Router, WalkRouter
 from odscen.lanegraph.query import node_index, walk_node_index
 from odscen.sumo.network import Link, NetLane, RoadNet
-from odscen.sumo.routes import NoRouteError, Route, RoutePlanner, connected
+from odscen.sumo.routes import NoRouteError, RepairKind, Route, RoutePlanner, connected
 from odscen.sumo.walks import Walk, WalkPlanner
 from tests.sumo.toys import STARTS, lane_places, street, street_net, walk_places
 
@@ -128,7 +128,7 @@ def chain(*lengths: float, gaps: tuple[int, ...] = ()) -> RoadNet:
 def test_a_missing_edge_is_put_in_and_told() -> None:
     edges, repairs = connected(chain(10, 10, 10, 10), ["e0", "e2", "e3"], "passenger")
     assert edges == ("e0", "e1", "e2", "e3")
-    assert repairs == ("e1 put in between e0 and e2",)
+    assert repairs == ((RepairKind.PUT_IN, "e1 put in between e0 and e2"),)
 
 
 def test_a_stray_edge_is_left_out_and_told() -> None:
@@ -138,7 +138,7 @@ def test_a_stray_edge_is_left_out_and_told() -> None:
         RoadNet({**net.lanes, "x_0": stray}, net.links), ["e0", "x", "e1", "e2"], "passenger"
     )
     assert edges == ("e0", "e1", "e2")
-    assert repairs == ("edge x left out: no link from e0",)
+    assert repairs == ((RepairKind.LEFT_OUT, "edge x left out: no link from e0"),)
 
 
 def test_a_goal_that_cannot_be_reached_is_no_route() -> None:
@@ -151,7 +151,7 @@ def test_a_path_into_a_dead_end_is_left_as_late_as_possible() -> None:
     links = (Link("a_0", "b_0"), Link("b_0", "dead_0"), Link("b_0", "z_0"))
     edges, repairs = connected(RoadNet(lanes, links), ["a", "b", "dead", "z"], "passenger")
     assert edges == ("a", "b", "z")
-    assert repairs == ("dead left out; z put in between b and z",)
+    assert repairs == ((RepairKind.LED_AROUND, "dead left out; z put in between b and z"),)
 
 
 def test_a_front_beyond_its_lane_leaves_by_a_link_of_that_lane() -> None:
@@ -169,7 +169,7 @@ def test_a_front_beyond_its_lane_leaves_by_a_link_of_that_lane() -> None:
     route = planner.plan(path, length=4.5, vclass="passenger")
     assert route.edges == ("side", "out")
     assert route.depart_pos == pytest.approx(97.0 + 2.25 - 98.0)
-    assert route.repairs == ("leaves lane in_1 by side, not out",)
+    assert route.repairs == ((RepairKind.OTHER_LINK, "leaves lane in_1 by side, not out"),)
 
 
 def test_lateral_offsets_are_mirrored_for_vehicles_in_left_hand_traffic() -> None:

@@ -1,6 +1,7 @@
 import { Alert, Anchor, Loader, Table, Text, Title, VisuallyHidden } from "@mantine/core";
 import { useCallback } from "react";
 
+import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { hashOf } from "../ui/route";
 import { useLoaded } from "../ui/useLoaded";
@@ -17,8 +18,9 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
   const { run, finished, summary } = info;
   const load = useCallback(() => lastBefore(scenario, run, finished ?? Infinity), [scenario, run, finished]);
   const { value, error } = useLoaded(load);
-  if (error) return <Alert color="gray" title="Earlier runs cannot be compared">{error}</Alert>;
-  if (!value) return <Loader aria-label="Looking for the last run" />;
+  const known = useLoaded(allFigures);
+  if (error ?? known.error) return <Alert color="gray" title="Earlier runs cannot be compared">{error ?? known.error}</Alert>;
+  if (!value || !known.value) return <Loader aria-label="Looking for the last run" />;
   const [last] = value;
   if (!summary || !last) {
     return <Text size="sm" c="dimmed">This is the first run of this scenario. After the next one, both are shown beside each other here.</Text>;
@@ -33,10 +35,10 @@ export function Comparison({ info, scenario }: { info: RunInfo; scenario: string
       <Table mt="xs" verticalSpacing={4} fz={13} aria-label="Compared with the last run">
         <Table.Thead><Table.Tr><Table.Th><VisuallyHidden>Figure</VisuallyHidden></Table.Th><Table.Th>This run</Table.Th><Table.Th>Last run</Table.Th><Table.Th>Difference</Table.Th></Table.Tr></Table.Thead>
         <Table.Tbody>
-          {compared(summary, last.summary).map((one) => (
-            <Table.Tr key={one.label}>
-              <Table.Th scope="row" fw={400}>{one.label}</Table.Th><Table.Td>{one.value}</Table.Td><Table.Td>{one.before}</Table.Td>
-              <Table.Td fw={one.difference === "same" ? 400 : 700}>{one.difference}</Table.Td>
+          {compared(summary, last.summary, known.value).map((one) => (
+            <Table.Tr key={one.name}>
+              <Table.Th scope="row" fw={400} title={one.definition}>{one.label}</Table.Th><Table.Td>{one.value}</Table.Td><Table.Td>{one.before}</Table.Td>
+              <Table.Td fw={one.difference === "same" ? 400 : 700}>{one.difference}{one.better === null ? "" : one.better ? ", better" : ", worse"}</Table.Td>
             </Table.Tr>
           ))}
         </Table.Tbody>

@@ -13,7 +13,7 @@ export function IncidentLog({ incidents, categories, over, onShow }: {
   incidents: readonly Incident[]; categories: ReadonlyMap<string, Category>; over: boolean; onShow: (incident: Incident) => void;
 }) {
   if (incidents.length === 0) {
-    return <Text size="sm" c="dimmed">{over ? "Nothing went wrong on the road." : "Nothing has gone wrong so far. Collisions, emergency braking and road users that are stuck appear here."}</Text>;
+    return <Text size="sm" c="dimmed">{over ? "Nothing went wrong on the road." : "Nothing has gone wrong so far. Collisions, emergency braking and teleports (removed after waiting too long) appear here."}</Text>;
   }
   const listed = incidents.slice(-LISTED).reverse();
   return (

@@ -2,9 +2,11 @@ import { Alert, Button, Group, Text, Title } from "@mantine/core";
 import { useState } from "react";
 
 import { carla } from "../api/carla";
+import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/route";
+import { useLoaded } from "../ui/useLoaded";
 import { Comparison } from "./Comparison";
 import { keyFigures } from "./figures";
 import { Files } from "./Files";
@@ -19,6 +21,7 @@ export function Result({ info, scenario, onBack, onGoOn }: {
   info: RunInfo; scenario: string; onBack: () => void; onGoOn: () => void;
 }) {
   const [busy, setBusy] = useState(false);
+  const known = useLoaded(allFigures);
   const again = (): void => {
     setBusy(true);
     runs.start({ scenario, speed: Number(info.summary?.until) > LONG ? null : 1 }).then(
@@ -33,7 +36,7 @@ export function Result({ info, scenario, onBack, onGoOn }: {
       {failed && <Failure info={info} />}
       {info.summary && !failed && (
         <dl className="run-figures">
-          {keyFigures(info.summary).map(({ label, value }) => <div key={label}><dt>{label}</dt><dd>{value}</dd></div>)}
+          {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => <div key={name} title={definition}><dt>{label}</dt><dd>{value}</dd></div>)}
         </dl>
       )}
       <Group mt="md" mb="lg" gap="xs">

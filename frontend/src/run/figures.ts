@@ -1,8 +1,12 @@
-import { clock, kmh, longClock } from "../ui/words";
+import { longClock } from "../ui/words";
+import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
 
 export interface Figure {
+  name: string;
   label: string;
+  /** One sentence on what it is. */
+  definition: string;
   value: string;
 }
 
@@ -10,62 +14,50 @@ export interface Figure {
 export interface Compared extends Figure {
   before: string;
   difference: string;
+  /** Whether the newer run is the better one; null where neither is. */
+  better: boolean | null;
 }
 
-interface Known {
-  label: string;
-  path: ["sim_seconds"] | ["actors", keyof Summary["actors"]] | ["figures", string];
-  say: (value: number) => string;
-  /** The size of a difference, without its sign. */
-  sayDifference?: (value: number) => string;
-}
-
-const plain = (n: number): string => n.toLocaleString("en");
-const seconds = (n: number): string => `${n.toFixed(1)} s`;
-const KNOWN: Known[] = [
-  { label: "Simulated time", path: ["sim_seconds"], say: (n) => longClock(n, n), sayDifference: seconds },
-  { label: "Planned", path: ["actors", "planned"], say: plain },
-  { label: "Arrived", path: ["actors", "arrived"], say: plain },
-  { label: "Still on the way", path: ["actors", "running"], say: plain },
-  { label: "Never got on the road", path: ["actors", "waiting"], say: plain },
-  { label: "In collisions", path: ["actors", "collided"], say: plain },
-  { label: "Had to brake hard", path: ["actors", "emergency_stopped"], say: plain },
-  { label: "Stuck, taken off the road", path: ["actors", "teleported"], say: plain },
-  { label: "Mean speed", path: ["figures", "mean_speed"], say: kmh, sayDifference: (n) => `${(n * 3.6).toFixed(1)} km/h` },
-  { label: "Mean trip", path: ["figures", "mean_travel_time"], say: clock, sayDifference: seconds },
-  { label: "Mean delay", path: ["figures", "mean_delay"], say: seconds },
-  { label: "Mean walk", path: ["figures", "pedestrian_mean_travel_time"], say: clock, sayDifference: seconds },
-];
-
-function get(summary: Summary, path: readonly string[]): number | null {
-  const found = path.reduce<unknown>(
-    (at, key) => (at && typeof at === "object" ? (at as Record<string, unknown>)[key] : undefined), summary);
+function get(summary: Summary, { name, part }: FigureInfo): number | null {
+  const from: unknown = part ? summary[part] : summary;
+  const found = from && typeof from === "object" ? (from as Record<string, unknown>)[name] : undefined;
   return typeof found === "number" ? found : null;
 }
 
-/** The key figures of a run in plain words; those that the run has not are left out. */
-export function keyFigures(summary: Summary): Figure[] {
-  return KNOWN.flatMap(({ label, path, say }) => {
-    const value = get(summary, path);
-    return value === null ? [] : [{ label, value: say(value) }];
+function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): string {
+  const text = (n * factor).toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  return unit ? `${text} ${unit}` : text;
+}
+
+const say = (n: number, { display }: FigureInfo): string => display.clock ? longClock(n, n) : plain(n, display);
+const words = ({ name, label, definition }: FigureInfo) =>
+  ({ name, label: label.charAt(0).toUpperCase() + label.slice(1), definition });
+
+/** The key figures of a run; those that the run has not are left out. */
+export function keyFigures(summary: Summary, all: readonly FigureInfo[]): Figure[] {
+  return all.filter((one) => one.on_page).flatMap((one) => {
+    const value = get(summary, one);
+    return value === null ? [] : [{ ...words(one), value: say(value, one) }];
   });
 }
 
 /** Key figures of a run beside those of an earlier one; what neither has is left out. */
-export function compared(now: Summary, before: Summary): Compared[] {
-  return KNOWN.flatMap(({ label, path, say, sayDifference = say }) => {
-    const [a, b] = [get(now, path), get(before, path)];
+export function compared(now: Summary, before: Summary, all: readonly FigureInfo[]): Compared[] {
+  return all.filter((one) => one.on_page).flatMap((one) => {
+    const [a, b] = [get(now, one), get(before, one)];
     if (a === null && b === null) return [];
+    const difference = a === null || b === null ? "–" : signed(a - b, one);
     return [{
-      label, value: a === null ? "–" : say(a), before: b === null ? "–" : say(b),
-      difference: a === null || b === null ? "–" : signed(a - b, sayDifference),
+      ...words(one), value: a === null ? "–" : say(a, one), before: b === null ? "–" : say(b, one), difference,
+      better: a === null || b === null || difference === SAME || one.better === "neither" ? null : (a > b) === (one.better === "higher"),
     }];
   });
 }
 
-function signed(difference: number, say: (value: number) => string): string {
-  const size = say(Math.abs(difference));
-  return size === say(0) ? "same" : `${difference > 0 ? "+" : "−"}${size}`;
+const SAME = "same";
+function signed(difference: number, { display }: FigureInfo): string {
+  const size = plain(Math.abs(difference), display);
+  return size === plain(0, display) ? SAME : `${difference > 0 ? "+" : "−"}${size}`;
 }
 
 const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupted"];

@@ -13,7 +13,7 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
 };
 
 export const MARK_WORD: Record<MarkKind, string> = {
-  collision: "Collision", braking: "Emergency braking", lifted: "Stuck, taken off the road",
+  collision: "Collision", braking: "Emergency braking", lifted: "Teleported",
   met: "Count met", unmet: "Count not met",
 };
 
@@ -26,8 +26,8 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
     case "collision":
       return incident.partner ? `${who} collided with ${named(incident.partner, categories)}` : `${who} collided`;
     case "emergency_stop": return `${who} had to brake as hard as it could`;
-    case "teleport_start": return `${who} was stuck for too long and was taken off the road`;
-    case "teleport_end": return `${who} was put back on the road`;
+    case "teleport_start": return `${who} was gridlocked and teleported`;
+    case "teleport_end": return `${who} was put back on the road after its teleport`;
     default: return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
 }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.results.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from odscen.carla.cosim import CosimReport
@@ -193,14 +194,14 @@ def _run_native(
     if report.interrupted:
         log("Interrupted; what CARLA did so far is kept.")
     log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")
-    failed = result.status == "failed"
+    failed = result.status is RunStatus.FAILED
     raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
 
 
 def _exit_code(result: RunResult, report: CosimReport) -> int:
     from odscen.carla.cosim import INTERRUPTED
 
-    if result.status == "failed" or report.error or report.left_behind:
+    if result.status is RunStatus.FAILED or report.error or report.left_behind:
         return 3
     return INTERRUPTED if report.interrupted else result.exit_code
 

@@ -12,6 +12,7 @@ import typer
 from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, print_table, progress
 from odscen.durations import clock, parse_duration
 from odscen.errors import InputError
+from odscen.results.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -200,7 +201,7 @@ def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) 
             if not verdict["passed"]:
                 has = f"{verdict['expectation']} (is {verdict['value']})"
                 log(f"{result.folder.name}: failed: {has}")
-        if result.status == "failed":
+        if result.status is RunStatus.FAILED:
             log(f"{result.folder.name}: {result.summary['error']}")
         else:
             log(f"Report: {result.to_dict()['files'].get('report', result.folder)}")

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from odscen.regression.measure import Kind, Measured
+    from odscen.regression.measure import Measured
+    from odscen.results.measures.figure import FigureKind
     from odscen.scenario.document import Scenario
 
 FORMAT = "odscen-baseline"
@@ -31,7 +32,7 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
-_KINDS: tuple[Kind, ...] = ("segment", "junction", "actor")
+_KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
 """What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from odscen.errors import InputError
 from odscen.regression.measure import measure
 from odscen.results.comparison import CONFIDENCE, compare_figure
+from odscen.results.measures.registry import SEGMENT_FIGURES
+from odscen.results.outcomes import RunStatus
 from odscen.results.place_shapes import place_shapes
 from odscen.results.traffic_files import read_tables
-from odscen.results.units import unit_of, with_unit
 from odscen.sumo.ended import read_summary
 from odscen.sumo.layout import FIGURES_FOLDER, SUMMARY_FILE
 from odscen.workflow import load_map
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from odscen.catalog.store import Workspace
     from odscen.regression.measure import Key, Measured
-    from odscen.results.comparison import Difference
+    from odscen.results.comparison import Difference, Finding
     from odscen.results.place_shapes import PlaceShapes
 
 FORMAT = "odscen-comparison"
@@ -34,7 +35,8 @@ VERSION = 1
 MOST = 8
 """Places that are named, at most."""
 
-_PLACE_FIGURES = {"segment": "mean_speed", "junction": "waiting_time"}
+_TELLING = {(figure.kind, figure.name) for figure in SEGMENT_FIGURES if figure.tells}
+"""The one figure of each kind of place that says how well traffic moves there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Row:
     @property
     def cells(self) -> tuple[str, ...]:
         """Figure, unit, both means, difference, interval, and what it says."""
-        found, unit = self.difference, unit_of(self.key.figure)
+        found, unit = self.difference, self.key.entry.unit
         interval = difference = ""
         if found.low is not None and found.high is not None and found.low < found.high:
             interval = f"{found.low:+,.2f} to {found.high:+,.2f}"
@@ -76,22 +78,20 @@ class Row:
         return self.key.name, unit, a, b, difference, interval, self.says
 
     @property
-    def says(self) -> str:
+    def says(self) -> Finding:
         """What the difference amounts to."""
-        found = self.difference
-        if found.difference is None:
-            return "only on one side" if found.a is not found.b else "not there"
-        if found.difference == 0.0:
-            return "the same"
-        if found.clear is None:
-            return "too few runs"
-        return "clear" if found.clear else "unclear"
+        return self.difference.finding
+
+    @property
+    def improves(self) -> bool | None:
+        """Whether B is the better side; ``None`` if neither is."""
+        return self.key.entry.improves(self.difference.difference)
 
     @property
     def words(self) -> str:
         """One line for people."""
-        found, figure = self.difference, self.key.figure
-        a, b = ("none" if v is None else with_unit(v, figure) for v in (found.a, found.b))
+        found, figure = self.difference, self.key.entry
+        a, b = ("none" if v is None else figure.written(v) for v in (found.a, found.b))
         return f"{self.key.name}: {a} in A, {b} in B ({self.says})"
 
 
@@ -108,7 +108,7 @@ class RunComparison:
     @property
     def place_rows(self) -> list[Row]:
         """The one figure of each place that says how traffic gets on there."""
-        return [row for row in self.rows if _PLACE_FIGURES.get(row.key.kind) == row.key.figure]
+        return [row for row in self.rows if (row.key.kind, row.key.figure) in _TELLING]
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data; figures in SI units, named beside each."""
@@ -131,7 +131,7 @@ def _row(row: Row) -> dict[str, Any]:
     key = {"kind": row.key.kind, "place": row.key.place or None, "figure": row.key.figure}
     found = asdict(row.difference)
     found |= {"relative": row.difference.relative, "clear": row.difference.clear}
-    return {**key, "unit": unit_of(row.key.figure), **found}
+    return {**key, "unit": row.key.entry.unit, **found}
 
 
 def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
@@ -193,7 +193,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
 def _summary(folder: Path) -> dict[str, Any]:
     summary = read_summary(folder)
     status = summary["status"]
-    if status != "completed" or not isinstance(summary["seed"], int):
+    if status != RunStatus.COMPLETED or not isinstance(summary["seed"], int):
         msg = f"the run has not completed, it is {status!r}"
         raise InputError(msg, file=str(folder / SUMMARY_FILE))
     return summary
@@ -234,7 +234,7 @@ def _most_changed(rows: list[Row], a: RunSet, b: RunSet) -> tuple[Row, ...]:
     }
     scored = []
     for row in rows:
-        if _PLACE_FIGURES.get(row.key.kind) != row.key.figure or not row.difference.difference:
+        if (row.key.kind, row.key.figure) not in _TELLING or not row.difference.difference:
             continue
         size = abs(row.difference.difference) / max(abs(row.difference.a or 0.0), 1.0)
         weight = math.sqrt(passed.get((row.key.kind, row.key.place), 0.0))

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.catalog.markup import Markup, element, join, number, path_data
-from odscen.regression.figure_words import in_words
+from odscen.results.comparison import Finding
 from odscen.results.plots import Dots, dot_chart, legend
 from odscen.results.report import html_page
 from odscen.results.report_flow import DENSITY, FLOW, column
 from odscen.results.report_map import fitted_view, scale_bar, view_box
 from odscen.results.report_tables import html_table, report_section
 from odscen.results.report_words import stretch
-from odscen.results.units import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -64,9 +63,9 @@ def _side(name: str, seeds: Iterable[int]) -> str:
 
 
 def _in_short(figures: Sequence[Row]) -> Markup:
-    clear = [row for row in figures if row.says == "clear"]
+    clear = [row for row in figures if row.says is Finding.CLEAR]
     clear.sort(key=lambda row: -abs(row.difference.relative or np.inf))
-    if not figures or all(row.says == "the same" for row in figures):
+    if not figures or all(row.says is Finding.SAME for row in figures):
         content = element("p", "A and B are the same in every figure.")
     elif not any(map(_counts, clear)):
         words = "Whatever is clear is too small to matter." if clear else "Each may be chance."
@@ -86,13 +85,18 @@ def _counts(row: Row) -> bool:
 
 
 def _sentence(row: Row) -> str:
-    found, figure = row.difference, row.key.figure
+    found, figure = row.difference, row.key.entry
     if found.a is None or found.b is None:
-        return in_words(figure)
-    values = f"{with_unit(found.a, figure)} in A, {with_unit(found.b, figure)} in B"
+        return figure.label
+    values = f"{figure.written(found.a)} in A, {figure.written(found.b)} in B"
     word = "more" if found.b > found.a else "less"
     share = f"{number(100.0 * abs(found.relative), 1)} % {word} in B: " if found.relative else ""
-    return f"{in_words(figure)}: {share}{values}."
+    return f"{figure.label}: {share}{values}{_better(row)}."
+
+
+def _better(row: Row) -> str:
+    improves = row.improves
+    return "" if improves is None else f"; {'B' if improves else 'A'} is better"
 
 
 def _chart_section(figures: Sequence[Row]) -> Markup | None:
@@ -132,8 +136,8 @@ def _interval_chart(rows: Sequence[Row]) -> Markup:
                          text_anchor="end"))  # fmt: skip
     for index, (row, share) in enumerate(zip(rows, shares.tolist(), strict=True)):
         y = index * _ROW + _ROW / 2.0 + 4.0
-        style = "difference clear" if row.says == "clear" else "difference"
-        marks = [element("text", in_words(row.key.figure), x=_LABELS - 12, y=y + 4,
+        style = "difference clear" if row.says is Finding.CLEAR else "difference"
+        marks = [element("text", row.key.entry.label, x=_LABELS - 12, y=y + 4,
                          text_anchor="end", class_="axis-name")]  # fmt: skip
         found = row.difference
         if found.low is not None and found.high is not None and found.a:
@@ -162,19 +166,21 @@ def _table_section(figures: Sequence[Row]) -> Markup:
         "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
         "is clear, one that holds zero may be chance."
     )
-    rows = [_table_row(row, in_words(row.key.figure)) for row in figures]
+    rows = [_table_row(row) for row in figures]
     table = html_table(_HEADS, rows)
     return report_section("All figures", table, explained=explained, ident="figures")
 
 
-def _table_row(row: Row, name: str) -> Markup:
+def _table_row(row: Row) -> Markup:
     cells = row.cells
+    clear = row.says is Finding.CLEAR
+    says = row.says + (_better(row) if clear else "")
     return element(
         "tr",
-        element("th", name, scope="row"),
+        element("th", row.key.label, scope="row"),
         element("td", cells[1]),
         *(element("td", text, class_="n") for text in cells[2:6]),
-        element("td", cells[6], class_="fair" if cells[6] == "clear" else None),
+        element("td", says, class_="fair wrap" if clear else None),
     )
 
 
@@ -184,10 +190,10 @@ def _place_section(result: RunComparison) -> Markup | None:
     explained = (
         "on the map, red places are slower in B, or have longer waits, and blue ones are faster; "
         f"places that fewer than {LEAST_VEHICLES:g} vehicles pass stay grey. The table has "
-        "segments by mean speed and junctions by the time that a vehicle stands before them; large "
-        "changes where many vehicles pass come first."
+        "segments by mean speed and junctions by stopped delay; large changes where many vehicles "
+        "pass come first."
     )
-    rows = [_table_row(row, row.key.name.replace("_", " ")) for row in result.places]
+    rows = [_table_row(row) for row in result.places]
     drawn = None if result.a.shapes is None else _change_map(result, result.a.shapes)
     table = html_table(_HEADS, rows, label="Places")
     return report_section(
@@ -257,13 +263,13 @@ def _grades(result: RunComparison) -> dict[tuple[str, str], tuple[str, str]]:
             continue
         # A junction's wait may be next to nothing in A: seconds count there.
         base = max(abs(difference.a or 0.0), 1.0)
-        worse = -difference.difference if row.key.kind == "segment" else difference.difference
-        share = worse / base
+        worse = -1.0 if row.improves else 1.0
+        share = worse * abs(difference.difference) / base
         step = int(np.searchsorted(STEPS, abs(share)))
         grade = 3 - step if share > 0 else 3 + step
-        values = (f"{with_unit(value or 0.0, row.key.figure)} in {side}"
+        values = (f"{row.key.entry.written(value or 0.0)} in {side}"
                   for value, side in ((difference.a, "A"), (difference.b, "B")))  # fmt: skip
-        found[key] = (f"d{grade}", f"{in_words(row.key.figure)} {', '.join(values)}")
+        found[key] = (f"d{grade}", f"{row.key.entry.label} {', '.join(values)}")
     return found
 
 

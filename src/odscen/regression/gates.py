@@ -7,8 +7,9 @@ import shutil
 import tempfile
 import threading
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.assets import shipped_assets
 from odscen.catalog.store import name_from_file
@@ -23,6 +24,7 @@ from odscen.regression.baseline import (
 from odscen.regression.measure import measure
 from odscen.regression.verdict import hold_against
 from odscen.results.expectations import evaluate, needs_criticality
+from odscen.results.outcomes import RunStatus
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.recording import Recording
@@ -41,7 +43,18 @@ if TYPE_CHECKING:
     from odscen.sumo.progress import Progress
     from odscen.sumo.runner import RunResult
 
-Status = Literal["passed", "failed", "error"]
+
+class CaseStatus(StrEnum):
+    """Verdict on a scenario of a suite; ``error`` if a run of it failed."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    ERROR = "error"
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return "run failed" if self is CaseStatus.ERROR else self.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +93,11 @@ class CaseResult:
     updated: bool = False
 
     @property
-    def status(self) -> Status:
+    def status(self) -> CaseStatus:
         """``error`` if a run failed, ``failed`` if one fell short, else ``passed``."""
         if any(run.error for run in self.runs):
-            return "error"
-        return "failed" if self.problems else "passed"
+            return CaseStatus.ERROR
+        return CaseStatus.FAILED if self.problems else CaseStatus.PASSED
 
     @property
     def wall_seconds(self) -> float:
@@ -103,7 +116,7 @@ class SuiteResult:
     def exit_code(self) -> int:
         """0 all passed; 1 something differs or falls short; 3 a run failed."""
         found = {case.status for case in self.cases}
-        return 3 if "error" in found else 1 if "failed" in found else 0
+        return 3 if CaseStatus.ERROR in found else 1 if CaseStatus.FAILED in found else 0
 
 
 @dataclass(slots=True)
@@ -264,7 +277,7 @@ def _seed_result(loaded: _Loaded, seed: int, result: RunResult) -> SeedResult:
         if not verdict.passed
     ]
     error = None
-    if result.status == "failed":
+    if result.status is RunStatus.FAILED:
         error = f"seed {seed}: the run failed: {summary['error']}"
         missed = []
     figures = measure(result.folder, summary)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
+from odscen.regression.gates import CaseStatus
 from odscen.regression.words import lines, reason
 
 if TYPE_CHECKING:
@@ -21,8 +22,8 @@ def junit_xml(result: SuiteResult) -> str:
     seconds = sum(case.wall_seconds for case in result.cases)
     counts = {
         "tests": str(len(statuses)),
-        "failures": str(statuses.count("failed")),
-        "errors": str(statuses.count("error")),
+        "failures": str(statuses.count(CaseStatus.FAILED)),
+        "errors": str(statuses.count(CaseStatus.ERROR)),
         "time": f"{seconds:.3f}",
     }
     root = etree.Element("testsuites", counts)
@@ -43,8 +44,8 @@ def _test_case(suite: etree._Element, case: CaseResult, suite_name: str) -> None
     }
     element = etree.SubElement(suite, "testcase", attributes)
     told = [_UNWRITABLE.sub("?", line) for line in lines(case)]
-    if case.status != "passed":
-        tag = "error" if case.status == "error" else "failure"
+    if case.status is not CaseStatus.PASSED:
+        tag = "error" if case.status is CaseStatus.ERROR else "failure"
         etree.SubElement(element, tag, {"message": told[0]}).text = "\n".join(told)
     elif note := reason(case):
         etree.SubElement(element, "system-out").text = note

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from itertools import groupby
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.errors import InputError, in_file
-from odscen.results.expectations import COUNTS
+from odscen.results.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGURES, figure_of
+from odscen.results.outcomes import RunStatus
 from odscen.results.summary import actors_from_json
 from odscen.results.traffic import over_run
 from odscen.sumo import layout
@@ -16,9 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from odscen.results.measures.figure import Figure, FigureKind
     from odscen.results.traffic import TrafficFigures
-
-Kind = Literal["run", "segment", "junction", "actor"]
 
 DIGITS = 4
 """Decimals kept: far below what matters, and readable in a diff."""
@@ -27,7 +28,7 @@ DIGITS = 4
 class Key(NamedTuple):
     """A figure and its place; ``place`` is empty for figures of the whole run."""
 
-    kind: Kind
+    kind: FigureKind
     place: str
     figure: str
 
@@ -35,6 +36,17 @@ class Key(NamedTuple):
     def name(self) -> str:
         """``"mean_delay"``, ``"segment r1-0: mean_speed"``."""
         return f"{self.kind} {self.place}: {self.figure}" if self.place else self.figure
+
+    @property
+    def entry(self) -> Figure:
+        """What the registry says of the figure."""
+        return figure_of(self.kind, self.figure)
+
+    @property
+    def label(self) -> str:
+        """``"mean delay"``, ``"segment r1-0: mean speed"``."""
+        label = self.entry.label
+        return f"{self.kind} {self.place}: {label}" if self.place else label
 
 
 Measured = dict[Key, float | None]
@@ -52,24 +64,16 @@ def run_figures(summary: Mapping[str, Any]) -> Measured:
     }
 
 
-_PLACES: dict[str, tuple[Kind, dict[str, str]]] = {
-    "segments": ("segment", {"vehicles": "vehicles", "mean_speed": "speed", "free_speed": "free"}),
-    "junctions": ("junction", {"vehicles": "vehicles", "waiting_time": "waiting"}),
-}
-"""Tables with the kind of their places, and their figures by the names that baselines have."""
-
-
 def place_figures(figures: TrafficFigures) -> Iterator[tuple[Key, float | None]]:
     """Figures of each segment and junction over the whole run."""
-    import polars as pl
-
-    for table, (kind, names) in _PLACES.items():
-        rows = over_run(getattr(figures, table))
-        if kind == "segment":
-            rows = rows.with_columns(free=1000.0 * pl.col("length") / pl.col("free_flow_time"))
-        for row in rows.iter_rows(named=True):
-            for name, column in names.items():
-                yield Key(kind, row[kind], name), row[column]
+    for kind, entries in groupby(SEGMENT_FIGURES, key=lambda figure: figure.kind):
+        chosen = list(entries)
+        rows = over_run(getattr(figures, chosen[0].table)).select(
+            kind, *(figure.column().alias(figure.name) for figure in chosen)
+        )
+        for place, *values in rows.iter_rows():
+            for figure, value in zip(chosen, values, strict=True):
+                yield Key(kind, place, figure.name), value
 
 
 def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
@@ -85,7 +89,7 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
     import polars as pl
 
     found = run_figures(summary)
-    if summary["status"] != "completed":
+    if summary["status"] != RunStatus.COMPLETED:
         return found
     actors_file = folder / layout.ACTORS_FILE
     try:
@@ -93,7 +97,10 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
             actors = actors_from_json(actors_file.read_text(encoding="utf-8"))
         for actor in actors:
             if actor.flow is None:
-                found[Key("actor", actor.id, "travel_time")] = actor.travel_time
+                found |= {
+                    Key("actor", actor.id, figure.name): figure.compute(actor)
+                    for figure in ACTOR_FIGURES
+                }
         figures = read_figures(folder, end=summary["sim_seconds"])
     except (OSError, pl.exceptions.PolarsError) as error:
         msg = f"files of the run cannot be read: {error}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.catalog.markup import Markup, element, join
+from odscen.regression.gates import CaseStatus
 from odscen.regression.words import lines, reason, where
 from odscen.results.report import html_page
 from odscen.results.report_tables import html_table, report_section
@@ -13,12 +14,10 @@ if TYPE_CHECKING:
     from odscen.regression.gates import CaseResult, SuiteResult
     from odscen.regression.verdict import Change
 
-_WORDS = {"passed": ("good", "passed"), "failed": ("bad", "failed"), "error": ("bad", "run failed")}
-
 
 def suite_page(result: SuiteResult) -> str:
     """Page of a suite: the verdict, the scenarios, and what has changed where."""
-    passed = sum(case.status == "passed" for case in result.cases)
+    passed = sum(case.status is CaseStatus.PASSED for case in result.cases)
     total = len(result.cases)
     whole = passed == total
     verdict = "All as it should be" if whole else f"{total - passed} of {total} scenarios failed"
@@ -45,13 +44,13 @@ def suite_page(result: SuiteResult) -> str:
 
 
 def _case_row(case: CaseResult) -> Markup:
-    style, words = _WORDS[case.status]
+    style = "good" if case.status is CaseStatus.PASSED else "bad"
     seeds = ", ".join(str(run.seed) for run in case.runs)
     return element(
         "tr",
         element("th", case.case.name, scope="row"),
         element("td", case.map_name),
-        element("td", words, class_=style),
+        element("td", case.status.label, class_=style),
         element("td", seeds),
         element("td", f"{case.wall_seconds:.1f}", class_="n"),
     )
@@ -77,14 +76,8 @@ def _case_section(case: CaseResult) -> Markup:
     )
 
 
-def _readable(name: str) -> str:
-    """``mean_delay`` as ``mean delay``."""
-    return name.replace("_", " ")
-
-
 def _change_row(change: Change) -> Markup:
-    row = change.row
-    cells = [element("td", text, class_="n") for text in row[1:]]
+    cells = [element("td", text, class_="n") for text in change.row[1:]]
     fails = element("td", "fails" if change.counts else "too few vehicles to fail",
                     class_="bad" if change.counts else "fair")  # fmt: skip
-    return element("tr", element("th", _readable(row[0]), scope="row"), *cells, fails)
+    return element("tr", element("th", change.key.label, scope="row"), *cells, fails)

@@ -152,7 +152,9 @@ def _run(
 
 
 def _shortcomings(result: RunResult) -> list[str]:
-    if result.status == "failed":
+    from odscen.results.outcomes import RunStatus
+
+    if result.status is RunStatus.FAILED:
         return [f"the run failed: {result.summary['error']}"]
     return [
         f"expected {verdict['expectation']}, but it is {verdict['value']}"

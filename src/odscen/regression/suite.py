@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import AfterValidator, Field, ValidationError
 
 from odscen.errors import InputError, ScenarioError
-from odscen.regression.tolerance import PLACE_FIGURES, Tolerances, parse_tolerance
-from odscen.results.expectations import NAMES, parse_expectation
+from odscen.regression.tolerance import Tolerances, parse_tolerance
+from odscen.results.expectations import parse_expectation
+from odscen.results.measures.registry import ALL_FIGURES
 from odscen.scenario.document import Label, Part
 from odscen.scenario.files import validation_problems
 from odscen.workflow import folder_name
@@ -25,6 +26,8 @@ Seeds = Annotated[
     tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], Field(min_length=1, max_length=1000)
 ]
 ToleranceTable = dict[str, str | dict[str, str]]
+
+_PLACE_KINDS = {figure.kind for figure in ALL_FIGURES} - {"run"}
 
 
 def _expectation(text: str) -> str:
@@ -173,15 +176,15 @@ def _tolerances(table: ToleranceTable) -> dict[tuple[str, str], Tolerance]:
     found = {}
     for key, value in table.items():
         kind, rows = ("run", {key: value}) if isinstance(value, str) else (key, value)
-        known = NAMES if kind == "run" else [name for own, name in PLACE_FIGURES if own == kind]
+        known = {figure.name: figure for figure in ALL_FIGURES if figure.kind == kind}
         for name, text in rows.items():
             where = f"tolerance.{name}" if kind == "run" else f"tolerance.{kind}.{name}"
             if name not in known:
-                listed = ", ".join(sorted(known) or sorted({kind for kind, _ in PLACE_FIGURES}))
+                listed = ", ".join(sorted(known) or sorted(_PLACE_KINDS))
                 msg = f"no figure has this name; known are {listed}"
                 raise InputError(msg, element=where)
             try:
-                found[kind, name] = parse_tolerance(str(text), name)
+                found[kind, name] = parse_tolerance(str(text), known[name])
             except InputError as error:
                 raise InputError(error.problem, element=where) from error
     return found

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 from odscen.errors import InputError
-from odscen.results.expectations import COUNTS
-from odscen.results.units import in_unit_of, with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.regression.measure import Key
+    from odscen.results.measures.figure import Figure
 
 _PART = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>%|[A-Za-z][A-Za-z/]*)?")
 
@@ -29,16 +29,16 @@ class Tolerance:
         """Return the largest difference that passes, in the unit of the figure."""
         return max(self.relative * abs(baseline), self.absolute)
 
-    def words(self, figure: str) -> str:
+    def words(self, figure: Figure) -> str:
         """``"5 % or 1.50 s"``, as it may be written in a suite."""
         parts = [f"{100 * self.relative:g} %"] if self.relative else []
         if self.absolute or not parts:
-            parts.append(with_unit(self.absolute, figure))
+            parts.append(figure.written(self.absolute))
         return " or ".join(parts)
 
 
-def parse_tolerance(text: str, figure: str) -> Tolerance:
-    """Read a tolerance of the figure ``figure``.
+def parse_tolerance(text: str, figure: Figure) -> Tolerance:
+    """Read a tolerance of a figure.
 
     Raises
     ------
@@ -55,33 +55,17 @@ def parse_tolerance(text: str, figure: str) -> Tolerance:
         if unit == "%":
             relative = max(relative, number / 100.0)
         else:
-            absolute = max(absolute, in_unit_of(figure, number, unit))
+            absolute = max(absolute, figure.in_unit_of(number, unit))
     return Tolerance(relative, absolute)
 
 
 EXACT = Tolerance()
-ORDINARY = Tolerance(relative=0.02)
-"""Of figures of a run that nothing else is said of."""
 
-_USUAL: dict[tuple[str, str], Tolerance] = {
-    **{("run", name): EXACT for name in COUNTS},
-    ("run", "mean_delay"): Tolerance(0.02, 0.5),
-    ("run", "pedestrian_mean_delay"): Tolerance(0.02, 0.5),
-    ("run", "mean_waiting_time"): Tolerance(0.02, 0.5),
-    ("run", "pedestrian_mean_waiting_time"): Tolerance(0.02, 0.5),
-    ("run", "mean_stops"): Tolerance(0.05, 0.1),
-    ("run", "insertion_error_max"): Tolerance(0.0, 0.05),
-    ("run", "insertion_error_mean"): Tolerance(0.0, 0.05),
-    ("run", "depart_delay_max"): Tolerance(0.05, 1.0),
-    ("segment", "vehicles"): Tolerance(0.05, 1.0),
-    ("segment", "mean_speed"): Tolerance(0.1, 1.0),
-    ("segment", "free_speed"): Tolerance(0.05, 0.5),
-    ("junction", "vehicles"): Tolerance(0.05, 1.0),
-    ("junction", "waiting_time"): Tolerance(0.1, 1.5),
-    ("actor", "travel_time"): Tolerance(0.1, 5.0),
-}
 
-PLACE_FIGURES = frozenset(key for key in _USUAL if key[0] != "run")
+@cache
+def usual(figure: Figure) -> Tolerance:
+    """Tolerance of a figure that a suite says nothing of."""
+    return parse_tolerance(figure.tolerance, figure)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,5 +76,5 @@ class Tolerances:
 
     def of(self, key: Key) -> Tolerance:
         """Tolerance of one figure."""
-        own = (key.kind, key.figure)
-        return self.given.get(own, _USUAL.get(own, ORDINARY))
+        given = self.given.get((key.kind, key.figure))
+        return usual(key.entry) if given is None else given

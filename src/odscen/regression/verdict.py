@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from odscen.regression.tolerance import EXACT
 from odscen.results.comparison import compare_figure
-from odscen.results.units import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,14 +37,14 @@ class Change:
     @property
     def row(self) -> tuple[str, str, str, str, str]:
         """Figure, baseline, value, difference and what is allowed, for people."""
-        figure, found = self.key.figure, self.difference
+        figure, found = self.key.entry, self.difference
         before, now = (
-            "none" if value is None else with_unit(value, figure) for value in (found.a, found.b)
+            "none" if value is None else figure.written(value) for value in (found.a, found.b)
         )
         how_far = []
         if found.difference is not None:
             sign = "+" if found.difference > 0 else "-"
-            how_far.append(f"{sign}{with_unit(abs(found.difference), figure)}")
+            how_far.append(f"{sign}{figure.written(abs(found.difference))}")
         if found.relative is not None:
             how_far.append(f"{100 * found.relative:+.1f} %")
         return self.key.name, before, now, ", ".join(how_far), self.tolerance.words(figure)
@@ -92,10 +91,14 @@ class Verdict:
 def hold_against(
     baseline: Baseline, runs: Mapping[int, Measured], tolerances: Tolerances
 ) -> Verdict:
-    """Hold new runs, given by seed, against a baseline, by the means over the seeds of both."""
+    """Hold new runs, given by seed, against a baseline, by the means over the seeds of both.
+
+    Figures of the run that the baseline does not have are newer than it, and are not judged.
+    """
     seeds = [seed for seed in baseline.seeds if seed in runs]
     position = {seed: index for index, seed in enumerate(baseline.seeds)}
-    keys = dict.fromkeys((*baseline.figures, *(key for seed in seeds for key in runs[seed])))
+    found = (key for seed in seeds for key in runs[seed] if key.kind != "run")
+    keys = dict.fromkeys((*baseline.figures, *found))
     changes = []
     for key in keys:
         stored = baseline.figures.get(key)

@@ -8,6 +8,7 @@ compared by Welch's interval, which does not ask for equal variances.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 FloatArray = NDArray[np.float64]
+
+
+class Finding(StrEnum):
+    """What a difference amounts to, in words."""
+
+    ONE_SIDE = "only on one side"
+    NOWHERE = "not there"
+    SAME = "the same"
+    TOO_FEW = "too few runs"
+    CLEAR = "clear"
+    UNCLEAR = "unclear"
+
 
 CONFIDENCE = 0.95
 
@@ -56,6 +69,17 @@ class Difference:
         if self.low is None or self.high is None:
             return None
         return self.low > 0.0 or self.high < 0.0
+
+    @property
+    def finding(self) -> Finding:
+        """What it amounts to."""
+        if self.difference is None:
+            return Finding.NOWHERE if self.a is self.b else Finding.ONE_SIDE
+        if self.difference == 0.0:
+            return Finding.SAME
+        if self.clear is None:
+            return Finding.TOO_FEW
+        return Finding.CLEAR if self.clear else Finding.UNCLEAR
 
 
 def compare_figure(a: Mapping[int, float | None], b: Mapping[int, float | None]) -> Difference:

@@ -29,9 +29,6 @@ WATCHED_ON = 2.0
 SERIOUS_TTC, SERIOUS_DRAC, SERIOUS_PET = 1.5, 3.35, 1.0
 """What makes a conflict serious: seconds or less, m/s^2 or more, seconds or less."""
 
-CONFLICT_FIGURES = ("min_ttc", "max_drac", "min_pet", "pedestrian_min_pet", "serious_conflicts")
-"""Figures of a run in which criticality was measured."""
-
 BODY = 0.25
 """Metres around the centre of somebody on foot that belong to them."""
 
@@ -100,24 +97,6 @@ def _joined(tables: Sequence[pl.DataFrame]) -> pl.DataFrame:
     )
 
 
-def conflict_figures(conflicts: pl.DataFrame) -> dict[str, float]:
-    """Figures of a run; no conflict that was recorded gives the limit of what is recorded.
-
-    ``min_ttc``, ``min_pet``, ``pedestrian_min_pet`` in s, ``max_drac`` in m/s^2, and the number of
-    ``serious_conflicts``.
-    """
-    afoot = conflicts["kind"] == "walking"
-    driven, walked = conflicts.filter(~afoot), conflicts.filter(afoot)
-    serious = conflicts.select(is_serious().sum()).item()
-    return {
-        "min_ttc": _least(driven["ttc"], SEEN_TTC),
-        "max_drac": max([SEEN_DRAC, *driven["drac"].drop_nulls().to_list()]),
-        "min_pet": _least(driven["pet"], SEEN_PET),
-        "pedestrian_min_pet": _least(walked["pet"], SEEN_PET),
-        "serious_conflicts": float(serious),
-    }
-
-
 def is_serious() -> pl.Expr:
     """Whether a conflict is serious by any of its measures."""
     import polars as pl
@@ -127,11 +106,6 @@ def is_serious() -> pl.Expr:
         | (pl.col("drac") >= SERIOUS_DRAC).fill_null(value=False)
         | (pl.col("pet") <= SERIOUS_PET).fill_null(value=False)
     )
-
-
-def _least(values: pl.Series, most: float) -> float:
-    known: list[float] = values.drop_nulls().to_list()
-    return min([most, *known])
 
 
 def walking_conflicts(

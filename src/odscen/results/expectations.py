@@ -1,10 +1,11 @@
 """Expectations of a run, such as ``arrived>=0.95`` or ``mean_delay <= 40 s`` (requirement R58).
 
 ``NAME OP NUMBER [UNIT]`` with one of ``>= <= > < ==``. Names are those of the summary: sim_seconds,
-the counts of actors (planned, inserted, arrived, ...) and the key figures (insertion_error_max,
-mean_travel_time, ...). A *count* compared with a number from 0 to 1 that is written with a decimal
-point, or followed by ``%``, is taken as a share of the planned actors: ``arrived>=0.95``,
-``arrived>=95%`` and ``arrived==1.0`` are shares, ``arrived>=1`` and ``collided==0`` are counts.
+the counts of actors (planned, inserted, arrived, ...) and the figures (insertion_error_max,
+mean_travel_time, ...); :mod:`odscen.results.measures.registry` has them all. A *count* compared
+with a number from 0 to 1 that is written with a decimal point, or followed by ``%``, is taken as a
+share of the planned actors: ``arrived>=0.95``, ``arrived>=95%`` and ``arrived==1.0`` are shares,
+``arrived>=1`` and ``collided==0`` are counts.
 A unit may be another one of the same kind: ``mean_speed >= 30 km/h``; without one it is SI.
 """
 
@@ -17,44 +18,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.errors import InputError
-from odscen.results.conflicts import CONFLICT_FIGURES
-from odscen.results.run_traffic import TRAFFIC_FIGURES
-from odscen.results.units import in_unit_of
+from odscen.results.measures.figure import Basis
+from odscen.results.measures.registry import names_of, run_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-COUNTS = (
-    "planned",
-    "inserted",
-    "arrived",
-    "running",
-    "waiting",
-    "teleported",
-    "collided",
-    "emergency_stopped",
-)
-FIGURES = (
-    "insertion_error_max",
-    "insertion_error_mean",
-    "depart_delay_max",
-    "mean_travel_time",
-    "median_travel_time",
-    "p95_travel_time",
-    "mean_speed",
-    "mean_delay",
-    "mean_waiting_time",
-    "mean_stops",
-    "pedestrian_mean_travel_time",
-    "pedestrian_median_travel_time",
-    "pedestrian_p95_travel_time",
-    "pedestrian_mean_speed",
-    "pedestrian_mean_delay",
-    "pedestrian_mean_waiting_time",
-    *TRAFFIC_FIGURES,
-    *CONFLICT_FIGURES,
-)
-NAMES = ("sim_seconds", *COUNTS, *FIGURES)
+NAMES = names_of("run")
 
 _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
@@ -106,19 +76,20 @@ def parse_expectation(text: str) -> Expectation:
         raise InputError(msg)
     name, number, unit = match["name"], match["number"], match["unit"] or ""
     percent = unit == "%"
-    if name not in NAMES:
+    figure = run_figure(name)
+    if figure is None:
         close = difflib.get_close_matches(name, NAMES, n=3, cutoff=0.5)
         hint = f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(NAMES)}"
         msg = f"expectation {text!r}: no figure is named {name!r}; {hint}"
         raise InputError(msg)
-    if percent and name not in COUNTS:
+    if percent and not figure.count:
         msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
         raise InputError(msg)
     if percent:
         bound = float(number) / 100.0
     else:
         try:
-            bound = in_unit_of(name, float(number), unit)
+            bound = figure.in_unit_of(float(number), unit)
         except InputError as error:
             msg = f"expectation {text!r}: {error.problem}"
             raise InputError(msg) from error
@@ -128,13 +99,14 @@ def parse_expectation(text: str) -> Expectation:
         name=name,
         op=match["op"],
         bound=bound,
-        share=name in COUNTS and (percent or written_as_share),
+        share=figure.count and (percent or written_as_share),
     )
 
 
 def needs_criticality(expectations: Iterable[Expectation]) -> bool:
     """Whether one of them is about how close road users came, which is not measured by itself."""
-    return any(expectation.name in CONFLICT_FIGURES for expectation in expectations)
+    figures = (run_figure(expectation.name) for expectation in expectations)
+    return any(figure is not None and figure.basis is Basis.CONFLICTS for figure in figures)
 
 
 def evaluate(
@@ -154,16 +126,9 @@ def _verdict(expectation: Expectation, summary: Mapping[str, Any]) -> Verdict:
 
 
 def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
-    if expectation.name in COUNTS:
-        actors = summary.get("actors") or {}
-        count = actors.get(expectation.name)
-        if count is None:
-            return None
-        if not expectation.share:
-            return float(count)
-        return count / actors["planned"] if actors["planned"] else None
-    if expectation.name == "sim_seconds":
-        value = summary.get("sim_seconds")
-    else:
-        value = (summary.get("figures") or {}).get(expectation.name)
-    return None if value is None else float(value)
+    figure = run_figure(expectation.name)
+    value = None if figure is None else figure.of_summary(summary)
+    if value is None or not expectation.share:
+        return value
+    planned = summary["actors"]["planned"]
+    return value / planned if planned else None

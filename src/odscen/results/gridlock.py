@@ -1,4 +1,4 @@
-"""Where traffic got stuck, from the events of a run: jams, vehicles moved on, vehicles kept out.
+"""Incidents of traffic, from the events of a run: jams, teleports, vehicles not inserted.
 
 Pure; the reasons were found while the simulation went (:mod:`odscen.sumo.jams`).
 """
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from odscen.results.outcomes import ActorStatus, IncidentKind, StopReason, stop_reason
 from odscen.results.records import EventKind, rounded
 
 if TYPE_CHECKING:
@@ -17,43 +18,35 @@ if TYPE_CHECKING:
     from odscen.results.records import Event, Plan, PlannedActor
     from odscen.results.summary import ActorOutcome
 
-TroubleKind = Literal["jam", "moved_on", "kept_out"]
-
 LISTED = 200
 """Rows in ``summary.json`` at most; the counts are of all."""
 
-NO_ROOM_TO_START = "no room where they start"
-UNKNOWN = "the reason does not show"
-
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
-    """A place where traffic got stuck.
+class Incident:
+    """Vehicles gridlocked, teleported or not inserted at a place.
 
     Attributes
     ----------
-    kind
-        ``jam``: somebody stood for minutes; ``moved_on``: SUMO took a vehicle out and put it back
-        further on (a teleport); ``kept_out``: planned but never on the road.
     time
         Seconds: since when.
     until
-        Seconds: until when; ``None`` for a jam that did not dissolve, and for those kept out.
+        Seconds: until when; ``None`` for a jam that did not dissolve, and if not inserted.
     actor
         Who was first in it.
     count
-        How many stood in the jam when it was found, or were kept out at this place.
+        How many were stopped in the jam when it was found, or were not inserted at this place.
     x, y
         Metres, OpenDRIVE frame; ``None`` if unknown.
     lane
         SUMO lane, ``None`` if unknown.
     place
-        Lane-graph node where those kept out were to start, else ``None``.
+        Lane-graph node where those not inserted were to depart, else ``None``.
     reason
-        In words, as far as it shows.
+        As far as it shows; of an actor without a route in words of its own.
     """
 
-    kind: TroubleKind
+    kind: IncidentKind
     time: float
     until: float | None
     actor: str
@@ -62,46 +55,47 @@ class Trouble:
     y: float | None
     lane: str | None
     place: str | None
-    reason: str
+    reason: StopReason | str
 
 
-def find_trouble(
+def find_incidents(
     plan: Plan, outcomes: Sequence[ActorOutcome], events: Iterable[Event], *, end: float
-) -> tuple[Trouble, ...]:
-    """Every place where traffic got stuck.
+) -> tuple[Incident, ...]:
+    """All incidents of a run.
 
     Jams that did not dissolve come first, then other jams by how long they lasted, then places
-    where vehicles were kept out by their number, then vehicles moved on.
+    where vehicles were not inserted by their number, then teleports.
 
     Parameters
     ----------
     end
-        When the run ended, seconds; who was to depart later has not been kept out.
+        When the run ended, seconds; who was to depart later is not missed.
     """
-    found = [*_on_the_road(events), *_kept_out(plan, outcomes, end)]
+    found = [*_on_the_road(events), *_not_inserted(plan, outcomes, end)]
     return tuple(sorted(found, key=_order))
 
 
-def _order(one: Trouble) -> tuple[int, float, float]:
-    if one.kind == "jam":
+def _order(one: Incident) -> tuple[int, float, float]:
+    if one.kind is IncidentKind.JAM:
         return (0, one.time, 0.0) if one.until is None else (1, one.time - one.until, one.time)
-    return (2, -one.count, one.time) if one.kind == "kept_out" else (3, one.time, 0.0)
+    not_inserted = one.kind is IncidentKind.NOT_INSERTED
+    return (2, -one.count, one.time) if not_inserted else (3, one.time, 0.0)
 
 
-def trouble_summary(found: Sequence[Trouble]) -> dict[str, Any]:
+def incident_summary(found: Sequence[Incident]) -> dict[str, Any]:
     """Counts of all, and the first :data:`LISTED`, for ``summary.json``."""
     kinds = Counter(one.kind for one in found)
-    kept_out = sum(one.count for one in found if one.kind == "kept_out")
+    not_inserted = sum(one.count for one in found if one.kind is IncidentKind.NOT_INSERTED)
     return {
-        "jams": kinds["jam"],
-        "jams_at_the_end": sum(one.kind == "jam" and one.until is None for one in found),
-        "moved_on": kinds["moved_on"],
-        "kept_out": kept_out,
+        "jams": kinds[IncidentKind.JAM],
+        "jams_at_the_end": sum(one.kind is IncidentKind.JAM and one.until is None for one in found),
+        "moved_on": kinds[IncidentKind.TELEPORTED],
+        "kept_out": not_inserted,
         "places": [rounded(asdict(one)) for one in found[:LISTED]],
     }
 
 
-def _on_the_road(events: Iterable[Event]) -> list[Trouble]:
+def _on_the_road(events: Iterable[Event]) -> list[Incident]:
     open_jams: dict[str, Event] = {}
     found = []
     for event in events:
@@ -113,13 +107,13 @@ def _on_the_road(events: Iterable[Event]) -> list[Trouble]:
                 since = begin.time - (begin.waited or 0.0)
                 found.append(_jam(begin, since + (event.waited or 0.0)))
         elif event.kind is EventKind.TELEPORT_START:
-            found.append(_moved_on(event))
+            found.append(_teleported(event))
     return [*found, *(_jam(begin, None) for begin in open_jams.values())]
 
 
-def _jam(begin: Event, until: float | None) -> Trouble:
-    return Trouble(
-        kind="jam",
+def _jam(begin: Event, until: float | None) -> Incident:
+    return Incident(
+        kind=IncidentKind.JAM,
         time=begin.time - (begin.waited or 0.0),
         until=until,
         actor=begin.actor,
@@ -128,13 +122,13 @@ def _jam(begin: Event, until: float | None) -> Trouble:
         y=begin.y,
         lane=begin.lane,
         place=None,
-        reason=begin.detail or UNKNOWN,
+        reason=stop_reason(begin.detail),
     )
 
 
-def _moved_on(event: Event) -> Trouble:
-    return Trouble(
-        kind="moved_on",
+def _teleported(event: Event) -> Incident:
+    return Incident(
+        kind=IncidentKind.TELEPORTED,
         time=event.time - (event.waited or 0.0),
         until=event.time,
         actor=event.actor,
@@ -143,19 +137,19 @@ def _moved_on(event: Event) -> Trouble:
         y=event.y,
         lane=event.lane,
         place=None,
-        reason=event.detail or UNKNOWN,
+        reason=stop_reason(event.detail),
     )
 
 
-def _kept_out(plan: Plan, outcomes: Sequence[ActorOutcome], end: float) -> list[Trouble]:
+def _not_inserted(plan: Plan, outcomes: Sequence[ActorOutcome], end: float) -> list[Incident]:
     groups: dict[tuple[str, str], list[PlannedActor]] = {}
     for actor, outcome in zip(plan.actors, outcomes, strict=True):
-        if outcome.status == "waiting" and actor.depart < end:
-            reason = actor.problem or NO_ROOM_TO_START
+        if outcome.status is ActorStatus.WAITING and actor.depart < end:
+            reason = actor.problem or StopReason.NO_ROOM_TO_START
             groups.setdefault((actor.spawn, reason), []).append(actor)
     return [
-        Trouble(
-            kind="kept_out",
+        Incident(
+            kind=IncidentKind.NOT_INSERTED,
             time=first.depart,
             until=None,
             actor=first.id,

@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 from odscen.catalog.markup import Markup, element, join, number
 from odscen.results.curves import presence
-from odscen.results.gridlock import find_trouble
+from odscen.results.gridlock import find_incidents
+from odscen.results.measures.figure import RunData, SummaryPart
+from odscen.results.measures.registry import figure_values
+from odscen.results.outcomes import RunStatus
 from odscen.results.plots import Series, line_chart
 from odscen.results.report_conflicts import conflict_section
 from odscen.results.report_corridor import corridor_section
@@ -31,10 +34,9 @@ from odscen.results.report_tables import (
     expectation_table,
     report_section,
 )
-from odscen.results.report_trouble import trouble_section
+from odscen.results.report_trouble import incident_section
 from odscen.results.report_walking import walking_section
 from odscen.results.report_words import duration
-from odscen.results.summary import actor_counts, key_figures
 from odscen.results.traces import bin_width, speed_over_time, tidy, travel
 
 if TYPE_CHECKING:
@@ -43,7 +45,8 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.catalog.drawing import MapDrawing
-    from odscen.results.gridlock import Trouble
+    from odscen.results.gridlock import Incident
+    from odscen.results.measures.figure import Values
     from odscen.results.place_shapes import PlaceShapes
     from odscen.results.records import Event, Plan
     from odscen.results.report_corridor import CorridorTraces
@@ -77,7 +80,7 @@ def render_report(
     plan
         What the run was to do; names the scenario and gives the frame of the trajectories.
     actors
-        What became of each actor, as in ``actors.json``.
+        Outcome of each actor, as in ``actors.json``.
     events
         What happened, as in ``events.json``.
     trajectories
@@ -103,15 +106,17 @@ def render_report(
     categories = {actor.id: actor.category for actor in actors}
     traces = tidy(trajectories, categories, net_offset=plan.net_offset)
     end = _end(summary, traces)
-    trouble = find_trouble(plan, actors, events, end=end)
+    incidents = find_incidents(plan, actors, events, end=end)
     title = plan.scenario or "Run"
-    given = summary.get("figures") or key_figures(actors)
+    run = RunData(actors, figures, conflicts=conflicts)
+    counts = figure_values(run, part=SummaryPart.ACTORS)
+    given = summary.get("figures") or figure_values(run)
     body = [
-        _head(title, plan, summary, _in_a_sentence(actors)),
-        key_figure_section(given, actors, traces),
+        _head(title, plan, summary, _in_a_sentence(counts)),
+        key_figure_section({**given, **counts}, traces),
         service_section(figures, shapes) if figures else None,
-        _map_section(traces, plan, actors, events, drawing, trouble, every),
-        trouble_section(trouble),
+        _map_section(traces, plan, actors, events, drawing, incidents, every),
+        incident_section(incidents),
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
         corridor_section(corridor) if corridor is not None else None,
         _speed_section(traces, end),
@@ -160,37 +165,37 @@ def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
 
 def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
     """Class and words."""
-    status = str(summary.get("status", "completed"))
+    status = str(summary.get("status", RunStatus.COMPLETED))
     expectations = summary.get("expectations") or ()
     missed = sum(not row.get("passed") for row in expectations)
-    if status == "failed":
+    if status == RunStatus.FAILED:
         return "bad", "The run failed"
-    words = {"completed": "Completed", "stopped": "Stopped early"}.get(status, status)
+    words = "Completed" if status == RunStatus.COMPLETED else status
     if missed:
         return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
     if expectations:
         met = "expectation met" if len(expectations) == 1 else "all expectations met"
         return "good", f"{words}, {met}"
-    return ("good" if status == "completed" else "fair"), words
+    return ("good" if status == RunStatus.COMPLETED else "fair"), words
 
 
-def _in_a_sentence(actors: Sequence[ActorOutcome]) -> str:
-    """What became of the actors, in one sentence for people."""
-    counts = actor_counts(actors)
+def _in_a_sentence(counts: Values) -> str:
+    """Outcomes of the actors, in one sentence for people."""
     if not counts["planned"]:
         return ""
-    parts = [f"{counts['arrived']:,} of {counts['planned']:,} actors reached their goal"]
+    parts = [f"{counts['arrived']:,} of {counts['planned']:,} road users arrived"]
     if counts["running"]:
         verb = "was" if counts["running"] == 1 else "were"
-        parts.append(f"{counts['running']:,} {verb} still on the way at the end")
+        parts.append(f"{counts['running']:,} {verb} still under way at the end")
     if counts["waiting"]:
-        parts.append(f"{counts['waiting']:,} never entered the road")
-    trouble = [
+        verb = "was" if counts["waiting"] == 1 else "were"
+        parts.append(f"{counts['waiting']:,} {verb} not inserted")
+    incidents = [
         f"{counts[key]:,} {word}"
-        for key, word in (("teleported", "had to be teleported"), ("collided", "collided"))
+        for key, word in (("teleported", "teleported"), ("collided", "collided"))
         if counts[key]
     ]
-    parts += trouble or ["nobody was teleported or collided"]
+    parts += incidents or ["none was teleported or collided"]
     return "; ".join(parts) + "."
 
 
@@ -232,19 +237,19 @@ def _map_section(
     actors: Sequence[ActorOutcome],
     events: Sequence[Event],
     drawing: MapDrawing | None,
-    trouble: Sequence[Trouble],
+    incidents: Sequence[Incident],
     every: int,
 ) -> Markup | None:
-    figure = run_map(traces, plan, actors, events, drawing, trouble=trouble)
+    figure = run_map(traces, plan, actors, events, drawing, incidents=incidents)
     if figure is None:
         return None
     explained = (
         "every line is the way of one actor; point at it to see whose. Switch to mean speed to see "
         "where traffic was slow: red places stood, blue places flowed."
     )
-    if trouble:
+    if incidents:
         explained += (
-            " Numbered rings are places where traffic got stuck; the table below has them. Where "
+            " Numbered rings are incidents: gridlock, teleports; the table below has them. Where "
             "rings crowd, one has its number; point at the others for theirs."
         )
     if every > 1:

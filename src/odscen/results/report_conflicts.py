@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.markup import Markup, element, number
 from odscen.results.conflicts import (
-    SEEN_DRAC,
-    SEEN_PET,
-    SEEN_TTC,
     SERIOUS_DRAC,
     SERIOUS_PET,
     SERIOUS_TTC,
-    conflict_figures,
     is_serious,
 )
-from odscen.results.report_figures import Card, card_grid
+from odscen.results.measures.figure import ReportSection, RunData
+from odscen.results.measures.registry import figure_values
+from odscen.results.report_figures import card_grid, figure_cards
 from odscen.results.report_tables import html_table, report_section
 
 if TYPE_CHECKING:
@@ -25,10 +23,10 @@ SHOWN = 15
 """Rows of the table at most."""
 
 KINDS = {
-    "following": "in a line",
+    "following": "following",
     "merging": "merging",
     "crossing": "crossing",
-    "walking": "on foot",
+    "walking": "with a pedestrian",
 }
 
 
@@ -40,21 +38,14 @@ def conflict_section(conflicts: pl.DataFrame) -> Markup:
     conflicts
         As :func:`~odscen.results.conflicts.conflict_table` gives them.
     """
-    figures = conflict_figures(conflicts)
-    serious = round(figures["serious_conflicts"])
-    on_foot = (conflicts["kind"] == "walking").any()
-    cards = [
-        Card("serious conflicts", f"{serious:,}", f"of {conflicts.height:,} seen", bad=serious > 0),
-        Card("shortest time to collision", _least(figures["min_ttc"], SEEN_TTC), "of vehicles"),
-        Card("shortest time between", _least(figures["min_pet"], SEEN_PET), "two at one spot"),
-        Card("hardest braking needed", _drac(figures["max_drac"]), "to avoid a crash"),
-    ]
-    if on_foot:
-        closest = _least(figures["pedestrian_min_pet"], SEEN_PET)
-        cards.append(Card("shortest time to somebody on foot", closest, "at one spot"))
+    values = {**figure_values(RunData(conflicts=conflicts)), "conflicts": conflicts.height}
+    if not (conflicts["kind"] == "walking").any():
+        del values["pedestrian_min_pet"]
+    cards = figure_cards(ReportSection.CONFLICTS, values)
     explained = (
-        "the time to collision is what is left until two crash if both go on as they do; the time "
-        "between two is from when the first leaves a spot until the other is there. A conflict is "
+        "the time to collision is what is left until two crash if both continue as they do; the "
+        "post-encroachment time is from when the first leaves a spot until the other is there. A "
+        "conflict is "
         f"serious if these are below {SERIOUS_TTC:g} s and {SERIOUS_PET:g} s, or if more than "
         f"{SERIOUS_DRAC:g} m/s\u00b2 of braking is needed. Where they gather, look "
         "at sight, speed and right of way. A simulator's drivers see everything and hardly "
@@ -103,14 +94,4 @@ def _row(row: dict[str, Any], bad: bool) -> Markup:
             for name in ("ttc", "pet", "drac")
         ),
         element("td", place),
-    )
-
-
-def _least(value: float, seen: float) -> str:
-    return f"{number(value, 2)} s" if value < seen else f"over {seen:g} s"
-
-
-def _drac(value: float) -> str:
-    return (
-        f"{number(value, 1)} m/s\u00b2" if value > SEEN_DRAC else f"under {SEEN_DRAC:g} m/s\u00b2"
     )

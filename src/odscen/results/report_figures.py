@@ -1,20 +1,21 @@
-"""Key figures of the report, as cards."""
+"""Figures of the report, as cards."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.catalog.markup import Markup, element, number
+from odscen.results.measures.figure import Better, ReportSection
+from odscen.results.measures.registry import RUN_FIGURES
 from odscen.results.report_tables import report_section
 from odscen.results.report_words import duration
-from odscen.results.summary import actor_counts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     import polars as pl
 
-    from odscen.results.summary import ActorOutcome
+    from odscen.results.measures.figure import RunFigure
 
 
 class Card(NamedTuple):
@@ -41,107 +42,67 @@ def card_grid(cards: Iterable[Card]) -> Markup:
     return element("div", *shown, class_="cards")
 
 
-def key_figure_section(
-    figures: Mapping[str, Any], actors: Sequence[ActorOutcome], traces: pl.DataFrame
-) -> Markup:
-    """Section of the cards.
+def figure_cards(section: ReportSection, values: Mapping[str, Any]) -> list[Card]:
+    """Cards of all figures of a section that the run has.
 
     Parameters
     ----------
-    figures
-        Of the run, by name, SI units; those missing or ``None`` have no card.
+    values
+        Figures and counts of the run by name, in the units of the registry.
+    """
+    return [
+        _card(figure, float(value), values)
+        for figure in RUN_FIGURES
+        if figure.section is section and (value := values.get(figure.name)) is not None
+    ]
+
+
+def key_figure_section(values: Mapping[str, Any], traces: pl.DataFrame) -> Markup:
+    """ReportSection of the cards.
+
+    Parameters
+    ----------
+    values
+        As for :func:`figure_cards`.
     traces
         As :func:`~odscen.results.traces.tidy` gives them.
     """
     explained = (
-        "an actor is one vehicle or pedestrian. It has entered the road when the simulation could "
-        "place it, and teleported when it was stuck so long that the simulator moved it on. Time "
-        "is lost by whoever drives more slowly than the driver would like to on a free road."
+        "a road user is one vehicle or pedestrian. It is inserted when the simulation could place "
+        "it on the road, and teleported when it was gridlocked: removed after it had waited too "
+        "long, and put back further on. Delay is the time lost below the speed that the driver "
+        "desires on a free road, stopped delay the part of it below 0.1 m/s."
     )
-    cards = [
-        *_counts(actors),
-        *_travel(figures, traces),
-        *_reliability(figures),
-        *_consumption(figures),
-        *_start(figures),
-    ]
+    cards = [*figure_cards(ReportSection.KEY_FIGURES, values), *_speed_on_the_road(traces)]
     return report_section("Key figures", card_grid(cards), explained=explained, ident="figures")
 
 
-def _counts(actors: Sequence[ActorOutcome]) -> list[Card]:
-    counts = actor_counts(actors)
-    planned, inserted, arrived = (counts[key] for key in ("planned", "inserted", "arrived"))
-    cards = [
-        Card("actors planned", f"{planned:,}"),
-        Card("entered the road", f"{inserted:,}", _share(inserted, planned)),
-        Card("reached their goal", f"{arrived:,}", _share(arrived, planned)),
-    ]
-    for key in ("teleported", "collided"):
-        count = counts[key]
-        cards.append(Card(key, f"{count:,}", "" if count else "none: good", bad=count > 0))
-    return cards
+def shown_value(figure: RunFigure, value: float) -> str:
+    """``"36 km/h"``: a value as people read it; at the limit of what is recorded, just that."""
+    display = figure.shown
+    if figure.limit is not None and value == figure.limit:
+        beyond = "over" if figure.better is Better.HIGHER else "under"
+        return f"{beyond} {value * display.factor:g} {display.unit}"
+    if display.clock:
+        return duration(value)
+    scaled = value * display.factor
+    digits = display.digits if abs(scaled) < 1000.0 else 0
+    text = f"{scaled:,.0f}" if digits == 0 else number(scaled, digits)
+    return f"{text} {display.unit}".rstrip()
 
 
-def _travel(figures: Mapping[str, Any], traces: pl.DataFrame) -> list[Card]:
-    driven = traces.filter(traces["category"] != "pedestrian")["speed"].mean()
-    cards = [
-        Card("mean travel time", duration(figures.get("mean_travel_time")) or "-",
-             "of vehicles that arrived"),
-        Card("mean speed of vehicles", _kmh(driven), "stops included"),
-    ]  # fmt: skip
-    for name, words, note in (
-        ("mean_delay", "lost per vehicle", "against driving freely"),
-        ("mean_waiting_time", "stood per vehicle", "on average"),
-        ("worst_junction_delay", "lost at the worst junction", "by each vehicle there"),
-    ):
-        if (value := figures.get(name)) is not None:
-            cards.append(Card(words, duration(value), note))
-    if (stops := figures.get("mean_stops")) is not None:
-        cards.append(Card("stops per vehicle", number(stops, 1), "on average"))
-    return cards
+def _card(figure: RunFigure, value: float, values: Mapping[str, Any]) -> Card:
+    note = figure.note if isinstance(figure.note, str) else figure.note(values)
+    planned = values.get("planned")
+    if figure.count and figure.better is Better.HIGHER and planned:
+        note = f"{number(100.0 * value / planned, 1)} % of the planned"
+    elif figure.alarming and not value:
+        note = "none: good"
+    return Card(figure.label, shown_value(figure, value), note, bad=figure.alarming and value > 0)
 
 
-def _reliability(figures: Mapping[str, Any]) -> list[Card]:
-    cards = []
-    if (index := figures.get("travel_time_index")) is not None:
-        note = "so many times as long as on a free road"
-        cards.append(Card("a trip takes", f"{number(index, 2)} times", note))
-    if (index := figures.get("planning_time_index")) is not None:
-        note = "the time on a free road, to be in time 19 times in 20"
-        cards.append(Card("to allow for a trip", f"{number(index, 2)} times", note))
-    return cards
-
-
-def _consumption(figures: Mapping[str, Any]) -> list[Card]:
-    cards = []
-    arrived, driven = figures.get("throughput"), figures.get("vehicle_km")
-    if driven is not None:
-        note = "" if arrived is None else f"{number(arrived, 0)} arrived an hour"
-        cards.append(Card("driven by all vehicles", f"{driven:,.0f} km", note))
-    if (each := figures.get("co2_per_km")) is not None:
-        cards.append(Card("CO2 per vehicle and km", f"{number(each, 0)} g", _total(figures, "co2")))
-    fuel = figures.get("fuel_total")
-    if fuel is not None and driven:
-        value = f"{number(fuel * 1000.0 / driven, 0)} g"
-        cards.append(Card("fuel per vehicle and km", value, _total(figures, "fuel")))
-    return cards
-
-
-def _total(figures: Mapping[str, Any], name: str) -> str:
-    total = figures.get(f"{name}_total")
-    return "" if total is None else f"{total:,.0f} kg in all"
-
-
-def _start(figures: Mapping[str, Any]) -> list[Card]:
-    error = figures.get("insertion_error_max")
-    if not isinstance(error, int | float):
-        return []
-    return [Card("largest start error", f"{error * 100:.1f} cm", "from the planned place")]
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{number(100.0 * part / whole, 1)} % of the planned" if whole else ""
-
-
-def _kmh(speed: object) -> str:
-    return f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
+def _speed_on_the_road(traces: pl.DataFrame) -> list[Card]:
+    """Mean of all vehicles at all times, those included that have not arrived."""
+    speed = traces.filter(traces["category"] != "pedestrian")["speed"].mean()
+    text = f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
+    return [Card("mean speed on the road", text, "of all vehicles, stops included")]

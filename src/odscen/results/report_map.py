@@ -12,7 +12,7 @@ from odscen.catalog.layers import LayerOptions, map_layers
 from odscen.catalog.markup import Markup, element, number, path_data
 from odscen.catalog.render import length_text, round_length
 from odscen.results.records import EventKind
-from odscen.results.report_trouble import trouble_rings
+from odscen.results.report_trouble import incident_rings
 from odscen.results.traces import speed_by_place, thinned_paths
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.catalog.drawing import Bounds, MapDrawing
-    from odscen.results.gridlock import Trouble
+    from odscen.results.gridlock import Incident
     from odscen.results.records import Event, Plan
     from odscen.results.summary import ActorOutcome
     from odscen.results.traces import Paths, SpeedCells
@@ -57,7 +57,7 @@ def run_map(
     events: Sequence[Event],
     drawing: MapDrawing | None,
     *,
-    trouble: Sequence[Trouble] = (),
+    incidents: Sequence[Incident] = (),
 ) -> Markup | None:
     """Build the figure: controls, drawing, legend; ``None`` if nothing has a place.
 
@@ -71,8 +71,8 @@ def run_map(
         What became of them and what happened.
     drawing
         The map to draw below the ways, if there is one.
-    trouble
-        Places where traffic got stuck, in the order of the report's table.
+    incidents
+        In the order of the report's table.
     """
     paths = thinned_paths(traces)
     spawns = np.array([(actor.x, actor.y) for actor in plan.actors]).reshape(-1, 2)
@@ -93,7 +93,7 @@ def run_map(
     layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
-    layers += [rings] if (rings := trouble_rings(trouble, extent / 400.0)) else []
+    layers += [rings] if (rings := incident_rings(incidents, extent / 400.0)) else []
     svg = element(
         "svg",
         element("title", "Map of the run: the ways of all actors"),

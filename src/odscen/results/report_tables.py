@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.markup import Markup, element, number
+from odscen.results.outcomes import reason_label, stop_reason
 from odscen.results.records import EventKind
 
 if TYPE_CHECKING:
@@ -22,11 +23,11 @@ PRINTED_ACTORS = 100
 
 EVENT_LIMIT = 300
 
-_STUCK = "Usually a blocked lane, or a turn that the traffic never left room for."
+_STUCK = "Usually a blocked lane, or a turn that other traffic never left room for."
 
 EVENT_WORDS = {
-    EventKind.TELEPORT_START: ("was stuck too long and was lifted off the road", _STUCK),
-    EventKind.TELEPORT_END: ("was put back on the road further on", ""),
+    EventKind.TELEPORT_START: ("was gridlocked and teleported", _STUCK),
+    EventKind.TELEPORT_END: ("was put back on the road after its teleport", ""),
     EventKind.COLLISION: (
         "collided",
         "Two bodies overlapped; often at a junction without signals, or after a teleport.",
@@ -42,13 +43,7 @@ EVENT_WORDS = {
 }
 """What happened and why that may be, for the events worth telling."""
 
-_NEVER = ("never entered the road", "Its start was never free, or the run ended before its turn.")
-
-STATUS_WORDS = {
-    "arrived": "arrived",
-    "running": "still on its way",
-    "waiting": "never entered",
-}
+_NEVER = ("was not inserted", "Its start was never free, or the run ended before its turn.")
 
 
 def report_section(heading: str, *children: Markup | None, explained: str, ident: str) -> Markup:
@@ -125,7 +120,7 @@ def _event(event: Event) -> Markup:
     if event.x is not None and event.y is not None:
         words += f" at x {number(event.x, 1)} m, y {number(event.y, 1)} m"
     if event.detail:
-        words += f" ({event.detail})"
+        words += f" ({reason_label(stop_reason(event.detail))})"
     return _item(event.time, event.actor, words, reason)
 
 
@@ -159,7 +154,7 @@ _COLUMNS = (
 def actor_table(actors: Sequence[ActorOutcome], travel: ActorTravel) -> Markup:
     """One row per actor; the page's script sorts and filters it."""
     rows = [_actor_row(row, travel) for row in actors[:ACTOR_LIMIT]]
-    field = element("input", type="search", id="filter", placeholder="car, never entered, ...")
+    field = element("input", type="search", id="filter", placeholder="car, not inserted, ...")
     control = element("label", "Show only rows with ", field, class_="filter")
     more = None
     if len(actors) > ACTOR_LIMIT:
@@ -197,7 +192,7 @@ def _actor_row(actor: ActorOutcome, travel: ActorTravel) -> Markup:
         element("td", element("i", class_=f"swatch c-{actor.category}"), actor.category),
         element("td", actor.model or ""),
         *(element("td", text, class_="n") for text in numbers),
-        element("td", STATUS_WORDS.get(actor.status, actor.status)),
+        element("td", actor.status.label),
     ]
     return element("tr", *cells)
 

@@ -1,4 +1,4 @@
-"""People on foot: how fast they walk, and how long they wait."""
+"""Pedestrians: how fast they walk, and how long they wait."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.catalog.markup import Markup, number
+from odscen.results.measures.figure import ReportSection
+from odscen.results.outcomes import ActorStatus
 from odscen.results.plots import Series, line_chart
-from odscen.results.report_figures import Card, card_grid
+from odscen.results.report_figures import Card, card_grid, figure_cards
 from odscen.results.report_tables import report_section
-from odscen.results.report_words import duration
 from odscen.results.traces import bin_width, speed_over_time
 
 if TYPE_CHECKING:
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.catalog.markup import Markup
     from odscen.results.summary import ActorOutcome
-
-_PREFIX = "pedestrian_"
 
 
 def walking_section(
@@ -35,31 +34,24 @@ def walking_section(
     Parameters
     ----------
     figures
-        Of the run; those of people on foot begin with ``pedestrian_``.
+        Of the run by name.
     traces
         As :func:`~odscen.results.traces.tidy` gives them.
     """
     walkers = [actor for actor in actors if actor.category == "pedestrian"]
     if not walkers:
         return None
-    arrived = sum(actor.status == "arrived" for actor in walkers)
-    speed = figures.get(_PREFIX + "mean_speed")
-    cards = [Card("people on foot", f"{len(walkers):,}", f"{arrived:,} reached their goal")]
-    for name, words, note in (
-        ("mean_travel_time", "mean time on the way", "of those who arrived"),
-        ("mean_waiting_time", "stood on average", "mostly at crossings"),
-        ("mean_delay", "lost on average", "against walking freely"),
-    ):
-        if (seconds := figures.get(_PREFIX + name)) is not None:
-            cards.append(Card(words, duration(seconds), note))
-    if (speed := figures.get(_PREFIX + "mean_speed")) is not None:
-        cards.append(Card("mean walking speed", f"{number(speed, 2)} m/s", "waiting included"))
+    arrived = sum(actor.status is ActorStatus.ARRIVED for actor in walkers)
+    cards = [
+        Card("pedestrians", f"{len(walkers):,}", f"{arrived:,} arrived"),
+        *figure_cards(ReportSection.PEDESTRIANS, figures),
+    ]
     parts: list[Markup | None] = [card_grid(cards)]
     on_foot = traces.filter(traces["category"] == "pedestrian")
     if not on_foot.is_empty():
         curve = speed_over_time(on_foot, end=end, width=bin_width(end, bins=60))
         if np.isfinite(curve.mean).sum() > 1:
-            line = Series("mean of all people on foot", "c-pedestrian", curve.mean, curve.low,
+            line = Series("mean of all pedestrians", "c-pedestrian", curve.mean, curve.low,
                           curve.high)  # fmt: skip
             text = "Mean walking speed over time"
             chart = line_chart(
@@ -71,4 +63,4 @@ def walking_section(
         "any time at least one in ten stands, mostly before a red light or a busy road; much "
         "waiting asks for a crossing, or for more green for those who walk."
     )
-    return report_section("People on foot", *parts, explained=explained, ident="walking")
+    return report_section("Pedestrians", *parts, explained=explained, ident="walking")

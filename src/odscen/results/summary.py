@@ -1,4 +1,4 @@
-"""From plan, events and trips to what became of each actor, and the figures of a run.
+"""From plan, events and trips to the outcome of each actor.
 
 Everything here is a pure function of plan, events and trips; wall-clock figures are added by the
 runner to ``summary.json`` only, so that all other files of a run are the same bytes for the same
@@ -8,14 +8,15 @@ seed.
 from __future__ import annotations
 
 import json
-from collections import Counter, defaultdict
+from collections import defaultdict
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import orjson
 
 from odscen.errors import InputError
+from odscen.results.outcomes import ActorStatus
 from odscen.results.records import (
     ACTORS_FORMAT,
     VERSION,
@@ -23,16 +24,12 @@ from odscen.results.records import (
     EventKind,
     Plan,
     PlannedActor,
-    rounded,
     row_text,
     text_with_rows,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-ActorStatus = Literal["arrived", "running", "waiting"]
-"""``waiting``: planned, but not inserted when the run ended; ``running``: under way then."""
+    from collections.abc import Iterable, Iterator, Mapping
 
 
 class Trip(NamedTuple):
@@ -106,7 +103,7 @@ _COLUMNS = tuple(field.name for field in fields(ActorOutcome))
 
 
 @dataclass(slots=True)
-class _Fate:
+class _ActorHistory:
     """What has been heard of an actor so far."""
 
     departure: Event | None = None
@@ -133,28 +130,28 @@ _NO_TRIPS: Mapping[str, Trip] = MappingProxyType({})
 _NO_TRIP = Trip(None, None, None)
 
 
-class Fates:
-    """What becomes of the actors of a plan, told bit by bit."""
+class Outcomes:
+    """Outcomes of the actors of a plan, from reports that come bit by bit."""
 
     def __init__(self, plan: Plan) -> None:
         self._actors = {actor.id: actor for actor in plan.actors}
-        self._fates: defaultdict[str, _Fate] = defaultdict(_Fate)
+        self._histories: defaultdict[str, _ActorHistory] = defaultdict(_ActorHistory)
         self._trips: dict[str, Trip] = {}
         self._rows: dict[str, str] = {}
 
     def hear(self, events: Iterable[Event], trips: Mapping[str, Trip] = _NO_TRIPS) -> None:
         """Take in what has happened, in order of time, and what was measured, by id."""
-        fates = self._fates
+        histories = self._histories
         for event in events:
-            fates[event.actor].hear(event)
+            histories[event.actor].hear(event)
             if event.kind is EventKind.COLLISION and event.partner not in (None, event.actor):
-                fates[str(event.partner)].hear(event)
+                histories[str(event.partner)].hear(event)
         self._trips.update(trips)
 
     def settle(self) -> None:
         """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker."""
-        for name, fate in self._fates.items():
-            if fate.arrival is not None and name in self._actors and name not in self._rows:
+        for name, history in self._histories.items():
+            if history.arrival is not None and name in self._actors and name not in self._rows:
                 self._rows[name] = outcome_row(self._outcome(name))
 
     def outcomes(self) -> tuple[ActorOutcome, ...]:
@@ -167,8 +164,8 @@ class Fates:
             yield self._rows.get(name) or outcome_row(self._outcome(name))
 
     def _outcome(self, name: str) -> ActorOutcome:
-        fate = self._fates.get(name) or _Fate()
-        return _outcome(self._actors[name], fate, self._trips.get(name, _NO_TRIP))
+        history = self._histories.get(name) or _ActorHistory()
+        return _outcome(self._actors[name], history, self._trips.get(name, _NO_TRIP))
 
 
 def actor_outcomes(
@@ -181,14 +178,20 @@ def actor_outcomes(
     trips
         By id; whoever has none has no delay, waiting time and stops.
     """
-    fates = Fates(plan)
-    fates.hear(events, trips)
-    return fates.outcomes()
+    found = Outcomes(plan)
+    found.hear(events, trips)
+    return found.outcomes()
 
 
-def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
-    departure, arrival = fate.departure, fate.arrival
-    status: ActorStatus = "arrived" if arrival else "running" if departure else "waiting"
+def _outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOutcome:
+    departure, arrival = history.departure, history.arrival
+    status = (
+        ActorStatus.ARRIVED
+        if arrival
+        else ActorStatus.RUNNING
+        if departure
+        else ActorStatus.WAITING
+    )
     inserted = departure.time if departure else None
     travel_time = arrival.travel_time if arrival else None
     mean_speed = None
@@ -213,9 +216,9 @@ def _outcome(actor: PlannedActor, fate: _Fate, trip: Trip) -> ActorOutcome:
         delay=trip.time_loss if arrival else None,
         route_length=actor.route_length,
         mean_speed=mean_speed,
-        teleports=fate.teleports,
-        collisions=fate.collisions,
-        emergency_stops=fate.emergency_stops,
+        teleports=history.teleports,
+        collisions=history.collisions,
+        emergency_stops=history.emergency_stops,
         problem=actor.problem,
         time_loss=trip.time_loss,
         waiting_time=trip.waiting_time,
@@ -251,87 +254,13 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
         if (data["format"], data["version"]) != (ACTORS_FORMAT, VERSION):
             msg = f"format {data['format']!r} version {data['version']!r} is not a list of actors"
             raise InputError(msg)
-        return tuple(ActorOutcome(**actor) for actor in data["actors"])
+        return tuple(
+            ActorOutcome(**{**actor, "status": ActorStatus(actor["status"])})
+            for actor in data["actors"]
+        )
     except (KeyError, TypeError, ValueError) as error:
         msg = f"not a list of actors: {error!r}"
         raise InputError(msg) from error
-
-
-def actor_counts(outcomes: Sequence[ActorOutcome]) -> dict[str, int]:
-    """How many actors were planned, and how many of them met each fate.
-
-    ``inserted`` = ``arrived`` + ``running``; ``planned`` = ``inserted`` + ``waiting``.
-    ``teleported`` and ``collided`` count actors, not events.
-    """
-    status = Counter(outcome.status for outcome in outcomes)
-    return {
-        "planned": len(outcomes),
-        "inserted": status["arrived"] + status["running"],
-        "arrived": status["arrived"],
-        "running": status["running"],
-        "waiting": status["waiting"],
-        "teleported": sum(outcome.teleports > 0 for outcome in outcomes),
-        "collided": sum(outcome.collisions > 0 for outcome in outcomes),
-        "emergency_stopped": sum(outcome.emergency_stops > 0 for outcome in outcomes),
-    }
-
-
-def key_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
-    """Figures of the whole run; vehicles and pedestrians apart, as they mix badly.
-
-    Times in seconds, speeds in m/s; ``None`` where nobody arrived. ``mean_speed`` is the space
-    mean: metres of all who arrived over their seconds.
-    """
-    figures: dict[str, float | None] = {
-        "insertion_error_max": _largest([o.insertion_error for o in outcomes]),
-        "insertion_error_mean": _mean([o.insertion_error for o in outcomes]),
-        "depart_delay_max": _largest([o.depart_delay for o in outcomes]),
-    }
-    vehicles = [o for o in outcomes if o.category != "pedestrian"]
-    pedestrians = [o for o in outcomes if o.category == "pedestrian"]
-    figures.update(_travel_figures(vehicles))
-    figures.update(
-        {f"pedestrian_{name}": value for name, value in _travel_figures(pedestrians).items()}
-    )
-    figures["mean_stops"] = _mean([o.stops for o in vehicles if o.status == "arrived"])
-    return rounded(figures)
-
-
-def _travel_figures(outcomes: Sequence[ActorOutcome]) -> dict[str, float | None]:
-    times = sorted(o.travel_time for o in outcomes if o.travel_time is not None)
-    moved = [
-        (o.route_length, o.travel_time)
-        for o in outcomes
-        if o.travel_time and o.route_length is not None
-    ]
-    seconds = sum(time for _, time in moved)
-    return {
-        "mean_travel_time": _mean(times),
-        "median_travel_time": _percentile(times, 0.5),
-        "p95_travel_time": _percentile(times, 0.95),
-        "mean_speed": sum(length for length, _ in moved) / seconds if seconds else None,
-        "mean_delay": _mean([o.delay for o in outcomes]),
-        "mean_waiting_time": _mean([o.waiting_time for o in outcomes if o.status == "arrived"]),
-    }
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return sum(known) / len(known) if known else None
-
-
-def _largest(values: Sequence[float | None]) -> float | None:
-    return max((value for value in values if value is not None), default=None)
-
-
-def _percentile(ordered: Sequence[float], share: float) -> float | None:
-    """Linear between the two nearest ranks, as ``numpy.percentile`` does."""
-    if not ordered:
-        return None
-    position = share * (len(ordered) - 1)
-    low = int(position)
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (position - low) * (ordered[high] - ordered[low])
 
 
 def summary_to_json(summary: Mapping[str, Any]) -> str:

@@ -5,35 +5,22 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from odscen.results.measures.figure import Basis
+from odscen.results.measures.registry import COLUMN_UNITS, RUN_FIGURES, figure_values
+from odscen.results.measures.table_columns import COLUMNS
 from odscen.results.records import rounded
 from odscen.results.traffic import TABLES, TrafficFigures, over_run
-from odscen.results.traffic_sums import EMISSIONS
-from odscen.results.units import unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
     import polars as pl
 
+    from odscen.results.measures.figure import RunData
+
 FIGURES_FORMAT = "odscen-figures"
 VERSION = 1
 _DIGITS = 4
-
-COLUMN_UNITS = {
-    **dict.fromkeys(("begin", "end", "delay", "waiting", "travel_time", "free_flow_time"), "s"),
-    **dict.fromkeys(("seconds", "time_loss", "standing_seconds"), "veh*s"),
-    **dict.fromkeys(("vehicles", "standing", "running", "departed", "arrived"), "veh"),
-    **dict.fromkeys(("queue_max", "queue_p95", "throughput"), "veh"),
-    **dict.fromkeys(EMISSIONS, "g"),
-    "flow": "veh/h",
-    "density": "veh/km",
-    "speed": "m/s",
-    "distance": "m",
-    "length": "km",
-}
-"""Units of the columns of :class:`odscen.results.traffic.TrafficFigures`."""
-_COUNTS = ("vehicles", "departed", "arrived", "throughput")
 
 
 def write_tables(figures: TrafficFigures, folder: Path) -> None:
@@ -50,8 +37,9 @@ def read_tables(folder: Path) -> TrafficFigures | None:
 
     if not all((folder / f"{name}.csv").is_file() for name in TABLES):
         return None
-    types: dict[str, type[pl.DataType]] = dict.fromkeys(COLUMN_UNITS, pl.Float64)
-    types |= dict.fromkeys(_COUNTS, pl.Int64)
+    types: dict[str, type[pl.DataType]] = {
+        column.name: pl.Int64 if column.whole else pl.Float64 for column in COLUMNS
+    }
     tables = {}
     for name in TABLES:
         file = folder / f"{name}.csv"
@@ -62,17 +50,23 @@ def read_tables(folder: Path) -> TrafficFigures | None:
     return TrafficFigures(**tables)
 
 
-def figures_json(figures: TrafficFigures, of_run: Mapping[str, float | None]) -> str:
-    """``figures.json``: figures of the run, and of each place over the whole run, with units."""
+def figures_json(data: RunData, figures: TrafficFigures) -> str:
+    """``figures.json``: figures of the run and of each place over the whole run, with units.
+
+    Figures that are of actors alone are in ``summary.json`` only.
+    """
+    shown = [figure for figure in RUN_FIGURES if figure.basis is not Basis.ACTORS]
+    of_run = figure_values(data, shown)
+    units = {figure.name: figure.unit for figure in shown if figure.name in of_run}
     tables = {name: over_run(getattr(figures, name)) for name in TABLES}
-    data: dict[str, Any] = {
+    content: dict[str, Any] = {
         "format": FIGURES_FORMAT,
         "version": VERSION,
-        "units": {"run": {name: unit_of(name) for name in of_run}, "tables": COLUMN_UNITS},
+        "units": {"run": units, "tables": COLUMN_UNITS},
         "run": rounded(of_run),
         **{name: _short(table).to_dicts() for name, table in tables.items()},
     }
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _short(table: pl.DataFrame) -> pl.DataFrame:

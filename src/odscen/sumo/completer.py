@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from odscen.errors import OdscenError
 from odscen.results.records import Event, Plan, event_from_line, event_line
-from odscen.results.summary import Fates
+from odscen.results.summary import Outcomes
 from odscen.sumo import layout
 from odscen.sumo.checkpoint import (
     EVENTS_LINES,
@@ -85,22 +85,22 @@ def main() -> int:
     """Complete slices for as long as a worker asks for it; 0 when it asked for the results."""
     run, connection = Path(sys.argv[1]), Connection(int(sys.argv[2]))
     plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8"))
-    fates = Fates(plan)
-    gc.freeze()  # plan and fates stay, and need not be gone through again and again
+    outcomes = Outcomes(plan)
+    gc.freeze()  # plan and outcomes stay, and need not be gone through again and again
     for number in range(1, last_number(run) + 1):
-        fates.hear(*_happened(run, number))
+        outcomes.hear(*_happened(run, number))
     while True:
-        fates.settle()  # while the worker simulates
+        outcomes.settle()  # while the worker simulates
         try:
             written: Written | None = connection.recv()
         except EOFError:  # the worker is gone; what it has asked for is done
             return 1
         try:
             if written is None:
-                _write_results(run, fates)
+                _write_results(run, outcomes)
             else:
                 written.complete(plan, run)
-                fates.hear(*_happened(run, written.checkpoint.number))
+                outcomes.hear(*_happened(run, written.checkpoint.number))
         except (OdscenError, OSError) as error:
             connection.send(error)
             return 1
@@ -121,10 +121,10 @@ def _event_lines(run: Path, number: int) -> Iterator[str]:
             yield line.rstrip("\n")
 
 
-def _write_results(run: Path, fates: Fates) -> None:
+def _write_results(run: Path, outcomes: Outcomes) -> None:
     """Write events and actors of the whole run."""
     lines = chain.from_iterable(_event_lines(run, n) for n in range(1, last_number(run) + 1))
-    write_results(run, lines, fates.rows())
+    write_results(run, lines, outcomes.rows())
 
 
 if __name__ == "__main__":

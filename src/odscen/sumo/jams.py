@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.results.outcomes import StopReason, stop_reason
 from odscen.results.records import Event, EventKind
 
 if TYPE_CHECKING:
@@ -31,15 +32,6 @@ _HOPS = 200
 RELEASE = 60.0
 """Seconds without anybody watched after which a jam is over: moving up a little does not end it."""
 
-CIRCLE = "vehicles wait for each other in a circle"
-NO_WAY_ON = "its lane does not lead on along its way"
-WRONG_LANE = "it did not get to the lane that its way needs"
-RED = "a red light"
-PEOPLE = "people on a crossing"
-GIVES_WAY = "it has to give way to traffic that does not end"
-NO_ROOM = "no room on the road ahead"
-UNKNOWN = "the reason does not show"
-
 
 class Stuck(NamedTuple):
     """A vehicle that stood at the last look: where (OpenDRIVE frame), since when, and why."""
@@ -48,7 +40,7 @@ class Stuck(NamedTuple):
     x: float | None
     y: float | None
     since: float
-    reason: str
+    reason: StopReason | str
 
 
 class JamWatch:
@@ -81,7 +73,10 @@ class JamWatch:
         self.due = state["next"]
         self._since = dict(state["since"])
         self._seen = dict(state["seen"])
-        self._stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
+        stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
+        self._stuck = {
+            name: one._replace(reason=stop_reason(one.reason)) for name, one in stuck.items()
+        }
 
     def stuck(self, vehicle: str) -> Stuck | None:
         """Where and why a vehicle stood at the last look, if it did."""
@@ -100,8 +95,9 @@ class JamWatch:
         before, self._stuck = self._stuck, {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
+            reason: StopReason | str
             reason, head = explain(session, first.vehicle)
-            if reason in (RED, UNKNOWN) and first.vehicle in before:
+            if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
             for one in queue:
                 self._stuck[one.vehicle] = self._place(session, one, time, reason)
@@ -115,7 +111,9 @@ class JamWatch:
         """Jams that are over because the road is empty."""
         return [self._end(time, lane) for lane in sorted(self._since)]
 
-    def _place(self, session: Session, one: Standing, time: float, reason: str) -> Stuck:
+    def _place(
+        self, session: Session, one: Standing, time: float, reason: StopReason | str
+    ) -> Stuck:
         front = session.vehicle_front(one.vehicle)
         dx, dy = self._offset
         x = None if front is None else front.x - dx
@@ -142,30 +140,30 @@ class JamWatch:
         return Event(time, EventKind.JAM_END, "", lane=lane, waited=lasted)
 
 
-def explain(session: Session, vehicle: str) -> tuple[str, str]:
+def explain(session: Session, vehicle: str) -> tuple[StopReason, str]:
     """Why a vehicle stands, and the vehicle at the head of the queue that it stands in."""
     seen = [vehicle]
     ahead = session.ahead(vehicle)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
         if ahead.leader in seen or len(seen) >= _HOPS:
-            return CIRCLE if ahead.leader in seen else NO_ROOM, seen[-1]
+            return StopReason.CIRCLE if ahead.leader in seen else StopReason.NO_ROOM, seen[-1]
         seen.append(ahead.leader)
         ahead = session.ahead(ahead.leader)
     if ahead is None:
-        return UNKNOWN, seen[-1]
-    return _own_reason(ahead) or UNKNOWN, seen[-1]
+        return StopReason.UNKNOWN, seen[-1]
+    return _own_reason(ahead) or StopReason.UNKNOWN, seen[-1]
 
 
-def _own_reason(ahead: Ahead) -> str | None:
+def _own_reason(ahead: Ahead) -> StopReason | None:
     """Return the reason that is not just the vehicle ahead."""
     if not ahead.onwards:
-        return WRONG_LANE if ahead.beside else NO_WAY_ON
+        return StopReason.WRONG_LANE if ahead.beside else StopReason.NO_WAY_ON
     if ahead.leader is not None:
         return None
     if ahead.light in ("r", "u"):
-        return RED
+        return StopReason.RED
     if ahead.people:
-        return PEOPLE
+        return StopReason.PEOPLE
     if not ahead.open:
-        return GIVES_WAY
+        return StopReason.GIVES_WAY
     return None

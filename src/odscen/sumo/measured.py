@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.conflicts import conflict_figures
 from odscen.results.lane_places import LanePlaces
+from odscen.results.measures.figure import RunData
 from odscen.results.queues import queue_lengths
-from odscen.results.run_traffic import traffic_of_run
 from odscen.results.traffic import traffic_figures
 from odscen.results.traffic_files import figures_json, write_tables
 from odscen.results.traffic_sums import intervals
@@ -15,8 +14,10 @@ from odscen.sumo import layout
 from odscen.sumo.recorded import read_conflicts, read_lanes, read_trips, trajectory_files
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from odscen.results.summary import ActorOutcome
     from odscen.results.traffic import TrafficFigures
 
 
@@ -51,15 +52,29 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     return traffic_figures(lanes, places, end=end, queues=queues)
 
 
-def write_figures(run: Path, *, end: float, meso: bool = False) -> dict[str, float | None]:
-    """Write ``figures.json`` and the tables of a run, and return the figures of the whole run."""
-    figures = read_figures(run, end=end, meso=meso)
-    of_run = traffic_of_run(figures, read_trips(run))
-    conflicts = read_conflicts(run)
-    if conflicts is not None:
-        of_run |= conflict_figures(conflicts)
-    if figures is not None:
-        text = figures_json(figures, of_run)
-        (run / layout.FIGURES_FILE).write_text(text, encoding="utf-8")
-        write_tables(figures, run / layout.FIGURES_FOLDER)
-    return of_run
+def read_run_data(
+    run: Path, outcomes: Sequence[ActorOutcome], *, end: float, meso: bool = False
+) -> RunData:
+    """Read all that the figures of a run of ``end`` seconds are computed from.
+
+    Raises
+    ------
+    InputError
+        If the places of lanes cannot be read.
+    """
+    return RunData(
+        outcomes=outcomes,
+        traffic=read_figures(run, end=end, meso=meso),
+        trips=read_trips(run),
+        conflicts=read_conflicts(run),
+        end=end,
+    )
+
+
+def write_figures(run: Path, data: RunData) -> None:
+    """Write ``figures.json`` and the tables of a run; neither if nothing was measured on lanes."""
+    if data.traffic is None:
+        return
+    text = figures_json(data, data.traffic)
+    (run / layout.FIGURES_FILE).write_text(text, encoding="utf-8")
+    write_tables(data.traffic, run / layout.FIGURES_FOLDER)

@@ -285,7 +285,7 @@ class _Writer:
                 self.demand.add_walk(user, manner, way.route)
             else:
                 self.demand.add_vehicle(user, manner, way.route)
-            self.notes += [f"{user.id}: {repair}" for repair in way.route.repairs]
+            self.notes += [f"{user.id}: {repair.words}" for repair in way.route.repairs]
         return self._planned(user, body, manner, way)
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:

@@ -10,8 +10,9 @@ because several internal lanes overlap where they begin and geometry alone canno
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,9 +70,30 @@ class Places:
         return dict(zip(self.lanes, self.scale.tolist(), strict=True))
 
 
+class RepairKind(StrEnum):
+    """How a route differs from the path on the lane graph; the value is what is said of it."""
+
+    LEFT_OUT = "edge {edge} left out: no link from {before}"
+    PUT_IN = "{edges} put in between {before} and {edge}"
+    LED_AROUND = "{left_out} left out; {edges} put in between {before} and {edge}"
+    OTHER_LINK = "leaves lane {before} by {edge}, not {left_out}"
+
+
+class RouteRepair(NamedTuple):
+    """Where a route differs from the path; ``words`` are for people."""
+
+    kind: RepairKind
+    words: str
+
+    @classmethod
+    def of(cls, kind: RepairKind, **names: str) -> RouteRepair:
+        """Name the edges and lanes of a repair as its kind does."""
+        return cls(kind, kind.format(**names))
+
+
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A SUMO route; ``repairs`` says in words where it differs from the path on the lane graph."""
+    """A SUMO route; ``repairs`` says where it differs from the path on the lane graph."""
 
     edges: tuple[str, ...]
     depart_lane: int
@@ -79,7 +101,7 @@ class Route:
     depart_pos_lat: float
     arrival_lane: int | None
     arrival_pos: float
-    repairs: tuple[str, ...] = ()
+    repairs: tuple[RouteRepair, ...] = ()
 
 
 class RoutePlanner:
@@ -227,7 +249,7 @@ class RoutePlanner:
 
     def _along(
         self, lane: NetLane, edges: tuple[str, ...], vclass: str
-    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    ) -> tuple[tuple[str, ...], tuple[RouteRepair, ...]]:
         """Leave by a link of the lane that the body stands on, as its front is beyond the end.
 
         The path would have it change lanes first, for which it is too late.
@@ -240,7 +262,10 @@ class RoutePlanner:
         if len(edges) < 2 or not ways:
             return edges, ()
         best = min(ways, key=lambda way: (self._net.way_length(way), way))
-        return (edges[0], *best), (f"leaves lane {lane.id} by {best[0]}, not {edges[1]}",)
+        repair = RouteRepair.of(
+            RepairKind.OTHER_LINK, before=lane.id, edge=best[0], left_out=edges[1]
+        )
+        return (edges[0], *best), (repair,)
 
     def _next(self, lane: NetLane, edges: tuple[str, ...]) -> tuple[NetLane, ...]:
         """Return the lanes from the next one on to the next normal one, on the route."""
@@ -272,7 +297,7 @@ class RoutePlanner:
 
 def connected(
     net: RoadNet, edges: list[str], vclass: str
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
+) -> tuple[tuple[str, ...], tuple[RouteRepair, ...]]:
     """Make a list of edges a connected route.
 
     Where two edges have no link, the shortest way between them is put in; where there is none of at
@@ -281,24 +306,26 @@ def connected(
 
     Returns
     -------
-    The edges, and the repairs in words.
+    The edges, and the repairs.
 
     Raises
     ------
     NoRouteError
         If the last edge cannot be reached from any edge on the way.
     """
-    route, repairs = [edges[0]], []
+    route = [edges[0]]
+    repairs: list[RouteRepair] = []
     for edge in edges[1:-1]:
         if edge in net.next_edges(route[-1], vclass):
             route.append(edge)
             continue
         way = net.way(route[-1], edge, vclass)
         if way is None or net.way_length(way[1:-1]) > DETOUR:
-            repairs.append(f"edge {edge} left out: no link from {route[-1]}")
+            repairs.append(RouteRepair.of(RepairKind.LEFT_OUT, edge=edge, before=route[-1]))
             continue
         route.extend(way[1:])
-        repairs.append(f"{' '.join(way[1:-1]) or edge} put in between {way[0]} and {edge}")
+        put_in = " ".join(way[1:-1]) or edge
+        repairs.append(RouteRepair.of(RepairKind.PUT_IN, edges=put_in, before=way[0], edge=edge))
     if len(edges) > 1 and edges[-1] not in net.next_edges(route[-1], vclass):
         route, repair = _ended(net, route, edges[-1], vclass)
         repairs.append(repair)
@@ -307,15 +334,19 @@ def connected(
     return tuple(route), tuple(repairs)
 
 
-def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list[str], str]:
+def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list[str], RouteRepair]:
     """Lead a route to its last edge from the latest place where that is possible."""
     for kept in range(len(route), 0, -1):
         way = net.way(route[kept - 1], last, vclass)
         if way is None:
             continue
-        told = f"{' '.join(way[1:-1]) or last} put in between {way[0]} and {last}"
-        if kept < len(route):
-            told = f"{' '.join(route[kept:])} left out; {told}"
-        return [*route[:kept], *way[1:]], told
+        repair = RouteRepair.of(
+            RepairKind.LED_AROUND if kept < len(route) else RepairKind.PUT_IN,
+            left_out=" ".join(route[kept:]),
+            edges=" ".join(way[1:-1]) or last,
+            before=way[0],
+            edge=last,
+        )
+        return [*route[:kept], *way[1:]], repair
     msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {last}"
     raise NoRouteError(msg)

@@ -7,16 +7,19 @@ import shutil
 import sys
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
-from odscen.results.expectations import COUNTS, evaluate
-from odscen.results.gridlock import find_trouble, trouble_summary
+from odscen.results.expectations import evaluate
+from odscen.results.gridlock import find_incidents, incident_summary
+from odscen.results.measures.figure import SummaryPart
+from odscen.results.measures.registry import COUNTS, figure_values
+from odscen.results.outcomes import RunStatus
 from odscen.results.records import events_from_json, rounded
-from odscen.results.summary import actor_counts, actors_from_json, key_figures
+from odscen.results.summary import actors_from_json
 from odscen.results.traffic import TABLES
 from odscen.sumo import layout
-from odscen.sumo.measured import write_figures
+from odscen.sumo.measured import read_run_data, write_figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,8 +30,6 @@ if TYPE_CHECKING:
     from odscen.results.records import Plan
     from odscen.sumo.forecast import Forecast
     from odscen.sumo.process import Ended
-
-RunStatus = Literal["completed", "failed"]
 
 FORMAT = "odscen-run"
 VERSION = 1
@@ -80,8 +81,7 @@ class RunResult:
     @property
     def status(self) -> RunStatus:
         """``completed`` if the simulation ended by itself, whatever became of the actors."""
-        status: RunStatus = self.summary["status"]
-        return status
+        return RunStatus(self.summary["status"])
 
     @property
     def expectations_met(self) -> bool:
@@ -91,7 +91,7 @@ class RunResult:
     @property
     def exit_code(self) -> int:
         """0 completed, 1 completed with failed expectations, 3 failed."""
-        if self.status == "failed":
+        if self.status is RunStatus.FAILED:
             return 3
         return 0 if self.expectations_met else 1
 
@@ -142,7 +142,7 @@ def make_summary(
     summary: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
-        "status": "completed" if done else "failed",
+        "status": RunStatus.COMPLETED if done else RunStatus.FAILED,
         "error": ended.error,
         "stopped": bool(done and done.stopped),
         "scenario": plan.scenario,
@@ -163,15 +163,15 @@ def make_summary(
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
         meso = bool(prepared.about.get("meso"))
-        traffic = write_figures(folder, end=done.sim_seconds, meso=meso)
-        figures = key_figures(outcomes) | rounded(traffic)
-        summary["actors"] = actor_counts(outcomes)
-        summary["insertion_error_max"] = figures["insertion_error_max"]
-        summary["figures"] = figures
+        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso)
+        write_figures(folder, data)
+        summary["actors"] = figure_values(data, part=SummaryPart.ACTORS)
+        summary["figures"] = rounded(figure_values(data))
+        summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
         events = events_from_json(text)
-        trouble = find_trouble(plan, outcomes, events, end=done.sim_seconds)
-        summary["gridlock"] = trouble_summary(trouble)
+        incidents = find_incidents(plan, outcomes, events, end=done.sim_seconds)
+        summary["gridlock"] = incident_summary(incidents)
     summary["expectations"] = [
         {"expectation": v.expectation, "value": v.value, "passed": v.passed}
         for v in evaluate(expectations, summary)

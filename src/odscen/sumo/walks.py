@@ -13,7 +13,7 @@ from odscen.sumo.routes import NoRouteError, connected
 if TYPE_CHECKING:
     from odscen.lanegraph.model import IntArray, PedestrianGraph
     from odscen.sumo.network import NetLane, RoadNet
-    from odscen.sumo.routes import Places
+    from odscen.sumo.routes import Places, RouteRepair
 
 
 ALONG = 0.5
@@ -32,7 +32,7 @@ class Walk:
     depart_pos: float
     depart_pos_lat: float
     arrival_pos: float
-    repairs: tuple[str, ...] = ()
+    repairs: tuple[RouteRepair, ...] = ()
 
 
 class WalkPlanner:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from odscen.errors import OdscenError
 from odscen.results.records import Plan, event_line
-from odscen.results.summary import Fates
+from odscen.results.summary import Outcomes
 from odscen.sumo.conflict_files import tidy_conflicts
 from odscen.sumo.layout import (
     CONFIG_FILE,
@@ -83,9 +83,9 @@ def simulate(
         return run_slices(plan, folder, stepper)
     done = _in_one_piece(plan, folder, stepper)
     events = stepper.recorder.events
-    fates = Fates(plan)
-    fates.hear(events, trips_in(folder / TRIPS_FILE))
-    write_results(folder, map(event_line, events), fates.rows())
+    outcomes = Outcomes(plan)
+    outcomes.hear(events, trips_in(folder / TRIPS_FILE))
+    write_results(folder, map(event_line, events), outcomes.rows())
     return done
 
 

@@ -19,6 +19,7 @@ from odscen.scenario.document import Scenario
 from odscen.web import (
     carla_routes,
     demand_routes,
+    figure_routes,
     map_routes,
     result_routes,
     run_routes,
@@ -106,6 +107,7 @@ def create_app(
         demand_routes,
         run_routes,
         result_routes,
+        figure_routes,
         carla_routes,
     ):
         app.include_router(routes.router)

@@ -1,0 +1,71 @@
+"""Columns of the tables by place and time, with their units; see :mod:`odscen.results.traffic`."""
+
+from __future__ import annotations
+
+from odscen.results.measures.figure import TableColumn
+
+_STOPPED = "below 0.1 m/s"
+_HERE = "at the place itself (junction: inside); null with `--no-emissions`"
+_SUM = "one of the sums that the other columns are made of"
+
+
+def _column(name: str, unit: str, definition: str, *, whole: bool = False) -> TableColumn:
+    return TableColumn(name=name, unit=unit, definition=definition, whole=whole)
+
+
+COLUMNS = (
+    _column("begin", "s", "start of the interval"),
+    _column("end", "s", "end of the interval"),
+    _column(
+        "delay",
+        "s",
+        "time loss per vehicle: the sum of (1 - speed / desired speed) dt. Junction: from the "
+        "junction before, or the start, through this one, per vehicle that enters",
+    ),
+    _column("waiting", "s", f"stopped delay: time {_STOPPED} per vehicle; places as for `delay`"),
+    _column("travel_time", "s", "segment: along all of it, at the mean speed"),
+    _column("free_flow_time", "s", "segment: along all of it, at the speeds that drivers desired"),
+    _column("seconds", "veh*s", f"time that vehicles spent there; {_SUM}"),
+    _column("time_loss", "veh*s", f"time that they lost; {_SUM}"),
+    _column("standing_seconds", "veh*s", f"time that they were {_STOPPED}; {_SUM}"),
+    _column(
+        "vehicles",
+        "veh",
+        "came into the place or started there; network: were under way",
+        whole=True,
+    ),
+    _column("standing", "veh", f"mean number {_STOPPED}, the mean queue; places as for `delay`"),
+    _column("running", "veh", "network: mean number under way"),
+    _column("departed", "veh", "network: departed", whole=True),
+    _column("arrived", "veh", "network: arrived", whole=True),
+    _column(
+        "queue_max",
+        "veh",
+        "longest queue: vehicles stopped at one time on the approaches to the junction and in it. "
+        "Only with trajectories, and not in the mesoscopic model",
+    ),
+    _column(
+        "queue_p95",
+        "veh",
+        "95th percentile queue: what it does not exceed 95 % of the time. Over the run: of the "
+        "worst interval",
+    ),
+    _column("throughput", "veh", "of a junction: the same as `vehicles`", whole=True),
+    _column("co2", "g", f"carbon dioxide, {_HERE}"),
+    _column("co", "g", "carbon monoxide, likewise"),
+    _column("hc", "g", "hydrocarbons, likewise"),
+    _column("nox", "g", "nitrogen oxides, likewise"),
+    _column("pmx", "g", "particulate matter, likewise"),
+    _column("fuel", "g", "fuel, likewise"),
+    _column(
+        "flow",
+        "veh/h",
+        "generalized definition of Edie (1963): metres of all vehicles over length and time. "
+        "Segment: all lanes and directions together; junction and movement: along the mean "
+        "connection; network: per lane",
+    ),
+    _column("density", "veh/km", "Edie's: seconds of all vehicles over length and time"),
+    _column("speed", "m/s", "Edie's: metres over seconds, the space mean; null without anybody"),
+    _column("distance", "m", f"metres that vehicles travelled; {_SUM}"),
+    _column("length", "km", "what flow and density refer to"),
+)

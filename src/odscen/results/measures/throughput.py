@@ -1,0 +1,78 @@
+"""How much traffic the roads carried, and where it was delayed most."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.results.measures.figure import CLOCK, Basis, Better, Display, ReportSection, RunFigure
+from odscen.results.traffic import over_run
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from odscen.results.measures.figure import RunData
+
+LEAST_VEHICLES = 5
+"""A junction that fewer vehicles enter in a run is not looked at for the worst delay."""
+
+
+def _throughput(run: RunData) -> float:
+    network = run.network
+    hours = (network["end"] - network["begin"]) / 3600.0
+    return float(network["arrived"] / hours)
+
+
+def _worst_junction_delay(run: RunData) -> float | None:
+    if run.traffic is None:
+        return None
+    junctions = over_run(run.traffic.junctions)
+    entered = junctions.filter(junctions["vehicles"] >= LEAST_VEHICLES)
+    worst = entered["delay"].max()
+    return worst if isinstance(worst, float) else None
+
+
+def _arrivals(values: Mapping[str, Any]) -> str:
+    arrivals = values.get("throughput")
+    return "" if arrivals is None else f"{arrivals:,.0f} arrived per hour"
+
+
+FIGURES = (
+    RunFigure(
+        name="vehicle_km",
+        unit="km",
+        label="vehicle-kilometres travelled",
+        definition="Kilometres of all vehicles, arrived or not.",
+        source="SUMO lane data, distance",
+        basis=Basis.ROADS,
+        display=Display("km", digits=0),
+        section=ReportSection.KEY_FIGURES,
+        note=_arrivals,
+        compute=lambda run: float(run.network["distance"]) / 1000.0,
+    ),
+    RunFigure(
+        name="throughput",
+        unit="veh/h",
+        label="throughput",
+        definition="Vehicles that arrived, per hour.",
+        source="SUMO lane data, arrived",
+        better=Better.HIGHER,
+        basis=Basis.ROADS,
+        compute=_throughput,
+    ),
+    RunFigure(
+        name="worst_junction_delay",
+        unit="s",
+        label="highest junction delay",
+        definition="Control delay per vehicle of the junction with the highest, of those that "
+        f"{LEAST_VEHICLES} vehicles or more enter.",
+        source="HCM, 7th edition, control delay; with what is lost behind slower vehicles on the "
+        "approaches",
+        better=Better.LOWER,
+        basis=Basis.ROADS,
+        display=CLOCK,
+        section=ReportSection.KEY_FIGURES,
+        note="per vehicle, on its approaches and in it",
+        compute=_worst_junction_delay,
+    ),
+)
