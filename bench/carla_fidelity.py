@@ -18,8 +18,9 @@ import numpy as np
 
 import tests.carla.test_mirror_on_maps as judge
 from bench.common import shared_maps
-from odscen import workflow
+from odscen.app.scenarios import generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 
 SHIPPED = ("signal_crossing", "town_5x5")
 SHARED = ("carla-2019/Town05", "carla-2019/Town03")
@@ -39,8 +40,11 @@ def main() -> None:
         for number in range(int(count)):
             xodr = files[number % len(files)]
             workspace.add_map(xodr)
-            [path] = workflow.generate(
-                workspace, map_name=xodr.stem, seed=number, fill=0.15, roi_segments=15
+            [path] = generate(
+                workspace,
+                settings=GenerationSettings(
+                    map_name=xodr.stem, seed=number, fill=0.15, roi_segments=15
+                ),
             )
             with tempfile.TemporaryDirectory() as out:
                 try:

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from bench.common import shared_maps
-from odscen import workflow
+from odscen.app.maps import LoadedMap, load_map
 from odscen.catalog.store import Workspace
 from odscen.scenario import edits
 from odscen.scenario.counting import Observation, transitions
@@ -39,7 +39,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         workspace = Workspace.open(Path(folder))
-        loaded = workflow.load_map(workspace.add_map(town))
+        loaded = load_map(workspace.add_map(town))
         known = known_demand(loaded)
         counts = counted(known, loaded)
         scenario = known.model_copy(update={"demand": Demand(counts=(counts,)), "seed": 2})
@@ -56,7 +56,7 @@ def main() -> None:
             sys.exit(1)
 
 
-def known_demand(loaded: workflow.LoadedMap) -> Scenario:
+def known_demand(loaded: LoadedMap) -> Scenario:
     graph = loaded.sumo.graph
     scenario = edits.new_scenario(graph, name="known", roi=graph.segments.ids, seed=1)
     trips = Background.model_validate({"id": "known", "trips": PER_HOUR * HOURS, "mix": MIX})
@@ -68,7 +68,7 @@ def known_demand(loaded: workflow.LoadedMap) -> Scenario:
     )
 
 
-def counted(known: Scenario, loaded: workflow.LoadedMap) -> Counts:
+def counted(known: Scenario, loaded: LoadedMap) -> Counts:
     """Turns and streams at every junction; those that nobody uses are not counted."""
     region = Region.of(loaded.sumo.graph, known.roi)
     users, _ = everybody(known, loaded.sumo, region, until=known.simulation.duration)
@@ -93,7 +93,7 @@ def spoiled(counts: Counts) -> Counts:
     return Counts.model_validate({**counts.model_dump(), "rows": rows})
 
 
-def _places(loaded: workflow.LoadedMap) -> set[str]:
+def _places(loaded: LoadedMap) -> set[str]:
     graph = loaded.sumo.graph
     onwards = transitions(graph)
     junctions = [

@@ -21,9 +21,10 @@ from websockets.sync.client import connect
 
 from bench.canvas import TOWN
 from bench.common import shared_maps
-from odscen import workflow
+from odscen.app.scenarios import SUFFIX, generate
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from tests.browser.pages import OdscenPage
 from tools import page as tool
 
@@ -80,8 +81,8 @@ def main() -> None:
 
 
 def _sampled(workspace: Workspace, map_name: str, **options: Any) -> str:
-    path = workflow.generate(workspace, map_name=map_name, seed=5, **options)[0]
-    return path.name.removesuffix(workflow.SUFFIX)
+    path = generate(workspace, settings=GenerationSettings(map_name=map_name, seed=5, **options))[0]
+    return path.name.removesuffix(SUFFIX)
 
 
 @contextmanager

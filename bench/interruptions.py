@@ -22,12 +22,14 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from odscen import demands, workflow
+from odscen.app import demands
+from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.scenario.demand_edits import set_clock
 from odscen.scenario.document import Flow
 from odscen.scenario.files import dumps
+from odscen.scenario.generation_settings import GenerationSettings
 from odscen.scenario.profiles import DAY, curve
 from odscen.sumo.layout import RECORDED
 from odscen.sumo.recorded import recorded_files
@@ -64,7 +66,7 @@ def main(
         start = time.perf_counter()
         subprocess.run([*run, "--out", str(folder / "alone")], check=True, capture_output=True)
         alone = time.perf_counter() - start
-        target = folder / "killed" / scenario.name.removesuffix(workflow.SUFFIX)
+        target = folder / "killed" / scenario.name.removesuffix(SUFFIX)
         command = run = [*run, "--out", str(target.parent)]
         resume = [*cli, "resume", str(target), *options]
         expected = results(folder / "alone" / target.name)
@@ -93,8 +95,8 @@ def main(
 
 def traffic(workspace: Workspace, name: str, hours: float) -> Path:
     """Write a scenario of flows from places that sampling has chosen."""
-    (path,) = workflow.generate(workspace, map_name=name, seed=1, fill=0.5)
-    sampled = workflow.read_scenario(path)
+    (path,) = generate(workspace, settings=GenerationSettings(map_name=name, seed=1, fill=0.5))
+    sampled = read_scenario(path)
     flows = tuple(
         Flow(
             id=f"flow{i}", spawn=actor.spawn, per_hour=PER_HOUR / FLOWS, end=hours * 3600.0,
@@ -123,8 +125,8 @@ def morning(workspace: Workspace, name: str, hours: float, trips: float) -> Path
     )
     simulation = scenario.simulation.model_copy(update={"duration": hours * 3600.0})
     scenario = scenario.model_copy(update={"demand": demand, "simulation": simulation})
-    path = workspace.scenarios / f"morning{workflow.SUFFIX}"
-    return workflow.write_scenario(scenario, path)
+    path = workspace.scenarios / f"morning{SUFFIX}"
+    return write_scenario(scenario, path)
 
 
 def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:

@@ -20,9 +20,10 @@ import uvicorn
 from websockets.sync.client import connect
 
 from bench import recording
-from odscen import workflow
+from odscen.app.scenarios import SUFFIX, generate
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from odscen.sumo import layout
 from odscen.sumo.live import Live
 from odscen.sumo.process import run_worker
@@ -45,8 +46,8 @@ def first_frame() -> None:
     with tempfile.TemporaryDirectory() as name:
         workspace = Workspace.open(Path(name))
         workspace.add_map(next(path for path in shipped_maps() if path.stem == MAP))
-        path = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.3)[0]
-        scenario = path.name.removesuffix(workflow.SUFFIX)
+        path = generate(workspace, settings=GenerationSettings(map_name=MAP, seed=5, fill=0.3))[0]
+        scenario = path.name.removesuffix(SUFFIX)
         bound = socket.create_server(("127.0.0.1", 0))
         server = uvicorn.Server(uvicorn.Config(create_app(workspace), log_level="warning"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]})

@@ -28,15 +28,18 @@ from typing import NamedTuple
 import polars as pl
 
 from bench.common import shared_maps, without_output
-from odscen import demands, workflow
+from odscen.app import demands
+from odscen.app.maps import load_map
+from odscen.app.reports import write_report
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.sumo import layout
 from odscen.sumo.checkpoint import last_number, read_checkpoint
-from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.prepare import prepare
 from odscen.sumo.process import run_worker
 from odscen.sumo.recorded import trajectory_files
 from odscen.sumo.run_folder import make_summary, write_run_folder
+from odscen.sumo.run_settings import RunSettings
 from tools.make_maps.__main__ import map_text
 
 HOUR = 3600.0
@@ -72,7 +75,7 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
         workspace = Workspace.open(Path(name) / "workspace")
         entry = workspace.add_map(path)
         scenario, _ = demands.whole_day(workspace, entry.name, trips=trips, day="weekday", seed=0)
-        loaded = workflow.load_map(entry)
+        loaded = load_map(entry)
         net, assets = entry.path("net"), workspace.assets()
         times: defaultdict[str, list[Spent]] = defaultdict(list)
         records, moved_on = [], []
@@ -80,7 +83,9 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             run = Path(name) / f"run{seed}"
             run.mkdir()
             start = spent()
-            prepared = prepare(scenario, loaded.sumo, net, assets, seed=seed, until=until)
+            prepared = prepare(
+                scenario, loaded.sumo, net, assets, settings=RunSettings(seed=seed, until=until)
+            )
             write_run_folder(prepared, run)
             times["preparation"].append(since(start))
             config = run / layout.SUMO_FOLDER / layout.CONFIG_FILE
@@ -93,11 +98,11 @@ def day(path: Path, *, trips: float, until: float, rounds: int) -> None:
             if ended.done is None:
                 raise SystemExit(ended.error)
             records.append(rows(trajectory_files(run)) / alone)
-            summary = make_summary(prepared, run, ended, ())
+            summary = make_summary(prepared, run, ended)
             moved_on.append(summary["actors"]["teleported"])
             times["silent"].append(timed(silent))
         start = spent()
-        write_report(run, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
+        write_report(run, summary, loaded=loaded)
         report = since(start)
         memory = [read_checkpoint(run, n).memory / 1e6 for n in range(1, last_number(run) + 1)]
         print(

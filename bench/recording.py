@@ -18,7 +18,7 @@ from pathlib import Path
 from bench.common import without_output
 from odscen.results.records import Plan, PlannedActor
 from odscen.sumo import layout
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.measures import interval_of, measures_xml
 
 VEHICLES = 1500
@@ -88,7 +88,7 @@ def prepare(folder: Path, binaries: Path) -> None:
         capture_output=True,
     )  # fmt: skip
     (sumo_folder / layout.ROUTES_FILE).write_text(_routes(net), encoding="utf-8")
-    settings = RunSettings(until=SECONDS, step_length=0.5, seed=1, measures=True)
+    settings = SumocfgSettings(until=SECONDS, step_length=0.5, seed=1, measures=True)
     (sumo_folder / layout.CONFIG_FILE).write_text(sumo_config(settings), encoding="utf-8")
     measures = measures_xml(interval_of(SECONDS), emissions=True)
     (sumo_folder / layout.MEASURES_FILE).write_text(measures, encoding="utf-8")

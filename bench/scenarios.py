@@ -14,12 +14,14 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from bench.common import shared_maps
-from odscen import workflow
+from odscen.app import runs
+from odscen.app.scenarios import generate
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.cli.maps import names_for
 from odscen.results.summary import ActorOutcome, actors_from_json
 from odscen.scenario.config import SamplingConfig
+from odscen.scenario.generation_settings import GenerationSettings
 
 COUNT = int(os.environ.get("ODSCEN_BENCH_SCENARIOS", "200"))
 UNTIL = 3600.0
@@ -46,10 +48,13 @@ def main() -> None:
         failed: Counter[str] = Counter()
         for index, entry in enumerate(entries):
             count = COUNT // len(entries) + (index < COUNT % len(entries))
-            paths = workflow.generate(
-                workspace, map_name=entry.name, count=count, seed=1000 * index, config=config
+            paths = generate(
+                workspace,
+                settings=GenerationSettings(
+                    map_name=entry.name, count=count, seed=1000 * index, config=config
+                ),
             )
-            results = workflow.run(workspace, paths, processes=os.cpu_count() or 1)
+            results = runs.run(workspace, paths, processes=os.cpu_count() or 1)
             scenarios[entry.name] += len(paths)
             for result in results:
                 if result.status == "failed":

@@ -13,12 +13,14 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX, generate, write_scenario
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.scenario import demand_edits, edits
 from odscen.scenario.counting import transitions
 from odscen.scenario.document import Scenario
+from odscen.scenario.generation_settings import GenerationSettings
 from tests.browser.pages import OdscenPage, settle
 from tools import page as tool
 
@@ -55,8 +57,10 @@ def main() -> None:
         workspace = Workspace.open(Path(name))
         for path in shipped_maps():
             workspace.add_map(path)
-        made = workflow.generate(workspace, map_name=MAP, seed=5, fill=0.15, roi_segments=7)[0]
-        scenario = made.name.removesuffix(workflow.SUFFIX)
+        made = generate(
+            workspace, settings=GenerationSettings(map_name=MAP, seed=5, fill=0.15, roi_segments=7)
+        )[0]
+        scenario = made.name.removesuffix(SUFFIX)
         _counted(workspace)
         _long(workspace)
         with tool.served(Path(name)) as server, tool.launched() as browser:
@@ -67,7 +71,7 @@ def main() -> None:
 
 def _counted(workspace: Workspace) -> None:
     """Save a scenario with background traffic and counts, some of which contradict each other."""
-    graph = workflow.load_map(workspace.map(MAP)).sumo.graph
+    graph = load_map(workspace.map(MAP)).sumo.graph
     scenario = edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
     scenario = demand_edits.set_clock(scenario, clock=7.5 * 3600)
     mix = {"car": 8, "van": 1, "bicycle": 1}
@@ -87,7 +91,7 @@ def _counted(workspace: Workspace) -> None:
 
 def _long(workspace: Workspace) -> None:
     """Save a scenario of hours."""
-    graph = workflow.load_map(workspace.map(SMALL)).sumo.graph
+    graph = load_map(workspace.map(SMALL)).sumo.graph
     scenario = edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
     scenario = edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
     scenario = demand_edits.set_background(scenario, graph, background="others", trips=1200)
@@ -95,7 +99,7 @@ def _long(workspace: Workspace) -> None:
 
 
 def _save(workspace: Workspace, name: str, scenario: Scenario) -> None:
-    workflow.write_scenario(scenario, workspace.scenarios / f"{name}{workflow.SUFFIX}")
+    write_scenario(scenario, workspace.scenarios / f"{name}{SUFFIX}")
 
 
 def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> None:

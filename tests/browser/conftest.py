@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
-from odscen import workflow
+from odscen.app.scenarios import SUFFIX, generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from tests.browser.pages import OdscenPage
 from tools import chromium
 from tools import page as tool
@@ -65,8 +66,8 @@ def served(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 def sampled(served: tool.Served) -> str:
     """Name of a scenario with cars and pedestrians that runs without problems."""
     workspace = Workspace.open(served.workspace)
-    path = workflow.generate(workspace, map_name=CROSSING, seed=5, fill=0.25)[0]
-    return path.name.removesuffix(workflow.SUFFIX)
+    path = generate(workspace, settings=GenerationSettings(map_name=CROSSING, seed=5, fill=0.25))[0]
+    return path.name.removesuffix(SUFFIX)
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -13,10 +13,13 @@ import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
-from odscen import workflow
+from odscen.app import runs
+from odscen.app.scenarios import generate
 from odscen.catalog.store import Workspace
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
+from odscen.scenario.generation_settings import GenerationSettings
+from odscen.sumo.run_settings import RunSettings
 from tests.browser.conftest import ARTEFACTS, CROSSING
 from tests.browser.pages import FAILED, OdscenPage, settle
 from tools import page as tool
@@ -244,11 +247,13 @@ def written(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str
     workspace = Workspace.open(one_map)
     sides = {}
     for side, fill in (("a", 0.25), ("b", 0.4)):
-        made = workflow.generate(
-            workspace, map_name=CROSSING, seed=5, fill=fill, out=root / "made" / side
+        made = generate(
+            workspace,
+            out=root / "made" / side,
+            settings=GenerationSettings(map_name=CROSSING, seed=5, fill=fill),
         )
         for seed in (1, 2):
-            workflow.run(workspace, made, out=root / side / str(seed), seed=seed)
+            runs.run(workspace, made, out=root / side / str(seed), settings=RunSettings(seed=seed))
             run = next((root / side / str(seed)).iterdir())
             run.rename(root / side / f"seed-{seed}")
         sides[side] = read_runs(root / side, workspace)

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from odscen import workflow
+from odscen.app.scenarios import SUFFIX, generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from tests.browser.conftest import CROSSING, SHIPPED
 from tests.browser.pages import OdscenPage
 from tests.browser.test_accessibility import Inspector
@@ -81,10 +82,12 @@ def test_without_carla_the_page_says_so_and_runs_all_the_same(
 ) -> None:
     root = tmp_path / "workspace"
     shutil.copytree(one_map, root)
-    scenario = workflow.generate(Workspace.open(root), map_name=CROSSING, seed=5, fill=0.1)[0]
+    scenario = generate(
+        Workspace.open(root), settings=GenerationSettings(map_name=CROSSING, seed=5, fill=0.1)
+    )[0]
     with tool.served(root, "--carla", "127.0.0.1:9") as server:
         user = open_page(server.url)
-        user.open_editor(scenario.name.removesuffix(workflow.SUFFIX))
+        user.open_editor(scenario.name.removesuffix(SUFFIX))
         user.step("Run").click()
         choice = user.page.get_by_role("group", name="CARLA", exact=True)
         expect(choice.get_by_role("status")).to_have_text("CARLA: not there")

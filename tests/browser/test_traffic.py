@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, expect
 
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX
 from odscen.catalog.store import Workspace
 from odscen.scenario import demand_edits, edits
 from odscen.scenario.files import dumps
-from odscen.workflow import SUFFIX, load_map
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
 from tools.page import Served

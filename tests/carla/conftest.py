@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from odscen import workflow
+from odscen.app.scenarios import generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 
 MAPS = Path(__file__).parents[2] / "maps"
 Sample = Callable[..., Path]
@@ -52,8 +53,11 @@ def sample(workspace: Workspace) -> Sample:
 
     def sampled(xodr: Path, *, seed: int = 1, fill: float = 0.2, segments: int = 12) -> Path:
         workspace.add_map(xodr)
-        [path] = workflow.generate(
-            workspace, map_name=xodr.stem, seed=seed, fill=fill, roi_segments=segments
+        [path] = generate(
+            workspace,
+            settings=GenerationSettings(
+                map_name=xodr.stem, seed=seed, fill=fill, roi_segments=segments
+            ),
         )
         return path
 

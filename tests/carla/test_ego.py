@@ -17,6 +17,7 @@ from odscen.errors import InputError
 from odscen.lanegraph.query import node_index
 from odscen.scenario.document import Actor, MapReference, Scenario
 from odscen.scenario.files import dumps
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import RunResult
 from tests.carla.conftest import MAPS
 from tests.carla.driver import Driver
@@ -69,8 +70,7 @@ def drive(
                 path,
                 CosimOptions(Address(server.host, server.port), tick=STEP, external_ego=True),
                 out=tmp_path / "runs",
-                until=until,
-                step_length=STEP,
+                settings=RunSettings(until=until, step_length=STEP),
             )
         roles = [a["type_id"] for a in server.actors() if a["type_id"].startswith("vehicle.")]
         assert roles == ["vehicle.tesla.model3"], "the hero is not ours and stays"
@@ -191,7 +191,13 @@ def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
     with StandIn(xodr, map_name=xodr.stem) as server:
         before = server.actors()
         options = CosimOptions(Address(server.host, server.port), tick=STEP, external_ego=True)
-        result, report = cosim(workspace, path, options, out=tmp_path, until=2.0, step_length=STEP)
+        result, report = cosim(
+            workspace,
+            path,
+            options,
+            out=tmp_path,
+            settings=RunSettings(until=2.0, step_length=STEP),
+        )
         assert (result.status, report.error, report.spawned) == ("completed", None, 0)
         assert [a["id"] for a in server.actors()] == [a["id"] for a in before]
     rows = pl.read_parquet(result.folder / "trajectories.parquet")

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
 from odscen.catalog.store import Workspace
+from odscen.sumo.run_settings import RunSettings
 from tests.carla.conftest import MAPS, Sample, lights_of_sumo_alone
 from tests.carla.observer import Frame, Observer
 from tests.carla_standin.process import StandIn
@@ -140,8 +141,7 @@ def mirrored(
                 path,
                 CosimOptions(Address(server.host, server.port), tick=STEP / TICKS),
                 out=tmp_path,
-                until=SECONDS,
-                step_length=STEP,
+                settings=RunSettings(until=SECONDS, step_length=STEP),
             )
         assert result.status == "completed"
         assert (report.error, report.refused, report.left_behind) == (None, [], [])

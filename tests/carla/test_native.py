@@ -16,7 +16,8 @@ import polars as pl
 import psutil
 import pytest
 
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import read_scenario
 from odscen.carla.native import native_actors
 from odscen.catalog.store import Workspace
 from odscen.scenario.files import dumps
@@ -33,9 +34,9 @@ def planned(workspace: Workspace) -> Any:
     """A function: scenario file to plan, lane graph and native actors."""
 
     def made(path: Path) -> Any:
-        scenario = workflow.read_scenario(path)
+        scenario = read_scenario(path)
         entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-        graph = workflow.load_map(entry)
+        graph = load_map(entry)
         run = prepare(scenario, graph.sumo, entry.path("net"))
         return run.plan, graph.sumo.graph, native_actors(scenario, graph.sumo.graph, run.plan)
 
@@ -141,7 +142,7 @@ def test_vehicles_go_the_way_of_the_plan_and_stop_at_its_end(
 ) -> None:
     """One car alone, over several junctions: nothing but its path decides where it goes."""
     path = sample(TOWN, seed=3, fill=0.1)
-    scenario = workflow.read_scenario(path)
+    scenario = read_scenario(path)
     cars = [a for a in planned(path)[2] if a.category == "car" and len(a.path) >= 3]
     chosen = max(cars, key=lambda car: len(car.way))
     actors = tuple(actor for actor in scenario.actors if actor.id == chosen.id)

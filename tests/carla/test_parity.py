@@ -12,6 +12,7 @@ from odscen.carla.client import Address
 from odscen.carla.cosim import CosimOptions, cosim
 from odscen.catalog.store import Workspace
 from odscen.sumo.in_step import Step
+from odscen.sumo.run_settings import RunSettings
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
 
@@ -41,7 +42,9 @@ def test_what_somebody_else_does_to_the_mirror_is_in_the_comparison(
             return True
 
         options = CosimOptions(address=address, on_step=interfere)
-        result, report = cosim(workspace, path, options, out=tmp_path, until=6.0)
+        result, report = cosim(
+            workspace, path, options, out=tmp_path, settings=RunSettings(until=6.0)
+        )
         assert report.error is None
     folder = result.folder
     figures = json.loads((folder / "parity.json").read_text(encoding="utf-8"))

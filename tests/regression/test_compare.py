@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from odscen import workflow
+from odscen.app import runs
 from odscen.catalog.store import Workspace
 from odscen.errors import InputError
 from odscen.regression.compare import compare_runs, read_runs
 from odscen.regression.comparison_page import comparison_page
 from odscen.regression.measure import Key
 from odscen.results.comparison import compare_figure
+from odscen.sumo.run_settings import RunSettings
 from tests.cli.conftest import odscen
 from tests.regression.conftest import ROOT
 
@@ -54,7 +55,7 @@ def sides(tmp_path_factory):
     other.write_text(json.dumps(changed))
     for side, path in (("a", SCENARIO), ("b", other)):
         for seed in (1, 2, 3):
-            workflow.run(store, [path], out=root / side / str(seed), seed=seed)
+            runs.run(store, [path], out=root / side / str(seed), settings=RunSettings(seed=seed))
             (root / side / str(seed) / "signal_crossing").rename(root / side / f"seed-{seed}")
     return root / "a", root / "b"
 
@@ -111,7 +112,9 @@ def test_a_page_of_runs_that_are_the_same_says_so(sides):
 def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
     store = Workspace.open(tmp_path / "workspace")
     store.add_map(ROOT / "maps" / "signal_crossing.xodr")
-    (done,) = workflow.run(store, [SCENARIO], out=tmp_path, seed=1, slice_length=100.0)
+    (done,) = runs.run(
+        store, [SCENARIO], out=tmp_path, settings=RunSettings(seed=1, slice_length=100.0)
+    )
     assert "trajectory_parts" in done.summary["files"]
     sliced, whole = read_runs(done.folder), read_runs(sides[0] / "seed-1")
     assert sliced.places

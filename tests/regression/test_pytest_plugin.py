@@ -45,7 +45,7 @@ def test_pytest_finds_the_plugin_by_its_entry_point():
 def test_scenario_files_are_left_alone_unless_asked_for(project, workspace):
     (project / "test_other.py").write_text(
         "import sys\n\ndef test_nothing_is_loaded():\n"
-        "    assert not {'libsumo', 'polars', 'numpy', 'odscen.workflow'} & set(sys.modules)\n"
+        "    assert not {'libsumo', 'polars', 'numpy', 'odscen.app'} & set(sys.modules)\n"
     )
     done = run_pytest(project, workspace, "-q")
     assert "1 passed" in done.stdout, done.stdout

@@ -11,7 +11,7 @@ import pytest
 import sumo
 
 from odscen.results.records import Plan, PlannedActor
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.measures import measures_xml
 from odscen.sumo.runner import PreparedRun
 
@@ -57,7 +57,7 @@ def prepare(grid: Path) -> Prepare:
             scenario="grid", seed=7, until=until, step_length=0.5, net_offset=(0.0, 0.0),
             actors=tuple(actors),
         )  # fmt: skip
-        settings = RunSettings(until=until, step_length=0.5, seed=7, measures=True)
+        settings = SumocfgSettings(until=until, step_length=0.5, seed=7, measures=True)
         return PreparedRun(
             plan=plan,
             sumo_files={
@@ -98,7 +98,7 @@ def long(grid: Path) -> PreparedRun:
                 f'<vehicle id="{name}" type="car" depart="{depart}" departLane="1">'
                 f'<route edges="{ROWS[index % 5]}"/></vehicle>'
             )
-    settings = RunSettings(until=UNTIL, step_length=0.5, seed=7, measures=True)
+    settings = SumocfgSettings(until=UNTIL, step_length=0.5, seed=7, measures=True)
     files = {
         "measures.add.xml": measures_xml(30.0, emissions=True),
         "routes.rou.xml": "\n".join([*lines, "</routes>", ""]),

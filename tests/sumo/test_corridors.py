@@ -14,6 +14,7 @@ from odscen.results.traffic import over_run
 from odscen.sumo.corridor_traces import corridor_traces
 from odscen.sumo.measured import read_figures
 from odscen.sumo.prepare import prepare
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import run_prepared
 from tests.sumo.test_on_maps import built, net_file, sampled
 
@@ -25,7 +26,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("corridor")
     scenario = sampled(NAME, fill=0.2)
     run_prepared(
-        prepare(scenario, built(NAME).sumo, net_file(NAME, folder), until=240.0), folder / "run"
+        prepare(
+            scenario, built(NAME).sumo, net_file(NAME, folder), settings=RunSettings(until=240.0)
+        ),
+        folder / "run",
     )
     return folder / "run"
 

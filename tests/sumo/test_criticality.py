@@ -14,6 +14,8 @@ from odscen.results.measures import safety
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
 from odscen.sumo.config import RunSettings, sumo_config
+from odscen.results.conflicts import SEEN_TTC, conflict_figures
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.recorded import read_conflicts, read_trajectories
 from odscen.sumo.recording import Recording
 from odscen.sumo.runner import PreparedRun, run_prepared
@@ -24,7 +26,7 @@ col = pl.col
 
 def watched(prepared: PreparedRun) -> PreparedRun:
     """The same run with an SSM device in every vehicle."""
-    settings = RunSettings(
+    settings = SumocfgSettings(
         until=UNTIL,
         step_length=prepared.plan.step_length,
         seed=prepared.plan.seed,

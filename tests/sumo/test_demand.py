@@ -23,6 +23,7 @@ from odscen.sumo.fit import planned_fit, run_fit
 from odscen.sumo.passages import planned_passages
 from odscen.sumo.prepare import prepare
 from odscen.sumo.realize import everybody, realize
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import run_prepared
 from odscen.sumo.tools import run_tool
 from odscen.sumo.town_day import peak_share, town_day, ways_in
@@ -45,7 +46,7 @@ def arms(name: str) -> list[str]:
 
 
 def planned(scenario: Scenario, name: str = CROSSING, **options: Any) -> tuple[PlannedActor, ...]:
-    return realize(scenario, built(name).sumo, **options).plan.actors
+    return realize(scenario, built(name).sumo, settings=RunSettings(**options)).plan.actors
 
 
 def segment(name: str, node: str | None) -> str:

@@ -11,16 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.categories import DEFAULT_BODY, Category
+from odscen.scenario.document import Actor
 from odscen.sumo.driving import KINDS, STYLES, Driver, draw_factor, driver, number
+from odscen.sumo.people import RoadUser
 from odscen.sumo.weather import BRAKING, NO_EFFECT, REACTION, stopping_speed, weather_effect
 from tests.sumo.conftest import BIN
 
 
 def made(category: Category = Category.CAR, **changes: Any) -> Driver:
-    values: dict[str, Any] = {
-        "style": "normal", "factor": 1.0, "speed": None, "limit": 13.89, "weather": NO_EFFECT,
-    }  # fmt: skip
-    return driver(category, DEFAULT_BODY[category], **{**values, **changes})
+    fields = {name: changes.pop(name) for name in Actor.model_fields if name in changes}
+    design = Actor(id="one", category=category, spawn="1.0.-1.0", **fields)
+    user = RoadUser("one", category, 0, 1, depart=0.0, speed=design.speed, design=design)
+    values: dict[str, Any] = {"factor": 1.0, "limit": 13.89, "weather": NO_EFFECT}
+    return driver(user, DEFAULT_BODY[category], **{**values, **changes})
 
 
 def test_a_normal_car_in_good_weather_is_sumos_own() -> None:

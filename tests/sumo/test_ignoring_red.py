@@ -13,6 +13,7 @@ from odscen.lanegraph.query import walk_node_id
 from odscen.scenario import edits
 from odscen.scenario.region import Region
 from odscen.sumo.prepare import prepare
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import run_prepared
 from tests.sumo.test_signals import crossing, net_file
 
@@ -44,7 +45,12 @@ def travel_times(folder: Path, *, ignores_red: bool) -> np.ndarray:
             ignores_red=ignores_red,
         )
     folder.mkdir()
-    prepared = prepare(scenario, crossing().sumo, net_file(folder), until=900.0, step_length=0.5)
+    prepared = prepare(
+        scenario,
+        crossing().sumo,
+        net_file(folder),
+        settings=RunSettings(until=900.0, step_length=0.5),
+    )
     run_prepared(prepared, folder / "run")
     events = json.loads((folder / "run" / "events.json").read_text())["events"]
     taken = {one["actor"]: one["travel_time"] for one in events if "travel_time" in one}

@@ -10,7 +10,7 @@ import pytest
 from odscen.results.outcomes import StopReason
 from odscen.results.records import EventKind, events_from_json
 from odscen.sumo import jams
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.observed import Ahead
 from odscen.sumo.runner import run_prepared
 from tests.sumo.conftest import TYPES, Prepare
@@ -69,7 +69,7 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
         '<route edges="A1B1 B1C1"/></vehicle>'
     )
     run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{car}\n</routes>")
-    settings = RunSettings(until=until, step_length=0.5, seed=7, signals=True)
+    settings = SumocfgSettings(until=until, step_length=0.5, seed=7, signals=True)
     files = {**run.sumo_files, "signals.add.xml": red, "scenario.sumocfg": sumo_config(settings)}
     plan = replace(run.plan, until=until)
     result = run_prepared(replace(run, plan=plan, sumo_files=files), tmp_path / "run")

@@ -20,6 +20,7 @@ from odscen.sumo.long_runs import resume
 from odscen.sumo.parts import check_room
 from odscen.sumo.progress import Command, Pace, Progress
 from odscen.sumo.recorded import read_trajectories, recorded_files, trajectory_files
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import PreparedRun, run_prepared
 from tests.sumo.conftest import SLICE, TYPES, UNTIL
 
@@ -53,7 +54,8 @@ def killed(
 def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     long: PreparedRun, tmp_path: Path
 ) -> None:
-    result = run_prepared(long, tmp_path / "run", expectations=[parse_expectation("inserted==90")])
+    settings = RunSettings(expectations=(parse_expectation("inserted==90"),))
+    result = run_prepared(replace(long, settings=settings), tmp_path / "run")
     assert result.exit_code == 0
     assert result.summary["actors"]["arrived"] + result.summary["actors"]["running"] == 90
     assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]

@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 
 from odscen.results.summary import actors_from_json
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.lane_table import lane_table
 from odscen.sumo.measures import interval_of, measures_xml
 from odscen.sumo.recorded import read_lanes, read_trajectories, read_trips
@@ -204,7 +204,7 @@ def test_a_run_without_anybody_has_neither_lanes_nor_trips(
 def test_queues_of_the_mesoscopic_model_are_measured_across_slices_too(
     long: PreparedRun, tmp_path: Path
 ) -> None:
-    settings = RunSettings(until=UNTIL, step_length=0.5, seed=7, measures=True, meso=True)
+    settings = SumocfgSettings(until=UNTIL, step_length=0.5, seed=7, measures=True, meso=True)
     files = {**long.sumo_files, "scenario.sumocfg": sumo_config(settings)}
     folder = run_prepared(replace(long, sumo_files=files), tmp_path / "run").folder
     lanes, trips = read_lanes(folder), read_trips(folder)

@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.reports import write_report
 from odscen.catalog.assets import shipped_assets
 from odscen.categories import Category
 from odscen.convert.network import build_network
@@ -25,7 +26,8 @@ from odscen.scenario.config import SamplingConfig, overridden
 from odscen.scenario.document import Actor, Flow, Scenario
 from odscen.scenario.edits import add_actor
 from odscen.scenario.sampling import sample_scenario
-from odscen.sumo.prepare import prepare, write_report
+from odscen.sumo.prepare import prepare
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import run_prepared
 from odscen.sumo.sumo_map import SumoMap, pos_per_metre
 from odscen.sumo.usable import usable_places
@@ -70,7 +72,11 @@ def sampled(name: str, *, seed: int = 1, fill: float = 0.4) -> Scenario:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_sampled_actors_start_in_their_places_and_arrive(name: str, tmp_path: Path) -> None:
     prepared = prepare(
-        sampled(name), built(name).sumo, net_file(name, tmp_path), shipped_assets(), until=1800
+        sampled(name),
+        built(name).sumo,
+        net_file(name, tmp_path),
+        shipped_assets(),
+        settings=RunSettings(until=1800),
     )
     result = run_prepared(prepared, tmp_path / "run")
     assert result.status == "completed", result.summary["error"]

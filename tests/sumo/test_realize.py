@@ -7,10 +7,11 @@ import pytest
 from lxml import etree
 
 from odscen.categories import Body, Category
-from odscen.errors import InputError, ScenarioError
+from odscen.errors import ScenarioError
 from odscen.scenario.document import Actor, Environment, Flow, MapReference, Scenario, Simulation
-from odscen.sumo.realize import Realization, SliceLength, realize, slices_of
+from odscen.sumo.realize import Realization, realize, slices_of
 from odscen.sumo.recording import Recording
+from odscen.sumo.run_settings import RunSettings, SliceLength
 from tests.graphs import SHA256
 from tests.sumo.toys import sumo_map
 
@@ -65,7 +66,7 @@ def test_the_same_scenario_gives_the_same_bytes_whatever_the_order_of_its_actors
     assert realize(scenario(), sumo_map()).files == one.files
     turned = scenario(actors=scenario().actors[::-1])
     assert realize(turned, sumo_map()).files == one.files
-    assert realize(scenario(), sumo_map(), seed=6).files != one.files
+    assert realize(scenario(), sumo_map(), settings=RunSettings(seed=6)).files != one.files
 
 
 def test_the_plan_says_where_each_body_is_to_stand() -> None:
@@ -92,7 +93,10 @@ def test_a_vehicle_has_place_and_speed_factor_and_speed_in_the_files() -> None:
 
 
 def test_an_open_goal_is_drawn_by_the_seed() -> None:
-    goals = {realize(scenario(), sumo_map(), seed=s).plan.actors[0].goal for s in range(12)}
+    goals = {
+        realize(scenario(), sumo_map(), settings=RunSettings(seed=s)).plan.actors[0].goal
+        for s in range(12)
+    }
     assert goals == {"3.0.-1.49", "3.0.-2.49"}
 
 
@@ -123,15 +127,14 @@ def test_vehicles_and_nobody_else_watch_how_close_they_come() -> None:
         Actor(id="a", category=Category.CAR, spawn="1.0.-2.10"),
         Actor(id="p", category=Category.PEDESTRIAN, spawn="ped.1.0.-3.10"),
     )
-    realized = realize(scenario(actors=actors), sumo_map(), recording=Recording(criticality=True))
+    realized = realize(
+        scenario(actors=actors),
+        sumo_map(),
+        settings=RunSettings(recording=Recording(criticality=True)),
+    )
     watching = {kind.get("id"): len(kind) for kind in routes(realized).iterfind("vType")}
     assert watching == {"car.0": 1, "pedestrian.0": 0}
     assert "device.ssm.file" in realized.files["scenario.sumocfg"]
-
-
-def test_criticality_is_refused_where_there_are_only_queues() -> None:
-    with pytest.raises(InputError, match="meso"):
-        realize(scenario(), sumo_map(), recording=Recording(criticality=True), meso=True)
 
 
 def test_equal_types_are_written_once() -> None:
@@ -149,7 +152,10 @@ def test_weather_can_be_switched_off_twice() -> None:
     wet = realize(storm, sumo_map(), ToyAssets())
     dry = realize(scenario(), sumo_map(), ToyAssets())
     assert wet.files != dry.files
-    assert realize(storm, sumo_map(), ToyAssets(), weather=False).files == dry.files
+    assert (
+        realize(storm, sumo_map(), ToyAssets(), settings=RunSettings(weather=False)).files
+        == dry.files
+    )
     off = scenario(environment=Environment(preset="Storm", affects_driving=False))
     assert realize(off, sumo_map(), ToyAssets()).files == dry.files
     by_hand = Environment(parameters={"precipitation": 100.0, "wetness": 100.0})
@@ -179,7 +185,7 @@ def test_a_shorter_run_has_the_first_members_of_the_same_flow() -> None:
     flow = Flow(id="f", spawn="1.0.-2.3", per_hour=1800, end=3600.0)
     crowd = scenario(actors=(), flows=(flow,), simulation=Simulation(duration=600.0))
     long = realize(crowd, sumo_map()).plan.actors
-    short = realize(crowd, sumo_map(), until=100.0).plan.actors
+    short = realize(crowd, sumo_map(), settings=RunSettings(until=100.0)).plan.actors
     assert short == long[: len(short)]
     assert short
     assert max(actor.depart for actor in short) < 100.0
@@ -207,7 +213,9 @@ def test_a_flow_member_and_an_actor_cannot_share_a_name() -> None:
 
 
 def test_settings_of_the_run_are_in_the_configuration() -> None:
-    text = realize(scenario(), sumo_map(), until=42.0, step_length=0.1).files["scenario.sumocfg"]
+    text = realize(scenario(), sumo_map(), settings=RunSettings(until=42.0, step_length=0.1)).files[
+        "scenario.sumocfg"
+    ]
     config = etree.fromstring(text.encode())
     values = {e.tag: e.attrib["value"] for section in config for e in section}
     assert (values["end"], values["step-length"], values["seed"]) == ("42", "0.1", "5")

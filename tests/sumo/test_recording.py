@@ -8,7 +8,7 @@ import pytest
 
 from odscen.durations import clock, parse_duration
 from odscen.errors import InputError, SimulationError
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.parts import tidy_part
 from odscen.sumo.recording import Recording, parse_recording, region_xml
 from odscen.sumo.route_slices import RouteSlices
@@ -59,7 +59,7 @@ def recorded(prepare: Prepare, out: Path, text: str) -> pl.DataFrame:
     """Trajectories of the small run with this recording."""
     run = prepare()
     recording = parse_recording(text)
-    settings = RunSettings(until=200.0, step_length=0.5, seed=7, recording=recording)
+    settings = SumocfgSettings(until=200.0, step_length=0.5, seed=7, recording=recording)
     files = {**run.sumo_files, "scenario.sumocfg": sumo_config(settings)}
     if recording.region is not None:
         files["region.add.xml"] = region_xml(recording.region, run.plan.net_offset)
@@ -96,7 +96,7 @@ def test_a_run_that_records_no_trajectories_has_everything_else(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     run = prepare()
-    settings = RunSettings(
+    settings = SumocfgSettings(
         until=200.0, step_length=0.5, seed=7, recording=Recording(trajectories=False)
     )
     files = {**run.sumo_files, "scenario.sumocfg": sumo_config(settings)}

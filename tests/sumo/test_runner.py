@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from odscen.errors import WorkspaceError
 from odscen.results.expectations import parse_expectation
 from odscen.results.records import EventKind, events_from_json
 from odscen.results.summary import actors_from_json
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import PreparedRun, RunJob, run_many, run_prepared
 from tests.sumo.conftest import BIN, Prepare
 
@@ -139,7 +141,8 @@ def test_a_network_that_sumo_cannot_read_or_crashes_on_is_a_failed_run(
 def test_a_run_over_its_time_limit_is_stopped_and_has_failed(
     prepare: Prepare, tmp_path: Path
 ) -> None:
-    result = run_prepared(prepare(), tmp_path / "run", time_limit=0.01)
+    hurried = replace(prepare(), settings=RunSettings(time_limit=0.01))
+    result = run_prepared(hurried, tmp_path / "run")
     assert result.status == "failed"
     assert "time limit of 0.01 s" in result.summary["error"]
     assert "trajectories" not in result.summary["files"]
@@ -163,8 +166,9 @@ def test_progress_is_told_and_never_runs_backwards(prepare: Prepare, tmp_path: P
 
 
 def test_expectations_are_judged_and_decide_the_exit_code(prepare: Prepare, tmp_path: Path) -> None:
-    wanted = [parse_expectation("arrived>=0.95"), parse_expectation("sim_seconds<5")]
-    result = run_prepared(prepare(), tmp_path / "run", expectations=wanted)
+    wanted = parse_expectation("arrived>=0.95"), parse_expectation("sim_seconds<5")
+    judged = replace(prepare(), settings=RunSettings(expectations=wanted))
+    result = run_prepared(judged, tmp_path / "run")
     assert [v["passed"] for v in result.summary["expectations"]] == [True, False]
     assert result.exit_code == 1
 

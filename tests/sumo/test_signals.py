@@ -27,6 +27,7 @@ from odscen.scenario import edits
 from odscen.scenario.document import Signals
 from odscen.sumo.prepare import prepare
 from odscen.sumo.realize import realize
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.runner import run_prepared, write_sumo_files
 from odscen.sumo.signals import scenario_lights, signals_xml
 from odscen.sumo.sumo_map import SumoMap
@@ -195,7 +196,9 @@ def timed(**fields: Any) -> Scenario:
 
 def states(folder: Path, one: Scenario, *, until: float) -> list[tuple[str, str]]:
     """Program and state of the light in each second, from plain SUMO on the exported files."""
-    prepared = prepare(one, crossing().sumo, net_file(folder), until=until, step_length=1.0)
+    prepared = prepare(
+        one, crossing().sumo, net_file(folder), settings=RunSettings(until=until, step_length=1.0)
+    )
     write_sumo_files(prepared.sumo_files, prepared.net, folder, link=False)
     (light,) = crossing().table.lights
     watch = f'<timedEvent type="SaveTLSStates" source="{light.id}" dest="states.xml"/>'

@@ -13,8 +13,9 @@ import pytest
 import uvicorn
 from starlette.testclient import TestClient
 
-from odscen import workflow
+from odscen.app.scenarios import SUFFIX, generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from odscen.web.app import create_app
 from odscen.web.security import LOOPBACK
 
@@ -48,8 +49,8 @@ def client(workspace: Workspace) -> Iterator[TestClient]:
 @pytest.fixture
 def sampled(workspace: Workspace) -> str:
     """Name of a scenario with cars and pedestrians that runs without problems."""
-    path = workflow.generate(workspace, map_name=CROSSING, seed=5, fill=0.25)[0]
-    return path.name.removesuffix(workflow.SUFFIX)
+    path = generate(workspace, settings=GenerationSettings(map_name=CROSSING, seed=5, fill=0.25))[0]
+    return path.name.removesuffix(SUFFIX)
 
 
 @pytest.fixture

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from odscen import demands, workflow
+from odscen.app import demands
+from odscen.app.maps import load_map
 from odscen.catalog.store import Workspace
 from odscen.scenario.counting import place_points
 from odscen.scenario.files import loads
@@ -93,7 +94,7 @@ def test_a_whole_day_keeps_who_is_there_and_is_one_step_for_undo(
     assert answer.status_code == 200, answer.text
     made = answer.json()
     document = made["scenario"]["document"]
-    ids = workflow.load_map(workspace.map(CROSSING)).sumo.graph.segments.ids
+    ids = load_map(workspace.map(CROSSING)).sumo.graph.segments.ids
     assert set(document["roi"]) == set(ids)
     assert document["simulation"]["duration"] == 86_400
     (matrix,) = document["demand"]["matrices"]
@@ -124,7 +125,7 @@ def test_the_fit_of_a_run_is_that_of_its_trajectories_with_places_on_the_map(
     assert found["met"] == sum(row.met for row in ours.rows) < 2
     assert "add up to 900" in found["rows"][1]["why"]
     scenario = loads(json.dumps(client.get("/api/scenarios/mine").json()["document"]))
-    graph = workflow.load_map(workspace.map(CROSSING)).sumo.graph
+    graph = load_map(workspace.map(CROSSING)).sumo.graph
     points = place_points(graph, [row[0] for row in scenario.demand.counts[0].rows])
     assert [(row["x"], row["y"]) for row in found["rows"]] == list(points.values())
 

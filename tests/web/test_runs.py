@@ -307,7 +307,7 @@ def test_a_run_whose_preparation_fails_can_be_removed(
         msg = "no way"
         raise SimulationError(msg)
 
-    monkeypatch.setattr(runs, "prepare", refuse)
+    monkeypatch.setattr(runs, "prepare_run", refuse)
     run = start(client, sampled)
     assert finished(client, run)["error"] == "no way"
     assert client.delete(f"/api/runs/{run}").status_code == 204
@@ -327,7 +327,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
 ) -> None:
     good = start(client, sampled, speed=5)
     wait_for(lambda: client.get(f"/api/runs/{good}").json()["state"] == "running" or None)
-    real = runs.prepare
+    real = runs.prepare_run
 
     def spoiled(*arguments: Any, **more: Any) -> Any:
         prepared = real(*arguments, **more)
@@ -338,7 +338,7 @@ def test_a_run_that_sumo_refuses_is_a_failed_run_in_sumos_words_and_harms_no_oth
         object.__setattr__(prepared, "sumo_files", files)
         return prepared
 
-    monkeypatch.setattr(runs, "prepare", spoiled)
+    monkeypatch.setattr(runs, "prepare_run", spoiled)
     bad = start(client, sampled)
     seen = watch(client, bad)
     assert seen.of("end")[0]["state"] == "failed"
@@ -471,16 +471,17 @@ def test_a_worker_ends_when_the_program_that_started_it_is_gone(
     script = """
 import os, sys, threading, time
 from pathlib import Path
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import read_scenario
 from odscen.catalog.store import Workspace
 from odscen.sumo.live import Live
 from odscen.sumo.prepare import prepare
 from odscen.sumo.progress import Pace
 from odscen.sumo.runner import run_prepared
 workspace = Workspace.open(Path(sys.argv[1]))
-scenario = workflow.read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
+scenario = read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
 entry = workspace.map("signal_crossing")
-prepared = prepare(scenario, workflow.load_map(entry).sumo, entry.path("net"))
+prepared = prepare(scenario, load_map(entry).sumo, entry.path("net"))
 live = Live(Pace(speed=0.1))
 threading.Thread(
     target=run_prepared, args=(prepared, Path(sys.argv[3]) / "run"), kwargs={"live": live},

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from odscen import workflow
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX, check_scenario
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import Workspace
 from odscen.categories import DEFAULT_BODY, Category
@@ -75,7 +76,7 @@ def new(client: TestClient) -> str:
 @pytest.fixture
 def places(workspace: Workspace) -> dict[str, str]:
     """Node names for the placeholders above: spawns far apart, a goal, and a walk."""
-    loaded = workflow.load_map(workspace.map(CROSSING))
+    loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
     region = Region.of(graph, ["j10001", "r1", "r2", "r3"])
     inside = [
@@ -145,7 +146,7 @@ def test_an_edit_of_a_part_takes_every_field_that_the_part_has(kind: str, part: 
 def test_edits_over_the_wire_give_the_same_documents_as_in_python(
     client: TestClient, workspace: Workspace, new: str, places: dict[str, str]
 ) -> None:
-    loaded = workflow.load_map(workspace.map(CROSSING))
+    loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
     ours = edits.new_scenario(graph, name="mine")
     state = client.get(f"/api/scenarios/{new}").json()
@@ -162,7 +163,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         file = workspace.scenarios / "mine.scenario.json"
         assert file.read_text(encoding="utf-8") == dumps(ours), kind
         assert loads(json.dumps(state["document"])) == ours
-        checked = workflow.check_scenario(workspace, ours)
+        checked = check_scenario(workspace, ours)
         assert [p["code"] for p in state["problems"]] == [p.code for p in checked]
 
 
@@ -336,10 +337,10 @@ def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
     client: TestClient, workspace: Workspace
 ) -> None:
     (town,) = (path for path in shipped_maps() if path.stem == "town_5x5")
-    graph = workflow.load_map(workspace.add_map(town)).sumo.graph
+    graph = load_map(workspace.add_map(town)).sumo.graph
     scenario = edits.new_scenario(graph, name="town", roi=graph.segments.ids)
     workspace.scenarios.mkdir(exist_ok=True)
-    (workspace.scenarios / f"town{workflow.SUFFIX}").write_text(dumps(scenario))
+    (workspace.scenarios / f"town{SUFFIX}").write_text(dumps(scenario))
     router = Region.of(graph, scenario.roi).router
     late = np.flatnonzero(late_for_changes(graph.lanes, DEFAULT_BODY[Category.CAR]))
     found = 0
@@ -359,8 +360,8 @@ def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
 def test_goals_ways_and_neighbours_are_those_of_the_graph(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
-    scenario = loads((workspace.scenarios / f"{sampled}{workflow.SUFFIX}").read_text())
-    graph = workflow.load_map(workspace.map(CROSSING)).sumo.graph
+    scenario = loads((workspace.scenarios / f"{sampled}{SUFFIX}").read_text())
+    graph = load_map(workspace.map(CROSSING)).sumo.graph
     region = Region.of(graph, scenario.roi)
     for category in ("car", "pedestrian"):
         actor = next(a for a in scenario.actors if a.category == category)

@@ -18,8 +18,9 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from odscen import workflow
+from odscen.app.scenarios import generate
 from odscen.catalog.store import Workspace
+from odscen.scenario.generation_settings import GenerationSettings
 from odscen.web.app import create_app
 from tests.web.conftest import CROSSING
 
@@ -47,7 +48,7 @@ def schema(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
     root = tmp_path_factory.mktemp("schema") / "workspace"
     shutil.copytree(built, root)
     workspace = Workspace.open(root)
-    workflow.generate(workspace, map_name=CROSSING, seed=1, fill=0.1)
+    generate(workspace, settings=GenerationSettings(map_name=CROSSING, seed=1, fill=0.1))
     app = create_app(workspace, hosts=None)
     app.router.lifespan_context = _kept  # schemathesis starts and ends the app for each request
     yield schemathesis.openapi.from_asgi("/api/openapi.json", app)

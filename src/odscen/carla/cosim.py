@@ -6,33 +6,29 @@ import signal
 import threading
 import time
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen import workflow
-from odscen.carla.blueprints import choose_blueprints, size_differences
+from odscen.app.runs import carry_out, check_file, prepare_run
 from odscen.carla.camera import first_view, watch_from_above
 from odscen.carla.client import Address
-from odscen.carla.ego import ExternalEgo
-from odscen.carla.environment import vehicle_lights, weather_parameters
 from odscen.carla.maps import ensure_map
-from odscen.carla.mirror import Mirror
+from odscen.carla.mirrored import MirroredPlan
 from odscen.carla.nearby import Nearby
 from odscen.carla.pictures import Wish
 from odscen.carla.recorder import StateRecorder
 from odscen.carla.server import Server
 from odscen.carla.signals import Heads
-from odscen.errors import CarlaError, InputError, in_file
-from odscen.scenario.problems import refuse_errors
+from odscen.errors import CarlaError, InputError
 from odscen.sumo.ground import Ground
 from odscen.sumo.in_step import InStep
-from odscen.sumo.prepare import prepare, write_report
-from odscen.sumo.runner import run_prepared
+from odscen.sumo.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from odscen.carla.camera import Camera
@@ -40,7 +36,8 @@ if TYPE_CHECKING:
     from odscen.results.records import Plan
     from odscen.sumo.in_step import Step
     from odscen.sumo.progress import OnProgress, Place
-    from odscen.sumo.runner import PreparedRun, RunResult
+    from odscen.sumo.run_settings import RunSettings
+    from odscen.sumo.runner import RunResult
 
 TICK = 0.05
 """Simulated seconds of a tick of CARLA's, at most, unless asked for otherwise."""
@@ -154,17 +151,27 @@ def cosim(
     path: Path,
     options: CosimOptions,
     *,
+    settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
-    seed: int | None = None,
-    until: float | None = None,
-    step_length: float | None = None,
-    weather: bool = True,
     progress: OnProgress | None = None,
 ) -> tuple[RunResult, CosimReport]:
     """Run a scenario in SUMO and show it on a CARLA server.
 
-    The run folder is that of :func:`odscen.workflow.run`, whatever happens to the server: if that
+    The run folder is that of :func:`odscen.app.runs.run`, whatever happens to the server: if that
     fails, SUMO stops and what it did so far is kept.
+
+    Parameters
+    ----------
+    path
+        Scenario file.
+    options
+        How it is mirrored.
+    settings
+        How it is run; always in one piece.
+    out
+        Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    progress
+        Called in this thread, a few times a second.
 
     Raises
     ------
@@ -174,57 +181,33 @@ def cosim(
         If the server is not there or does not fit; nothing has run then.
     """
     options.check()
-    scenario = workflow.read_scenario(path)
-    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    with in_file(str(path)):
-        refuse_errors(workflow.check_scenario(workspace, scenario))
-    loaded, assets = workflow.load_map(entry), workspace.assets()
-    prepared = prepare(
-        scenario,
-        loaded.sumo,
-        entry.path("net"),
-        assets,
-        seed=seed,
-        until=until,
-        step_length=step_length,
-        weather=weather,
-        slice_length=None,
-    )
+    run = check_file(workspace, path, out=out, settings=replace(settings, slice_length=None))
+    prepared = prepare_run(run)
     ticks = options.ticks(prepared.plan.step_length)
-    sky = weather_parameters(scenario.environment, assets)
     report = CosimReport(str(options.address))
     with (
         interrupts() as interrupted,
         Server(options.address) as server,
         ExitStack() as stack,
     ):
-        xodr = entry.path("xodr").read_text(encoding="utf-8")
-        report.map = ensure_map(server, entry.name, xodr, load=options.load_map)
+        xodr = run.entry.path("xodr").read_text(encoding="utf-8")
+        report.map = ensure_map(server, run.entry.name, xodr, load=options.load_map)
         server.synchronize(prepared.plan.step_length / ticks)
-        server.set_weather(sky)
-        blueprints = choose_blueprints(prepared.plan.actors, assets, server.library())
-        shapes = server.shapes(blueprints)
-        report.sizes = size_differences(prepared.plan.actors, blueprints, shapes)
-        ego = _external_ego(prepared, server, options, blueprints)
-        mirror = Mirror(
-            prepared.plan,
-            blueprints,
-            shapes,
-            nearby=options.nearby,
-            lights=vehicle_lights(sky),
-            left_out=ego.row if ego else None,
-        )
-        show = _Show(server, mirror, Heads(loaded.sumo.lights), ego, ticks, report, interrupted)
+        mirrored = MirroredPlan.on(server, run, prepared.plan, options)
+        report.sizes = mirrored.sizes
+        heads = Heads(run.map.sumo.lights)
+        show = _Show(server, mirrored, heads, ticks, report, interrupted)
         in_step = InStep(
             prepared.plan,
-            Ground(loaded.sumo.graph, entry.lane_table()),
+            Ground(run.map.sumo.graph, run.entry.lane_table()),
             show.on_step,
-            placed=ego.row if ego else None,
+            placed=mirrored.ego.row if mirrored.ego else None,
         )
         show.stop = in_step.stop
-        recorder = StateRecorder(prepared.plan, blueprints, shapes) if options.parity else None
-        if recorder is not None:
-            show.witnesses.append(lambda step: show.record(step, recorder))
+        recorder = None
+        if options.parity:
+            recorder = StateRecorder(prepared.plan, mirrored.blueprints, mirrored.shapes)
+            show.witnesses.append(partial(show.record, recorder=recorder))
         if options.pictures.any or options.on_picture:
             view = first_view(prepared.plan, options.pictures)
             camera = stack.enter_context(
@@ -234,33 +217,14 @@ def cosim(
         if options.on_step is not None:
             show.on_shown = options.on_step
 
-        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
+        def ended(folder: Path) -> None:
             if recorder is not None:
-                recorder.write(folder, loaded.drawing)
+                recorder.write(folder, run.map.drawing)
 
-        result = run_prepared(
-            prepared,
-            (out or workspace.runs) / workflow.folder_name(path),
-            progress=progress,
-            finish=finish,
-            live=in_step,
-        )
+        result = carry_out(run, prepared, progress=progress, ended=ended, live=in_step)
         show.conclude()
     report.left_behind = server.left_behind
     return result, report
-
-
-def _external_ego(
-    prepared: PreparedRun, server: Server, options: CosimOptions, blueprints: tuple[str, ...]
-) -> ExternalEgo | None:
-    if not options.external_ego:
-        return None
-    row = next((row for row, actor in enumerate(prepared.plan.actors) if actor.ego), None)
-    if row is None:
-        msg = "the scenario has no ego that could be driven in CARLA; mark one of its road users"
-        raise InputError(msg)
-    return ExternalEgo.take(server, prepared.plan, row, blueprints[row])
 
 
 def _follow_ego(camera: Camera, plan: Plan, step: Step) -> None:
@@ -274,9 +238,8 @@ class _Show:
     def __init__(
         self,
         server: Server,
-        mirror: Mirror,
+        mirrored: MirroredPlan,
         heads: Heads,
-        ego: ExternalEgo | None,
         ticks: int,
         report: CosimReport,
         interrupted: threading.Event,
@@ -285,9 +248,9 @@ class _Show:
         self.witnesses: list[Callable[[Step], None]] = []
         self.on_shown: Callable[[Step], bool] = lambda _step: True
         self._server = server
-        self._mirror = mirror
+        self._mirror = mirrored.mirror
         self._heads = heads
-        self._ego = ego
+        self._ego = mirrored.ego
         self._ticks = ticks
         self._report = report
         self._interrupted = interrupted

@@ -150,8 +150,8 @@ def _actor(
         row=row,
         id=user.id,
         category=user.category,
-        model=user.model,
-        ego=user.ego,
+        model=user.design.model,
+        ego=user.design.ego,
         depart=user.depart,
         at=at,
         height=DEFAULT_BODY[user.category].height,
@@ -159,8 +159,8 @@ def _actor(
         speed=speed,
         path=np.empty((0, 3)) if path is None else path,
         changes=changes,
-        offset=user.lateral_offset,
-        gap=_gap(user.style, user.category),
+        offset=user.design.lateral_offset,
+        gap=_gap(user.design.style, user.category),
     )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen import workflow
+from odscen.app.runs import carry_out, check_file, prepare_run
 from odscen.carla.camera import first_view
 from odscen.carla.client import Address
 from odscen.carla.cosim import interrupts
@@ -24,28 +24,27 @@ from odscen.carla.native import native_actors
 from odscen.carla.native_worker import NativeJob, Note, Shot, Tick, work
 from odscen.carla.pictures import Wish
 from odscen.carla.server import Server
-from odscen.errors import CarlaError, in_file
+from odscen.errors import CarlaError
 from odscen.frames import XodrPose, xodr_to_sumo
 from odscen.results.records import Event, EventKind, events_to_json
 from odscen.results.summary import actor_outcomes, actors_to_json
-from odscen.scenario.problems import refuse_errors
 from odscen.sumo import layout
-from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.process import Ended
 from odscen.sumo.progress import Done, Failed, Progress
-from odscen.sumo.runner import run_prepared
+from odscen.sumo.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
     import threading
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
     from multiprocessing.connection import Connection
     from pathlib import Path
-    from typing import Any
 
+    from odscen.app.runs import CheckedRun
     from odscen.carla.native_worker import Told
     from odscen.catalog.store import Workspace
     from odscen.results.records import Plan
     from odscen.sumo.progress import OnProgress
+    from odscen.sumo.run_settings import RunSettings
     from odscen.sumo.runner import RunResult
 
 LOG_FILE = "carla.log"
@@ -90,15 +89,26 @@ def run_native(
     path: Path,
     options: NativeOptions,
     *,
+    settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
-    seed: int | None = None,
-    until: float | None = None,
-    weather: bool = True,
     progress: OnProgress | None = None,
 ) -> tuple[RunResult, NativeReport]:
     """Let CARLA's Traffic Manager and walkers run a scenario.
 
     Ctrl-C ends it between two ticks, and what it did so far is kept.
+
+    Parameters
+    ----------
+    path
+        Scenario file.
+    options
+        How CARLA drives.
+    settings
+        How it is run; always in one piece.
+    out
+        Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    progress
+        Called in this thread with each tick.
 
     Raises
     ------
@@ -109,49 +119,18 @@ def run_native(
     """
     if options.pictures.any or options.on_picture:
         options.pictures.check()
-    scenario = workflow.read_scenario(path)
-    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
-    with in_file(str(path)):
-        refuse_errors(workflow.check_scenario(workspace, scenario))
-    loaded, assets = workflow.load_map(entry), workspace.assets()
-    prepared = prepare(
-        scenario,
-        loaded.sumo,
-        entry.path("net"),
-        assets,
-        seed=seed,
-        until=until,
-        weather=weather,
-        slice_length=None,
-    )
+    run = check_file(workspace, path, out=out, settings=replace(settings, slice_length=None))
+    prepared = prepare_run(run)
     plan = prepared.plan
     report = NativeReport()
 
     def simulate(folder: Path) -> Ended:
-        job = NativeJob(
-            address=options.address,
-            plan=plan,
-            assets=assets,
-            actors=native_actors(scenario, loaded.sumo.graph, plan),
-            delta=options.tick or min(plan.step_length, 0.05),
-            map_name=entry.name,
-            xodr=entry.path("xodr").read_text(encoding="utf-8"),
-            log=folder / LOG_FILE,
-            view=first_view(plan, options.pictures),
-            weather=weather_parameters(scenario.environment, assets),
-            load_map=options.load_map,
-            physics=options.physics,
-            pictures=options.pictures,
-            watched=options.on_picture is not None,
-        )
+        job = _job(run, plan, options, log=folder / LOG_FILE)
         with interrupts() as interrupted:
             follower = _Follower(job, folder, report, progress, options.on_picture)
             ended = follower.run(interrupted)
             report.interrupted = interrupted.is_set()
         return ended
-
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
     # SUMO has no part in this: no files of its own, and no routes that it could not find.
     actors = tuple(replace(actor, problem=None) for actor in plan.actors)
@@ -163,13 +142,26 @@ def run_native(
         notes=(),
         about={**prepared.about, "driven_by": "carla"},
     )
-    result = run_prepared(
-        prepared,
-        (out or workspace.runs) / workflow.folder_name(path),
-        finish=finish,
-        simulate=simulate,
+    return carry_out(run, prepared, simulate=simulate), report
+
+
+def _job(run: CheckedRun, plan: Plan, options: NativeOptions, *, log: Path) -> NativeJob:
+    return NativeJob(
+        address=options.address,
+        plan=plan,
+        assets=run.assets,
+        actors=native_actors(run.scenario, run.map.sumo.graph, plan),
+        delta=options.tick or min(plan.step_length, 0.05),
+        map_name=run.entry.name,
+        xodr=run.entry.path("xodr").read_text(encoding="utf-8"),
+        log=log,
+        view=first_view(plan, options.pictures),
+        weather=weather_parameters(run.scenario.environment, run.assets),
+        load_map=options.load_map,
+        physics=options.physics,
+        pictures=options.pictures,
+        watched=options.on_picture is not None,
     )
-    return result, report
 
 
 class _Follower:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
 from odscen.sumo.process import messages
 from odscen.sumo.progress import Done, Failed, Pace
+from odscen.sumo.run_settings import AS_DESIGNED, RunSettings
 
 if TYPE_CHECKING:
     from odscen.carla.client import Address
@@ -38,8 +39,12 @@ class ServedJob:
         Paths; the run's folder has the name of the scenario's file.
     address
         Of the server, ``HOST:PORT``.
+    step_length
+        Seconds of a step, whoever has chosen it.
     origin
         What frames have subtracted, see :func:`odscen.sumo.snapshots.origin`.
+    settings
+        How the scenario is run.
     """
 
     workspace: str
@@ -48,8 +53,7 @@ class ServedJob:
     address: str
     step_length: float
     origin: tuple[float, float] = (0.0, 0.0)
-    seed: int | None = None
-    until: float | None = None
+    settings: RunSettings = AS_DESIGNED
     paused: bool = False
     speed: float | None = None
 
@@ -60,13 +64,18 @@ class ServedJob:
 
     def to_line(self) -> bytes:
         """As the first line of the worker's standard input."""
-        return (json.dumps(asdict(self)) + "\n").encode()
+        data = asdict(self) | {"settings": self.settings.to_dict()}
+        return (json.dumps(data) + "\n").encode()
 
     @classmethod
     def from_line(cls, line: bytes) -> Self:
         """Inverse of :meth:`to_line`."""
         data = json.loads(line)
-        return cls(**{**data, "origin": tuple(data["origin"])})
+        own = {
+            "origin": tuple(data["origin"]),
+            "settings": RunSettings.from_dict(data["settings"]),
+        }
+        return cls(**{**data, **own})
 
 
 def run_served(job: ServedJob, live: Live) -> Done | Failed:

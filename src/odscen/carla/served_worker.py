@@ -68,9 +68,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
             on_step=page.on_step,
             on_picture=lambda jpeg: send(Shot(len(jpeg)), jpeg),
         ),
-        seed=job.seed,
-        until=job.until,
-        step_length=job.step_length,
+        settings=job.settings,
         progress=lambda message: send(message, b""),
     )
     troubles = [report.error, *report.left_behind, result.summary["error"]]

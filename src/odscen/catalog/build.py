@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from odscen.convert.conversion_settings import ConversionSettings
     from odscen.convert.lane_table import SumoLight
 
 
@@ -47,7 +48,7 @@ def build_map(
     name: str,
     file: str,
     sha256: str,
-    spacing: float,
+    settings: ConversionSettings,
     builder: str,
     progress: Callable[[str, float], None],
 ) -> None:
@@ -59,8 +60,8 @@ def build_map(
         The .xodr; ``file`` is its name for messages and ``sha256`` its hash.
     folder
         Exists and is empty.
-    spacing
-        Metres between nodes of the lane graph.
+    settings
+        How it is converted.
     builder
         Version of the folder's content.
     progress
@@ -77,7 +78,7 @@ def build_map(
     table = RoadTable.of(odr)
     (folder / FILES["xodr"]).write_bytes(content)
     progress("building the lane graph", 0.1)
-    graph = build_map_graph(odr, name=name, sha256=sha256, spacing=spacing, table=table)
+    graph = build_map_graph(odr, name=name, sha256=sha256, spacing=settings.spacing, table=table)
     (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
     (folder / FILES["graph"]).write_bytes(to_graphml(graph))
     progress("making the SUMO network", 0.4)
@@ -97,7 +98,7 @@ def build_map(
         "name": name,
         "source": file,
         "sha256": sha256,
-        "spacing": spacing,
+        "spacing": settings.spacing,
         "opendrive": {"version": f"{header.rev_major}.{header.rev_minor}", "rule": odr.rule},
         "statistics": statistics.to_dict(),
         "graph": graph_counts(graph),

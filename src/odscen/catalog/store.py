@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.catalog.assets import assets_in
 from odscen.catalog.folders import discard, new_folder
+from odscen.convert.conversion_settings import USUAL, ConversionSettings
 from odscen.errors import InputError, NotFoundError, WorkspaceError, in_file
 
 if TYPE_CHECKING:
@@ -81,6 +82,11 @@ class MapEntry:
     def sha256(self) -> str:
         """SHA-256 of the .xodr, hexadecimal."""
         return str(self.info["sha256"])
+
+    @property
+    def conversion(self) -> ConversionSettings:
+        """How it was converted."""
+        return ConversionSettings(spacing=float(self.info["spacing"]))
 
     def path(self, key: str) -> Path:
         """Absolute path of one of the files named in ``map.json``, for example ``"net"``."""
@@ -196,9 +202,7 @@ class Workspace:
         folder = self.root / "maps" / name
         entry = _read_entry(folder)
         if entry.info.get("builder") != BUILDER:
-            return self.add_map(
-                folder / "map.xodr", name=name, spacing=float(entry.info["spacing"])
-            )
+            return self.add_map(folder / "map.xodr", name=name, settings=entry.conversion)
         return entry
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
@@ -232,12 +236,12 @@ class Workspace:
         source: Path,
         *,
         name: str | None = None,
-        spacing: float = 2.0,
+        settings: ConversionSettings = USUAL,
         progress: Progress | None = None,
     ) -> MapEntry:
         """Build everything that later steps need from an OpenDRIVE file, once.
 
-        A map of the same name is replaced if the file, the spacing or the builder differ, and left
+        A map of the same name is replaced if the file, the settings or the builder differ, and left
         as it is otherwise.
 
         Parameters
@@ -246,8 +250,8 @@ class Workspace:
             The .xodr file.
         name
             Name in the catalogue; the file's stem if not given.
-        spacing
-            Metres between the nodes of the lane graph.
+        settings
+            How it is converted.
 
         Raises
         ------
@@ -255,9 +259,6 @@ class Workspace:
             If the file cannot be used; names file, element and value.
         """
         name = check_name(name_from_file(source) if name is None else name)
-        if not 0.1 <= spacing <= 100.0:
-            msg = f"spacing must lie between 0.1 and 100 m, not {spacing:g}"
-            raise InputError(msg)
         try:
             content = source.read_bytes()
         except OSError as error:
@@ -265,9 +266,9 @@ class Workspace:
         final = self.root / "maps" / name
         sha256 = hashlib.sha256(content).hexdigest()
         built = _read_entry(final) if (final / "map.json").is_file() else None
-        if built and (built.sha256, built.info["spacing"], built.info["builder"]) == (
+        if built and (built.sha256, built.conversion, built.info["builder"]) == (
             sha256,
-            spacing,
+            settings,
             BUILDER,
         ):
             return built
@@ -280,7 +281,7 @@ class Workspace:
                 name=name,
                 file=source.name,
                 sha256=sha256,
-                spacing=spacing,
+                settings=settings,
                 builder=BUILDER,
                 progress=progress or (lambda _what, _share: None),
             )

@@ -69,12 +69,12 @@ def update(
     """
     import json
 
+    from odscen.app.text_files import write_text
     from odscen.carla.client import Address
     from odscen.carla.models import SOURCE, fetch_models
     from odscen.carla.server import Server
     from odscen.catalog.assets import BLUEPRINTS_FILE, blueprint_row
     from odscen.catalog.store import Workspace
-    from odscen.workflow import write_text
 
     store = Workspace.open(workspace)
     old = store.assets()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from odscen.carla.cosim import CosimReport
     from odscen.carla.native_run import NativeOptions
     from odscen.sumo.progress import Progress
+    from odscen.sumo.run_settings import RunSettings
     from odscen.sumo.runner import RunResult
 
 
@@ -106,7 +107,9 @@ def cosim(
     from odscen.carla.nearby import Nearby
     from odscen.carla.pictures import Wish
     from odscen.catalog.store import Workspace
+    from odscen.sumo.run_settings import RunSettings
 
+    settings = RunSettings(seed=seed, until=until, step_length=step_length, weather=weather)
     options = CosimOptions(
         address=Address.parse(carla, timeout=timeout),
         tick=tick,
@@ -126,10 +129,9 @@ def cosim(
                 physics=physics,
                 pictures=options.pictures,
             ),
+            # CARLA's ticks are its steps.
+            replace(settings, step_length=None),
             out=out,
-            seed=seed,
-            until=until,
-            weather=weather,
             workspace=workspace,
             as_json=as_json,
         )
@@ -142,11 +144,8 @@ def cosim(
             Workspace.open(workspace),
             scenario,
             options,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            step_length=step_length,
-            weather=weather,
             progress=follow,
         )
     _show(result, report, as_json=as_json)
@@ -156,11 +155,9 @@ def cosim(
 def _run_native(
     scenario: Path,
     options: NativeOptions,
+    settings: RunSettings,
     *,
     out: Path | None,
-    seed: int | None,
-    until: float | None,
-    weather: bool,
     workspace: Path | None,
     as_json: bool,
 ) -> NoReturn:
@@ -173,10 +170,8 @@ def _run_native(
             Workspace.open(workspace),
             scenario,
             options,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            weather=weather,
             progress=lambda message: step(
                 f"{message.time:.0f} s, {message.running} on the road", message.share
             ),

@@ -64,11 +64,11 @@ def import_(
     The scenario holds the values; the tables are not needed any more. What has the same name is
     replaced.
     """
-    from odscen import demands, workflow
+    from odscen.app import demands, scenarios
     from odscen.catalog.store import Workspace
 
     store = Workspace.open(workspace)
-    document = workflow.read_scenario(scenario)
+    document = scenarios.read_scenario(scenario)
     common: dict[str, Any] = {"mix": parse_mix(mix)} if mix else {}
     tables = {"zones": zones, "profile": profile, "od": trips, "counts": counts}
     given = {kind: file for kind, file in tables.items() if file is not None}
@@ -79,7 +79,7 @@ def import_(
         document = demands.import_table(
             store, document, file, kind=kind, name=name, day=day, **common
         )
-    path = workflow.write_scenario(document, out or scenario)
+    path = scenarios.write_scenario(document, out or scenario)
     _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
 
@@ -105,7 +105,7 @@ def add(
     One of --fill, --per-km and --trips says how many; the first two say how many are to be on the
     road at a time.
     """
-    from odscen import demands, workflow
+    from odscen.app import demands, scenarios
     from odscen.catalog.store import Workspace
 
     amounts = {"fill": fill, "per_km": per_km, "trips": trips}
@@ -115,9 +115,9 @@ def add(
     if day:
         fields["profile"] = day
     store = Workspace.open(workspace)
-    document = workflow.read_scenario(scenario)
+    document = scenarios.read_scenario(scenario)
     document = demands.add_background(store, document, name=name or "background", **fields)
-    path = workflow.write_scenario(document, out or scenario)
+    path = scenarios.write_scenario(document, out or scenario)
     _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
 
 
@@ -140,13 +140,13 @@ def weekday(
     Trips start and end anywhere, fewer of them where junctions would be too busy; what that is
     based on is printed. If the junctions do not carry as many as asked for, there are fewer.
     """
-    from odscen import demands, workflow
+    from odscen.app import demands, scenarios
     from odscen.catalog.store import Workspace
 
     store = Workspace.open(workspace)
     document, load = demands.whole_day(store, map_name, trips=trips, day=day, seed=seed)
-    path = workflow.write_scenario(
-        document, out or store.scenarios / f"{map_name}-{day}{workflow.SUFFIX}"
+    path = scenarios.write_scenario(
+        document, out or store.scenarios / f"{map_name}-{day}{scenarios.SUFFIX}"
     )
     log(
         f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; then the busiest "
@@ -171,7 +171,7 @@ def fit(
 
     Of a scenario, traffic as planned, with nobody in its way; of a run, as it was.
     """
-    from odscen import demands
+    from odscen.app import demands
     from odscen.catalog.store import Workspace
 
     found = demands.fit(Workspace.open(workspace), what)

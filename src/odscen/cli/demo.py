@@ -19,9 +19,10 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Build the maps that ship, sample a scenario, run it, and name the report to open."""
-    from odscen import workflow
+    from odscen.app import runs, scenarios
     from odscen.catalog.shipped import shipped_maps
     from odscen.catalog.store import Workspace
+    from odscen.scenario.generation_settings import GenerationSettings
 
     store = Workspace.open(workspace)
     for path in shipped_maps():
@@ -29,11 +30,10 @@ def demo(
             entry = store.add_map(path, progress=step)
         log(f"{entry.name}: {entry.info['graph']['nodes']:,} nodes ({entry.path('preview')})")
     with progress("generating") as step:
-        scenarios = workflow.generate(
-            store, map_name=DEMO_MAP, seed=seed, fill=DEMO_FILL, roi_segments=60, progress=step
-        )
-    log(f"Scenario: {scenarios[0]}")
-    results = workflow.run(store, scenarios)
+        settings = GenerationSettings(map_name=DEMO_MAP, seed=seed, fill=DEMO_FILL, roi_segments=60)
+        paths = scenarios.generate(store, settings=settings, progress=step)
+    log(f"Scenario: {paths[0]}")
+    results = runs.run(store, paths)
     if as_json:
         print_json(results[0].to_dict())
     else:

@@ -52,6 +52,7 @@ def add(
     that cannot be used are refused with their reason; the others are added all the same.
     """
     from odscen.catalog.store import Workspace
+    from odscen.convert.conversion_settings import ConversionSettings
 
     if name is not None and len(files) > 1:
         msg = f"--name takes one file, {len(files)} are given"
@@ -62,7 +63,12 @@ def add(
     for file, map_name in zip(files, names_for(files, name), strict=True):
         try:
             with progress(map_name) as step:
-                entry = store.add_map(file, name=map_name, spacing=spacing, progress=step)
+                entry = store.add_map(
+                    file,
+                    name=map_name,
+                    settings=ConversionSettings(spacing=spacing),
+                    progress=step,
+                )
         except OdscenError as error:
             worst = max(worst, error.exit_code)
             rows.append({"name": map_name, "source": str(file), "error": error_fields(error)})

@@ -38,13 +38,13 @@ def gate(
     Exit code 0: all as it should be; 1: something differs or falls short; 2: bad input; 3: a run
     failed.
     """
+    from odscen.app.text_files import write_text
     from odscen.catalog.store import Workspace
     from odscen.regression.gates import run_suite
     from odscen.regression.junit import junit_xml
     from odscen.regression.pages import suite_page
     from odscen.regression.suite import read_suite
     from odscen.regression.words import to_dict
-    from odscen.workflow import write_text
 
     read = read_suite(suite)
     with progress("testing") as step:
@@ -95,10 +95,10 @@ def compare(
     as_json: JsonOption = False,
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
+    from odscen.app.text_files import write_text
     from odscen.catalog.store import Workspace
     from odscen.regression.compare import compare_runs, read_runs
     from odscen.regression.comparison_page import comparison_page
-    from odscen.workflow import write_text
 
     # The page draws the map, if the workspace has it.
     store = None if html is None else Workspace.open(workspace)

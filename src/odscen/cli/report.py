@@ -33,7 +33,7 @@ def report(
     as_json: JsonOption = False,
 ) -> None:
     """Write the report of a finished run anew, with a corridor of your choice."""
-    from odscen import workflow
+    from odscen.app.reports import renew_report
     from odscen.catalog.store import Workspace
 
     if (first is None) != (last is None):
@@ -43,7 +43,7 @@ def report(
         msg = "give either --corridor, or --from and --to"
         raise typer.BadParameter(msg)
     segments = [name.strip() for name in (corridor or "").split(",") if name.strip()]
-    written = workflow.report(
+    written = renew_report(
         Workspace.open(workspace),
         run,
         corridor=segments,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from odscen.sumo.progress import Progress
-    from odscen.sumo.realize import SliceLength
+    from odscen.sumo.run_settings import SliceLength
     from odscen.sumo.runner import RunJob, RunResult
 
 
@@ -122,34 +122,38 @@ def run(
 
     Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input; 3: a run failed.
     """
-    from odscen import workflow
+    from odscen.app import runs
+    from odscen.app.scenarios import scenario_files
     from odscen.catalog.store import Workspace
     from odscen.results.expectations import parse_expectation
     from odscen.sumo.recording import Recording, parse_recording
+    from odscen.sumo.run_settings import RunSettings
 
     recording = Recording() if trajectories is None else parse_recording(trajectories)
     slice_length: SliceLength = "auto" if slice_ == "auto" else None
     if slice_ not in ("auto", "none"):
         slice_length = parse_duration(slice_)
-    expectations = [parse_expectation(text) for text in expect or ()]
-    paths = workflow.scenario_files(scenarios)
+    settings = RunSettings(
+        seed=seed,
+        until=until,
+        step_length=step_length,
+        weather=weather,
+        recording=replace(recording, emissions=emissions, criticality=criticality),
+        meso=meso,
+        slice_length=slice_length,
+        time_limit=time_limit,
+        expectations=tuple(parse_expectation(text) for text in expect or ()),
+    )
+    paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
     with _hint(out or store.runs), progress("running") as step:
-        results = workflow.run(
+        results = runs.run(
             store,
             paths,
+            settings=settings,
             out=out,
-            seed=seed,
-            until=until,
-            step_length=step_length,
-            weather=weather,
-            expectations=expectations,
             processes=jobs,
-            time_limit=time_limit,
             progress=_follow(step, len(paths)),
-            recording=replace(recording, emissions=emissions, criticality=criticality),
-            meso=meso,
-            slice_length=slice_length,
             tell=log,
         )
     show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
@@ -168,7 +172,7 @@ def resume(
 
     Exit codes as of ``run``.
     """
-    from odscen import workflow
+    from odscen.app import runs
     from odscen.catalog.store import Workspace
 
     with progress("resuming") as step:
@@ -176,7 +180,7 @@ def resume(
         def follow(message: Progress) -> None:
             step(_words(run.name, message), message.time / message.until)
 
-        result = workflow.resume(
+        result = runs.resume(
             Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
         )
     show_results([result], as_json=as_json, several=False)

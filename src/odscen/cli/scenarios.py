@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from odscen.app.export import EXPORTERS
 from odscen.cli.output import JsonOption, WorkspaceOption, log, print_json, progress
 
 ScenarioArgument = Annotated[
@@ -16,11 +16,11 @@ ScenarioArgument = Annotated[
 ]
 
 
-class Target(StrEnum):
-    """What a scenario can be exported to."""
-
-    SUMO = "sumo"
-    GRAPHML = "graphml"
+def _format(text: str) -> str:
+    if text not in EXPORTERS:
+        msg = f"{text!r} is not one of {', '.join(EXPORTERS)}"
+        raise typer.BadParameter(msg)
+    return text
 
 
 def generate(
@@ -46,25 +46,26 @@ def generate(
     as_json: JsonOption = False,
 ) -> None:
     """Sample scenarios on a map: region, weather, actors, goals. The same seed, the same bytes."""
-    from odscen import workflow
+    from odscen.app import scenarios
     from odscen.catalog.store import Workspace
+    from odscen.scenario.generation_settings import GenerationSettings
 
+    settings = GenerationSettings(
+        map_name=map_name,
+        count=count,
+        seed=seed,
+        fill=fill,
+        roi_segments=roi_segments,
+        config=scenarios.read_config(config),
+    )
     with progress("generating") as step:
-        paths = workflow.generate(
-            Workspace.open(workspace),
-            map_name=map_name,
-            count=count,
-            seed=seed,
-            fill=fill,
-            roi_segments=roi_segments,
-            config=workflow.read_config(config),
-            out=out,
-            progress=step,
+        paths = scenarios.generate(
+            Workspace.open(workspace), settings=settings, out=out, progress=step
         )
     rows = [
         {"file": str(path), "name": scenario.name, "map": scenario.map.name, "seed": scenario.seed}
         | {"segments": len(scenario.roi), "actors": len(scenario.actors)}
-        for path, scenario in ((path, workflow.read_scenario(path)) for path in paths)
+        for path, scenario in ((path, scenarios.read_scenario(path)) for path in paths)
     ]
     for row in rows:
         log(f"{row['file']}: {row['actors']} actors on {row['segments']} segments of {row['map']}")
@@ -81,11 +82,10 @@ def check(
 
     Exit code 0 without errors (warnings are allowed), 2 with errors.
     """
-    from odscen import workflow
+    from odscen.app.scenarios import check_scenario, read_scenario
     from odscen.catalog.store import Workspace
 
-    document = workflow.read_scenario(scenario)
-    problems = workflow.check_scenario(Workspace.open(workspace), document)
+    problems = check_scenario(Workspace.open(workspace), read_scenario(scenario))
     errors = sum(problem.severity == "error" for problem in problems)
     for problem in problems:
         log(f"{problem.severity}: {problem.where}: {problem.message}")
@@ -105,21 +105,23 @@ def check(
 
 def export(
     scenario: ScenarioArgument,
-    to: Annotated[Target, typer.Option(help="SUMO files to run alone, or the graph form.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            parser=_format,
+            metavar="|".join(EXPORTERS),
+            help="; ".join(f"{one.name}: {one.label}" for one in EXPORTERS.values()) + ".",
+        ),
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.", metavar="DIR")],
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a scenario as SUMO files (for plain ``sumo -c``) or as GraphML."""
-    from odscen import workflow
+    """Write a scenario in another format."""
+    from odscen.app.export import export as write
     from odscen.catalog.store import Workspace
 
-    store = Workspace.open(workspace)
-    document = workflow.read_scenario(scenario)
-    if to is Target.SUMO:
-        files = workflow.export_sumo(store, document, out, file=scenario)
-    else:
-        files = [workflow.export_graphml(store, document, out, file=scenario)]
+    files = write(Workspace.open(workspace), scenario, out, to=to)
     for file in files:
         log(f"Wrote {file}")
     if as_json:

@@ -13,10 +13,10 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen import __version__
+from odscen.app.text_files import write_text
 from odscen.errors import InputError, in_file
 from odscen.regression.measure import Key
 from odscen.results.records import json_with_rows
-from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from odscen.regression.measure import Measured
     from odscen.results.measures.figure import FigureKind
     from odscen.scenario.document import Scenario
+    from odscen.sumo.run_settings import RunSettings
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -49,9 +50,7 @@ class Baseline:
     figures: dict[Key, tuple[float | None, ...]]
 
 
-def fingerprint(
-    scenario: Scenario, map_sha256: str, *, until: float | None, step_length: float | None
-) -> Fingerprint:
+def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> Fingerprint:
     """Fingerprint of what a scenario is run from.
 
     The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
@@ -59,8 +58,8 @@ def fingerprint(
     """
     # What has its default value is left out: a field that a later version adds changes nothing.
     document = scenario.model_dump(mode="json", exclude_defaults=True)
-    settings = {"duration": until, "step_length": step_length}
-    given = {name: value for name, value in settings.items() if value is not None}
+    wished = {"duration": settings.until, "step_length": settings.step_length}
+    given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from odscen.app.maps import load_map
 from odscen.errors import InputError
 from odscen.regression.measure import measure
 from odscen.results.comparison import CONFIDENCE, compare_figure
@@ -16,7 +17,6 @@ from odscen.results.place_shapes import place_shapes
 from odscen.results.traffic_files import read_tables
 from odscen.sumo.ended import read_summary
 from odscen.sumo.layout import FIGURES_FOLDER, SUMMARY_FILE
-from odscen.workflow import load_map
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

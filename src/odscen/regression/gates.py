@@ -10,9 +10,15 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
+from odscen.app.runs import check_run, run_all
+from odscen.app.scenarios import read_scenario
 from odscen.catalog.assets import shipped_assets
 from odscen.catalog.store import name_from_file
+from odscen.convert.conversion_settings import ConversionSettings
 from odscen.errors import InputError, in_file
 from odscen.regression.baseline import (
     baseline_of,
@@ -28,12 +34,12 @@ from odscen.results.outcomes import RunStatus
 from odscen.scenario.problems import refuse_errors
 from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.recording import Recording
-from odscen.sumo.runner import RunJob, run_many
-from odscen.workflow import check_scenario, load_map, read_scenario
+from odscen.sumo.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from odscen.app.runs import CheckedRun
     from odscen.catalog.store import MapEntry, Workspace
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.measure import Measured
@@ -41,7 +47,7 @@ if TYPE_CHECKING:
     from odscen.regression.verdict import Verdict
     from odscen.scenario.document import Scenario
     from odscen.sumo.progress import Progress
-    from odscen.sumo.runner import RunResult
+    from odscen.sumo.runner import RunJob, RunResult
 
 
 class CaseStatus(StrEnum):
@@ -121,11 +127,10 @@ class SuiteResult:
 
 @dataclass(slots=True)
 class _Loaded:
-    """A case with its scenario on the map that it will run on."""
+    """A case with its scenario on the map that it will run on; ``run`` is without a seed."""
 
     case: Case
-    scenario: Scenario
-    entry: MapEntry
+    run: CheckedRun
     made_of: Fingerprint
     baseline: Baseline | None
     runs: dict[int, SeedResult] = field(default_factory=dict)
@@ -160,13 +165,14 @@ def run_suite(
     jobs: dict[str, tuple[_Loaded, int]] = {}
     with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
         root = out or Path(temporary)
-        run_jobs = []
+        runs = []
         for case in loaded:
             for seed in case.case.seeds:
                 name = f"{case.case.name}/seed-{seed}"
                 jobs[name] = case, seed
-                run_jobs.append(RunJob(name, _preparer(case, seed), root / name))
-        follow = _Follow(len(run_jobs), progress)
+                settings = replace(case.run.settings, seed=seed)
+                runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
+        follow = _Follow(len(runs), progress)
 
         def done(job: RunJob, result: RunResult) -> None:
             case, seed = jobs[job.name]
@@ -175,19 +181,8 @@ def run_suite(
                 shutil.rmtree(result.folder)
             follow.done(job)
 
-        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-            if out is not None:
-                loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-                write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
-
-        run_many(
-            run_jobs,
-            processes=processes,
-            progress=follow.step,
-            done=done,
-            time_limit=suite.time_limit,
-            finish=finish,
-        )
+        keep = out is not None
+        run_all(runs, processes=processes, reports=keep, progress=follow.step, done=done)
     return SuiteResult(suite, tuple(_judge(case, update=update_baseline) for case in loaded))
 
 
@@ -225,12 +220,12 @@ def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_L
             # The suite names the map to test on; a baseline knows if it is not the one of before.
             reference = scenario.map.model_copy(update={"sha256": entry.sha256})
             scenario = scenario.model_copy(update={"map": reference})
-            refuse_errors(check_scenario(workspace, scenario))
-        made_of = fingerprint(
-            scenario, entry.sha256, until=case.until, step_length=case.step_length
-        )
+            settings = _settings(case, suite)
+            run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
+        made_of = fingerprint(scenario, entry.sha256, settings)
         baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
-        loaded.append(_Loaded(case, scenario, entry, made_of, baseline))
+        run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
+        loaded.append(_Loaded(case, run, made_of, baseline))
     return loaded
 
 
@@ -252,19 +247,16 @@ def _map_of(workspace: Workspace, scenario: Scenario, maps: Mapping[str, Path]) 
             return entry
     free = name not in workspace.map_names()
     own = name if free else f"{name[:50]}-{sha256[:8]}"
-    return workspace.add_map(maps[name], name=own, spacing=scenario.map.spacing)
+    settings = ConversionSettings(spacing=scenario.map.spacing)
+    return workspace.add_map(maps[name], name=own, settings=settings)
 
 
-def _preparer(loaded: _Loaded, seed: int) -> Callable[[], Any]:
-    return lambda: prepare(
-        loaded.scenario,
-        load_map(loaded.entry).sumo,
-        loaded.entry.path("net"),
-        shipped_assets(),
-        seed=seed,
-        until=loaded.case.until,
-        step_length=loaded.case.step_length,
-        recording=Recording(criticality=needs_criticality(loaded.case.expectations)),
+def _settings(case: Case, suite: Suite) -> RunSettings:
+    return RunSettings(
+        until=case.until,
+        step_length=case.step_length,
+        recording=Recording(criticality=needs_criticality(case.expectations)),
+        time_limit=suite.time_limit,
     )
 
 
@@ -291,13 +283,13 @@ def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
     problems += [missed for run in runs for missed in run.missed]
     figures = {run.seed: run.figures for run in runs if not run.error}
     if case.baseline is None or (update and len(figures) < len(runs)):
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
     if update:
         write_baseline(baseline_of(figures, loaded.made_of), case.baseline, scenario=case.name)
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems), updated=True)
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems), updated=True)
     if loaded.baseline is None:
         problems.append(f"there is no baseline {case.baseline}; write it with --update-baseline")
-        return CaseResult(case, loaded.entry.name, runs, problems=tuple(problems))
+        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
     unknown = sorted(figures.keys() - set(loaded.baseline.seeds))
     if unknown:
         listed = ", ".join(map(str, unknown))
@@ -305,4 +297,4 @@ def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
     verdict = hold_against(loaded.baseline, figures, case.tolerances)
     inputs = changed_inputs(loaded.baseline.fingerprint, loaded.made_of)
     problems += [change.words for change in verdict.failing]
-    return CaseResult(case, loaded.entry.name, runs, inputs, verdict, tuple(problems))
+    return CaseResult(case, loaded.run.entry.name, runs, inputs, verdict, tuple(problems))

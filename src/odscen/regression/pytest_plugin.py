@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from odscen.sumo.run_settings import RunSettings
     from odscen.sumo.runner import RunResult
 
 _SUFFIX = ".scenario.json"
@@ -68,7 +69,8 @@ class _ScenarioTest(pytest.Item):
             msg = f"odscen_seeds: {self.seed!r} is not a whole number"
             raise pytest.UsageError(msg) from None
         expect = self.config.getini("odscen_expect")
-        result = _run(self.config, factory.mktemp("odscen"), self.path, seed=seed, expect=expect)
+        settings = _settings(seed=seed, expect=expect)
+        result = _run(self.config, factory.mktemp("odscen"), self.path, settings)
         told = _shortcomings(result)
         if told:
             pytest.fail("\n".join(told), pytrace=False)
@@ -106,15 +108,9 @@ def odscen_run(
         expect: Sequence[str] = (),
         workspace: Path | None = None,
     ) -> RunResult:
-        result = _run(
-            request.config,
-            tmp_path_factory.mktemp("odscen"),
-            scenario,
-            seed=seed,
-            until=until,
-            expect=expect,
-            workspace=workspace,
-        )
+        settings = _settings(seed=seed, until=until, expect=expect)
+        folder = tmp_path_factory.mktemp("odscen")
+        result = _run(request.config, folder, scenario, settings, workspace=workspace)
         told = _shortcomings(result)
         if told:
             pytest.fail("\n".join(told))
@@ -123,31 +119,32 @@ def odscen_run(
     return run
 
 
+def _settings(
+    *, seed: int | None, until: float | None = None, expect: Sequence[str]
+) -> RunSettings:
+    from odscen.results.expectations import parse_expectation
+    from odscen.sumo.run_settings import RunSettings
+
+    expectations = tuple(parse_expectation(text) for text in expect)
+    return RunSettings(seed=seed, until=until, expectations=expectations)
+
+
 def _run(
     config: pytest.Config,
     out: Path,
     scenario: Path,
+    settings: RunSettings,
     *,
-    seed: int | None = None,
-    until: float | None = None,
-    expect: Sequence[str] = (),
     workspace: Path | None = None,
 ) -> RunResult:
     from pathlib import Path
 
-    from odscen import workflow
+    from odscen.app import runs
     from odscen.catalog.store import Workspace
-    from odscen.results.expectations import parse_expectation
 
     named = workspace or config.getoption("--odscen-workspace")
-    (result,) = workflow.run(
-        Workspace.open(Path(named) if named else None),
-        [Path(scenario)],
-        out=out,
-        seed=seed,
-        until=until,
-        expectations=[parse_expectation(text) for text in expect],
-    )
+    store = Workspace.open(Path(named) if named else None)
+    (result,) = runs.run(store, [Path(scenario)], settings=settings, out=out)
     return result
 
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, Field, ValidationError
 
+from odscen.app.scenarios import scenario_name
 from odscen.errors import InputError, ScenarioError
 from odscen.regression.tolerance import Tolerances, parse_tolerance
 from odscen.results.expectations import parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
 from odscen.scenario.document import Label, Part
 from odscen.scenario.files import validation_problems
-from odscen.workflow import folder_name
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -156,7 +156,7 @@ def _found(file: Path, key: str, pattern: str) -> list[Path]:
 
 
 def _case(document: _Document, entry: _ScenarioEntry, path: Path, folder: Path | None) -> Case:
-    name = folder_name(path)
+    name = scenario_name(path)
     tolerances = _tolerances(document.tolerance) | _tolerances(entry.tolerance)
     expect = dict.fromkeys((*document.expect, *entry.expect))
     return Case(

@@ -29,8 +29,8 @@ Longer than a red light, at which they stand behind each other for a reason.
 
 
 @dataclass(frozen=True, slots=True)
-class RunSettings:
-    """How SUMO runs a scenario.
+class SumocfgSettings:
+    """What a sumocfg says.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class RunSettings:
     meso: bool = False
 
 
-def sumo_config(settings: RunSettings) -> str:
+def sumo_config(settings: SumocfgSettings) -> str:
     """Text of ``scenario.sumocfg``."""
     recording = settings.recording
     inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
@@ -122,7 +122,7 @@ def sumo_config(settings: RunSettings) -> str:
     return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"
 
 
-def _outputs(settings: RunSettings) -> dict[str, str]:
+def _outputs(settings: SumocfgSettings) -> dict[str, str]:
     recording = settings.recording
     trips = {
         "tripinfo-output": TRIPINFO_FILE,

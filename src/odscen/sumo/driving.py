@@ -15,6 +15,7 @@ from odscen.scenario.goals import stream
 if TYPE_CHECKING:
     from odscen.categories import Body
     from odscen.scenario.document import DrivingStyle
+    from odscen.sumo.people import RoadUser
     from odscen.sumo.weather import WeatherEffect
 
 
@@ -117,38 +118,34 @@ def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) 
 
 
 def driver(
-    category: Category,
+    user: RoadUser,
     body: Body,
     *,
-    style: DrivingStyle,
     factor: float,
-    speed: float | None,
     limit: float | None,
     weather: WeatherEffect,
-    ignores_red: bool = False,
     electric: bool = False,
 ) -> Driver:
     """Attributes of somebody who drives, or walks, like this.
 
     Parameters
     ----------
+    user
+        Says category, style and the desired speed (m/s). A vehicle never goes faster. Where it is
+        above ``limit * factor``, the factor is raised so that the desired speed is reached at the
+        spawn, and other limits are exceeded in the same proportion.
     factor
         Drawn speed factor, see :func:`draw_factor`.
-    speed
-        Desired speed, m/s. A vehicle never goes faster. Where it is above ``limit * factor``, the
-        factor is raised so that the desired speed is reached at the spawn, and other limits are
-        exceeded in the same proportion.
     limit
         Speed limit at the spawn, m/s; ``None`` if unknown.
-    ignores_red
-        Of a pedestrian: crosses at red as at green (R45).
     electric
         Whether the model has no exhaust.
     """
+    category, speed = user.category, user.speed
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
-        return _walker(body, speed=speed, ignores_red=ignores_red)
-    kind, manner = KINDS[category], STYLES[style]
+        return _walker(user, body, speed=speed)
+    kind, manner = KINDS[category], STYLES[user.design.style]
     max_speed = kind.max_speed
     if speed is not None:
         max_speed = speed
@@ -176,7 +173,7 @@ def driver(
     return Driver(attributes, max_speed, round(factor, 4), accel)
 
 
-def _walker(body: Body, *, speed: float, ignores_red: bool) -> Driver:
+def _walker(user: RoadUser, body: Body, *, speed: float) -> Driver:
     attributes = (
         ("vClass", "pedestrian"),
         ("guiShape", "pedestrian"),
@@ -187,7 +184,7 @@ def _walker(body: Body, *, speed: float, ignores_red: bool) -> Driver:
         ("speedDev", "0"),
         ("emissionClass", KINDS[Category.PEDESTRIAN].emissions),
     )
-    if ignores_red:
+    if user.design.ignores_red:
         attributes += (("jmDriveAfterRedTime", number(ALWAYS, digits=0)),)
     return Driver(attributes, speed, 1.0, KINDS[Category.PEDESTRIAN].accel)
 

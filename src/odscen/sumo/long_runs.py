@@ -27,15 +27,16 @@ from odscen.sumo.run_folder import (
     make_summary,
     write_run_folder,
 )
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.status import locked, read_status, write_status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from odscen.results.expectations import Expectation
     from odscen.sumo.process import Companion
     from odscen.sumo.progress import OnProgress
+    from odscen.sumo.run_folder import Finish
 
 FORMAT = "odscen-run-settings"
 VERSION = 1
@@ -45,10 +46,8 @@ def run_long(
     prepared: PreparedRun,
     out: Path,
     *,
-    expectations: Sequence[Expectation] = (),
     progress: OnProgress | None = None,
-    time_limit: float | None = None,
-    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    finish: Finish | None = None,
     live: Companion | None = None,
 ) -> RunResult:
     """Run in slices in a new folder ``out``, which is there while it goes on.
@@ -63,10 +62,10 @@ def run_long(
     with _told(out):
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
-            _write_settings(prepared, folder, expectations)
+            _write_settings(prepared, folder)
             write_status(folder, prepared.plan, None)
         with locked(out) as lock:
-            return _go_on(prepared, out, lock, expectations, progress, time_limit, finish, live)
+            return _go_on(prepared, out, lock, progress, finish, live)
 
 
 def resume(
@@ -75,7 +74,7 @@ def resume(
     progress: OnProgress | None = None,
     tell: Callable[[str], None] | None = None,
     time_limit: float | None = None,
-    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    finish: Finish | None = None,
     live: Companion | None = None,
 ) -> RunResult:
     """Go on with an interrupted run from its last complete slice.
@@ -84,6 +83,8 @@ def resume(
     ----------
     tell
         Called with what the user should know: where it goes on, and which slices are damaged.
+    time_limit
+        Wall seconds after which it is interrupted again.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def resume(
         what = "interrupted run"
         raise NotFoundError(what, folder.name, interrupted(folder.parent))
     with _told(folder), locked(folder) as lock:
-        prepared, expectations = _restore(folder)
+        prepared = _restore(folder, time_limit)
         number, problems = survey(folder)
         if tell is not None:
             for problem in problems:
@@ -107,7 +108,7 @@ def resume(
             begin = read_checkpoint(folder, number).time if number else 0.0
             tell(f"going on at {begin:g} s, after slice {number}" if number else "begins anew")
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
-        return _go_on(prepared, folder, lock, expectations, progress, time_limit, finish, live)
+        return _go_on(prepared, folder, lock, progress, finish, live)
 
 
 def refuse_interrupted(out: Path) -> None:
@@ -147,15 +148,14 @@ def _go_on(
     prepared: PreparedRun,
     folder: Path,
     lock: int,
-    expectations: Sequence[Expectation],
     progress: OnProgress | None,
-    time_limit: float | None,
-    finish: Callable[[Path, Mapping[str, Any]], None] | None,
+    finish: Finish | None,
     live: Companion | None,
 ) -> RunResult:
-    ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live, keep=(lock,))
+    limit = prepared.settings.time_limit
+    ended = run_worker(folder, progress=progress, time_limit=limit, live=live, keep=(lock,))
     clear_parts(folder)  # a torn one takes room that what follows may need
-    summary = make_summary(prepared, folder, ended, expectations)
+    summary = make_summary(prepared, folder, ended)
     summary["slices"] = _slices(folder)
     if ended.done is None:
         kept = summary["slices"]["time"]
@@ -198,37 +198,37 @@ def _clear(folder: Path) -> None:
     (folder / layout.LOCK_FILE).unlink(missing_ok=True)
 
 
-def _write_settings(
-    prepared: PreparedRun, folder: Path, expectations: Sequence[Expectation]
-) -> None:
+def _write_settings(prepared: PreparedRun, folder: Path) -> None:
     settings = {
         "format": FORMAT,
         "version": VERSION,
         "problems": list(prepared.problems),
         "notes": list(prepared.notes),
         "about": dict(prepared.about),
-        "expectations": [one.text for one in expectations],
+        "expectations": [one.text for one in prepared.settings.expectations],
     }
     text = json.dumps(settings, indent=2, ensure_ascii=False) + "\n"
     (folder / layout.SETTINGS_FILE).write_text(text, encoding="utf-8")
 
 
-def _restore(folder: Path) -> tuple[PreparedRun, tuple[Expectation, ...]]:
+def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
+    """Read what is left to know of the run; all else is in its files."""
     path = folder / layout.SETTINGS_FILE
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         if (data["format"], data["version"]) != (FORMAT, VERSION):
             msg = f"format {data['format']!r} version {data['version']!r} is not a run to resume"
             raise InputError(msg, file=str(path))
-        prepared = PreparedRun(
+        expectations = tuple(parse_expectation(text) for text in data["expectations"])
+        return PreparedRun(
             plan=Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8")),
             sumo_files={},
             net=folder / layout.SUMO_FOLDER / layout.NET_FILE,
+            settings=RunSettings(time_limit=time_limit, expectations=expectations),
             problems=tuple(data["problems"]),
             notes=tuple(data["notes"]),
             about=data["about"],
         )
-        return prepared, tuple(parse_expectation(text) for text in data["expectations"])
     except (OSError, KeyError, TypeError, ValueError) as error:
         msg = f"cannot be resumed: {error!r}"
         raise InputError(msg, file=str(path)) from error

@@ -14,6 +14,7 @@ import numpy as np
 
 from odscen.categories import Category
 from odscen.scenario.counting import observations
+from odscen.scenario.document import Actor
 from odscen.scenario.goals import flow_goals, resolve_goals, stream
 from odscen.scenario.profiles import curve
 from odscen.scenario.region import place_of
@@ -26,11 +27,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.lanegraph.model import IntArray, MapGraph
-    from odscen.scenario.document import DrivingStyle, Flow, Scenario
+    from odscen.scenario.document import Flow, Scenario
     from odscen.scenario.profiles import Curve
     from odscen.scenario.region import Region
     from odscen.scenario.supply import Usable
     from odscen.scenario.trips import Trips
+
+
+_AS_USUAL = Actor(id="anybody", category=Category.CAR, spawn="anywhere")
+"""Its optional fields have the document's defaults; the others mean nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,9 @@ class RoadUser:
     They count on the pedestrian graph for pedestrians and on the lane graph for everybody else.
     ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
     of the demand: many share a goal, so their ways are found from there.
+
+    ``design`` is the actor as the document has it, for what is not decided here but acted on as it
+    is: model, style and the like. Members of flows and demand are as usual.
     """
 
     id: str
@@ -47,14 +55,10 @@ class RoadUser:
     spawn: int
     goal: int
     depart: float
-    model: str | None = None
     speed: float | None = None
-    lateral_offset: float = 0.0
-    style: DrivingStyle = "normal"
     flow: str | None = None
-    ego: bool = False
-    ignores_red: bool = False
     trip: bool = False
+    design: Actor = _AS_USUAL
 
     @property
     def person(self) -> bool:
@@ -80,12 +84,8 @@ def road_users(
             spawn=_node(graph, actor.spawn),
             goal=goals[actor.id],
             depart=actor.depart,
-            model=actor.model,
             speed=actor.speed,
-            lateral_offset=actor.lateral_offset,
-            style=actor.style,
-            ego=actor.ego,
-            ignores_red=actor.ignores_red,
+            design=actor,
         )
         for actor in scenario.actors
     ]

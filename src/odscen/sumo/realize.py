@@ -10,19 +10,19 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from odscen.categories import DEFAULT_BODY, Body
-from odscen.errors import InputError, ScenarioError
+from odscen.errors import ScenarioError
 from odscen.lanegraph.paths import Router
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.results.records import Plan, PlannedActor
 from odscen.scenario.problems import refuse_errors
 from odscen.scenario.region import Region
 from odscen.scenario.signals import signal_problems
-from odscen.sumo.config import RunSettings, sumo_config
+from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.demand import Demand
 from odscen.sumo.driving import KINDS, draw_factor, driver
 from odscen.sumo.layout import (
@@ -35,8 +35,9 @@ from odscen.sumo.layout import (
 from odscen.sumo.measures import interval_of, measures_xml
 from odscen.sumo.paths import each_path
 from odscen.sumo.people import RoadUser, demand_users, road_users
-from odscen.sumo.recording import Recording, region_xml
+from odscen.sumo.recording import region_xml
 from odscen.sumo.routes import NoRouteError, Route, RoutePlanner
+from odscen.sumo.run_settings import AS_DESIGNED
 from odscen.sumo.signals import scenario_lights, signals_xml
 from odscen.sumo.ssm import VEHICLE_PARAMETER
 from odscen.sumo.usable import usable_places
@@ -49,14 +50,13 @@ if TYPE_CHECKING:
     from odscen.lanegraph.model import IntArray
     from odscen.scenario.document import Environment, Scenario
     from odscen.sumo.driving import Driver
+    from odscen.sumo.run_settings import RunSettings, SliceLength
     from odscen.sumo.sumo_map import SumoMap
     from odscen.sumo.weather import WeatherEffect
 
 UNKNOWN_LIMIT = 13.89
 """Speed (m/s) that free-flow times assume where the map gives no limit: 50 km/h."""
 
-SliceLength = float | Literal["auto"] | None
-"""Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
 _HOUR = 3600.0
 _SLICES, _MOST_HOURS = 6, 4
 
@@ -93,13 +93,7 @@ def realize(
     sumo_map: SumoMap,
     assets: Assets | None = None,
     *,
-    seed: int | None = None,
-    until: float | None = None,
-    step_length: float | None = None,
-    weather: bool = True,
-    recording: Recording | None = None,
-    meso: bool = False,
-    slice_length: SliceLength = None,
+    settings: RunSettings = AS_DESIGNED,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -108,75 +102,66 @@ def realize(
     assets
         Knows the size of models and the parameters of weather presets; without it all bodies are
         their category's and only single parameters of the environment count.
-    seed, until, step_length
-        Instead of the scenario's own.
-    weather
-        Whether weather acts on driving; the scenario can also switch it off itself.
-    recording
-        What is recorded; everything if not given.
-    meso
-        Queues on road sections instead of single vehicles that follow each other.
-    slice_length
-        Seconds; a longer run goes in slices of this length, or of what suits it, see
-        :func:`slices_of`. ``None`` for one piece, however long.
+    settings
+        How it is run; what they leave open is the scenario's own.
 
     Raises
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable, or with every timing of a
         traffic light that is not possible.
-    InputError
-        If criticality is to be measured in meso.
     """
-    recording = recording or Recording()
-    if meso and recording.criticality:
-        msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"
-        raise InputError(msg)
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map.lights)))
-    if seed is not None:
-        scenario = scenario.model_copy(update={"seed": seed})
-    until = scenario.simulation.duration if until is None else until
-    step_length = scenario.simulation.step_length if step_length is None else step_length
+    if settings.seed is not None:
+        scenario = scenario.model_copy(update={"seed": settings.seed})
+    own, recording = scenario.simulation, settings.recorded
+    until = own.duration if settings.until is None else settings.until
+    step_length = own.step_length if settings.step_length is None else settings.step_length
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = everybody(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
-    effect = _effect(scenario.environment, assets) if weather else NO_EFFECT
+    effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
     demand = Demand((VEHICLE_PARAMETER,) if recording.criticality else ())
     writer = _Writer(sumo_map, region, assets, scenario.seed, effect, demand)
-    planned = writer.add(users)
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
         until=until,
         step_length=step_length,
         net_offset=sumo_map.net_offset,
-        actors=planned,
+        actors=writer.add(users),
         elevation=sumo_map.elevation,
-        slice_length=slices_of(until, slice_length, step_length),
+        slice_length=slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
     )
     signals = signals_xml(scenario.signals, sumo_map.lights)
-    settings = RunSettings(
-        until=until,
-        step_length=step_length,
-        seed=scenario.seed,
-        elevation=sumo_map.elevation,
+    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals)}
+    return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+
+
+def _run_files(plan: Plan, settings: RunSettings, signals: str | None) -> dict[str, str]:
+    """What SUMO reads beside network and routes; ``signals`` are programs that differ."""
+    recording = settings.recorded
+    sumocfg = SumocfgSettings(
+        until=plan.until,
+        step_length=plan.step_length,
+        seed=plan.seed,
+        elevation=plan.elevation,
         signals=signals is not None,
         recording=recording,
         measures=True,
-        meso=meso,
+        meso=settings.meso,
     )
-    interval = interval_of(until, plan.slice_length)
+    interval = interval_of(plan.until, plan.slice_length)
     files = {
-        ROUTES_FILE: writer.demand.to_xml(),
-        CONFIG_FILE: sumo_config(settings),
+        CONFIG_FILE: sumo_config(sumocfg),
         MEASURES_FILE: measures_xml(interval, emissions=recording.emissions),
     }
     if signals is not None:
         files[SIGNALS_FILE] = signals
     if recording.region is not None:
-        files[REGION_FILE] = region_xml(recording.region, sumo_map.net_offset)
-    return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+        files[REGION_FILE] = region_xml(recording.region, plan.net_offset)
+    return files
 
 
 def slices_of(until: float, length: SliceLength, step_length: float) -> float | None:
@@ -269,7 +254,7 @@ class _Writer:
             return _Way(None, str(error), length, duration)
 
     def _route(self, user: RoadUser, body: Body, path: IntArray) -> Route | Walk:
-        offset = user.lateral_offset
+        offset = user.design.lateral_offset
         if user.person:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
@@ -291,23 +276,20 @@ class _Writer:
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
         return driver(
-            user.category,
+            user,
             body,
-            style=user.style,
-            factor=draw_factor(self._seed, user.id, user.style, user.category),
-            speed=user.speed,
+            factor=draw_factor(self._seed, user.id, user.design.style, user.category),
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
-            ignores_red=user.ignores_red,
-            electric=user.model is not None
+            electric=user.design.model is not None
             and self._assets is not None
-            and self._assets.electric(user.model),
+            and self._assets.electric(user.design.model),
         )
 
     def _body(self, user: RoadUser) -> Body:
         known = None
-        if user.model is not None and self._assets is not None:
-            known = self._assets.dimensions(user.model)
+        if user.design.model is not None and self._assets is not None:
+            known = self._assets.dimensions(user.design.model)
         return DEFAULT_BODY[user.category] if known is None else known
 
     def _planned(self, user: RoadUser, body: Body, manner: Driver, way: _Way) -> PlannedActor:
@@ -323,17 +305,17 @@ class _Writer:
             depart=user.depart,
             length=body.length,
             width=body.width,
-            x=float(graph.x[spawn]) - math.sin(hdg) * user.lateral_offset,
-            y=float(graph.y[spawn]) + math.cos(hdg) * user.lateral_offset,
+            x=float(graph.x[spawn]) - math.sin(hdg) * user.design.lateral_offset,
+            y=float(graph.y[spawn]) + math.cos(hdg) * user.design.lateral_offset,
             z=float(graph.z[spawn]),
             hdg=hdg,
             speed=user.speed,
             speed_factor=manner.speed_factor,
             route_length=way.length,
             free_flow_time=way.free_flow_time,
-            model=user.model,
+            model=user.design.model,
             flow=user.flow,
-            ego=user.ego,
+            ego=user.design.ego,
             problem=way.problem,
         )
 

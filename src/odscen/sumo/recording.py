@@ -6,7 +6,8 @@ Trajectories as text, for the command line: ``none``, or ``key=value`` with comm
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 from odscen.durations import parse_duration
 from odscen.errors import InputError
@@ -46,6 +47,10 @@ class Recording:
     columns: tuple[str, ...] = ("lane",)
     emissions: bool = True
     criticality: bool = False
+
+    def with_criticality(self, wanted: bool) -> Self:
+        """Record how close road users come too, if that is wanted."""
+        return replace(self, criticality=True) if wanted else self
 
     def attributes(self, *, elevation: bool) -> tuple[str, ...]:
         """SUMO's names of the columns, in its order."""

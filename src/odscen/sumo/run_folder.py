@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -20,16 +21,20 @@ from odscen.results.summary import actors_from_json
 from odscen.results.traffic import TABLES
 from odscen.sumo import layout
 from odscen.sumo.measured import read_run_data, write_figures
+from odscen.sumo.measured import write_figures
+from odscen.sumo.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from odscen.results.expectations import Expectation
     from odscen.results.lane_places import LanePlaces
     from odscen.results.records import Plan
     from odscen.sumo.forecast import Forecast
     from odscen.sumo.process import Ended
+    from odscen.sumo.run_settings import RunSettings
+
+Finish = Callable[["Path", Mapping[str, Any]], None]
+"""Called with the folder and the summary of a run that has completed: the place for a report."""
 
 FORMAT = "odscen-run"
 VERSION = 1
@@ -48,6 +53,8 @@ class PreparedRun:
         :func:`odscen.sumo.realize.realize`.
     net
         SUMO network file of the map.
+    settings
+        How it is run; ``plan`` and ``sumo_files`` were made by the same.
     scenario_json
         The scenario document, kept in the run folder.
     problems, notes
@@ -63,6 +70,7 @@ class PreparedRun:
     plan: Plan
     sumo_files: Mapping[str, str]
     net: Path
+    settings: RunSettings = AS_DESIGNED
     scenario_json: str | None = None
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -132,9 +140,7 @@ def write_sumo_files(files: Mapping[str, str], net: Path, folder: Path, *, link:
     shutil.copyfile(net, target)
 
 
-def make_summary(
-    prepared: PreparedRun, folder: Path, ended: Ended, expectations: Sequence[Expectation]
-) -> dict[str, Any]:
+def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str, Any]:
     """What ``summary.json`` says of a run that has ended, well or badly."""
     plan, done = prepared.plan, ended.done
     # A long run may have been in the hands of several processes.
@@ -174,7 +180,7 @@ def make_summary(
         summary["gridlock"] = incident_summary(incidents)
     summary["expectations"] = [
         {"expectation": v.expectation, "value": v.value, "passed": v.passed}
-        for v in evaluate(expectations, summary)
+        for v in evaluate(prepared.settings.expectations, summary)
     ]
     summary["problems"] = list(prepared.problems)
     summary["notes"] = list(prepared.notes)

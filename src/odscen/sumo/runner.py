@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from odscen.catalog.folders import new_folder
 from odscen.errors import WorkspaceError
@@ -30,13 +30,13 @@ from odscen.sumo.run_folder import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Future
     from pathlib import Path
 
-    from odscen.results.expectations import Expectation
     from odscen.sumo.process import Companion, Ended
     from odscen.sumo.progress import OnProgress, Progress
+    from odscen.sumo.run_folder import Finish
 
 __all__ = ["PreparedRun", "RunJob", "RunResult", "run_many", "run_prepared", "write_sumo_files"]
 
@@ -45,10 +45,8 @@ def run_prepared(
     prepared: PreparedRun,
     out: Path,
     *,
-    expectations: Sequence[Expectation] = (),
     progress: OnProgress | None = None,
-    time_limit: float | None = None,
-    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
+    finish: Finish | None = None,
     live: Companion | None = None,
     tell: Callable[[str], None] | None = None,
     simulate: Callable[[Path], Ended] | None = None,
@@ -61,8 +59,6 @@ def run_prepared(
     ----------
     progress
         Called in this thread, a few times a second.
-    time_limit
-        Wall seconds after which the run is stopped and has failed.
     finish
         Called with the folder and the summary when a run has completed, before the folder appears:
         the place to add a report.
@@ -86,25 +82,18 @@ def run_prepared(
     if prepared.plan.slice_length is not None:
         if tell is not None and prepared.expected is not None:
             tell(f"{out.name}: {prepared.expected}")
-        return run_long(
-            prepared,
-            out,
-            expectations=expectations,
-            progress=progress,
-            time_limit=time_limit,
-            finish=finish,
-            live=live,
-        )
+        return run_long(prepared, out, progress=progress, finish=finish, live=live)
     try:
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
             if simulate is None:
-                ended = run_worker(folder, progress=progress, time_limit=time_limit, live=live)
+                limit = prepared.settings.time_limit
+                ended = run_worker(folder, progress=progress, time_limit=limit, live=live)
             else:
                 ended = simulate(folder)
             if ended.done is None:
                 drop_torn_records(folder)
-            summary = make_summary(prepared, folder, ended, expectations)
+            summary = make_summary(prepared, folder, ended)
             if finish is not None and ended.done is not None:
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
@@ -125,22 +114,23 @@ class _StoppedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class RunJob:
-    """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder."""
+    """One run of several: ``prepare`` is called when its turn comes; ``out`` is its folder.
+
+    ``finish`` as in :func:`run_prepared`.
+    """
 
     name: str
     prepare: Callable[[], PreparedRun]
     out: Path
+    finish: Finish | None = None
 
 
 def run_many(
     jobs: Sequence[RunJob],
     *,
     processes: int = 1,
-    expectations: Sequence[Expectation] = (),
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, RunResult], None] | None = None,
-    time_limit: float | None = None,
-    finish: Callable[[Path, Mapping[str, Any]], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> tuple[RunResult, ...]:
     """Run several scenarios, ``processes`` at a time; results in the order of ``jobs``.
@@ -158,15 +148,8 @@ def run_many(
             if progress is not None:
                 progress(job, message)
 
-        result = run_prepared(
-            job.prepare(),
-            job.out,
-            expectations=expectations,
-            progress=follow,
-            time_limit=time_limit,
-            finish=finish,
-            tell=tell,
-        )
+        prepared = job.prepare()
+        result = run_prepared(prepared, job.out, progress=follow, finish=job.finish, tell=tell)
         if done is not None:
             done(job, result)
         return result

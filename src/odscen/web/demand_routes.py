@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 
-from odscen import demands
+from odscen.app import demands
 from odscen.errors import InputError
 from odscen.scenario.document import Identifier, Scenario
 from odscen.web.messages import DayMade, ScenarioState, Version, WholeDay

@@ -13,13 +13,14 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from odscen.app.scenarios import SUFFIX
+from odscen.app.text_files import write_text
 from odscen.catalog.store import check_name
 from odscen.errors import ConflictError, InputError, NotFoundError, ScenarioError, WorkspaceError
 from odscen.scenario.files import dumps
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
-from odscen.workflow import SUFFIX, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from odscen.scenario.document import Part, Scenario
     from odscen.workflow import LoadedMap
+    from odscen.app.maps import LoadedMap
 
 _KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
 """Arguments that the server has itself, and the names of their types, which need no message."""

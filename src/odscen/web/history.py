@@ -15,8 +15,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
+from odscen.app.text_files import write_text
 from odscen.scenario.files import loads
-from odscen.workflow import write_text
 
 if TYPE_CHECKING:
     from pathlib import Path

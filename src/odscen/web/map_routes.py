@@ -11,6 +11,7 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
+from odscen.app.maps import load_map
 from odscen.catalog.shipped import shipped_maps
 from odscen.catalog.store import check_name, name_from_file
 from odscen.categories import DEFAULT_BODY

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from odscen.web.wire.media_types import Responses
 from odscen.workflow import load_map
+from odscen.app.maps import load_map
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,7 +7,8 @@ from pathlib import PurePosixPath
 from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
-from odscen import demands
+from odscen.app import demands
+from odscen.app.scenarios import read_scenario
 from odscen.scenario.counting import place_points
 from odscen.sumo.layout import SCENARIO_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit

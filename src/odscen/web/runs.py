@@ -8,38 +8,37 @@ import shutil
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from odscen.app.runs import carry_out, check_run, prepare_run, resume
+from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.carla.served import ServedJob, run_served
 from odscen.catalog.folders import discard
 from odscen.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
 from odscen.results.records import Plan
 from odscen.scenario.files import dumps
-from odscen.scenario.problems import refuse_errors
 from odscen.sumo import layout
 from odscen.sumo.live import Live
-from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.progress import Command, Failed, Pace
 from odscen.sumo.recording import Recording
-from odscen.sumo.runner import run_prepared
+from odscen.sumo.run_settings import RunSettings
 from odscen.sumo.snapshots import origin
 from odscen.sumo.status import going, read_status
 from odscen.web.kept_runs import KeptRuns
 from odscen.web.run_messages import RunForecast, RunInfo, RunProgress, RunState
-from odscen.workflow import SUFFIX, check_scenario, load_map, read_scenario, resume
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
+    from odscen.app.runs import CheckedRun
     from odscen.carla.client import Address
     from odscen.catalog.store import Workspace
     from odscen.scenario.document import Scenario
-    from odscen.sumo.runner import PreparedRun, RunResult
+    from odscen.sumo.runner import RunResult
     from odscen.web.run_messages import Control, GoOn, NewRun
-    from odscen.workflow import LoadedMap
 
 MOST = 8
 """Runs that can go on at a time."""
@@ -116,7 +115,7 @@ class Runs:
         ConflictError
             If too many are going on, or CARLA shows another one.
         """
-        refuse_errors(check_scenario(self._workspace, scenario))
+        run = check_run(self._workspace, scenario, name=name, settings=_settings(wish))
         if wish.carla and (wish.every is not None or not wish.trajectories):
             msg = (
                 "a run that CARLA shows is recorded step by step; leave every and trajectories out"
@@ -130,7 +129,10 @@ class Runs:
             pace = Pace(paused=wish.paused, speed=wish.speed)
             active = Active(self._free_id(name), scenario, Live(pace), carla=wish.carla)
             self._active[active.id] = active
-        active.future = self._pool.submit(self._run, active, lambda: self._simulate(active, wish))
+        run = replace(run, name=active.id, folder=self._workspace.runs / active.id)
+        active.future = self._pool.submit(
+            self._run, active, lambda: self._simulate(active, run, wish)
+        )
         return active.id
 
     def resume(self, run: str, wish: GoOn) -> None:
@@ -163,8 +165,10 @@ class Runs:
         ScenarioError
             If the scenario has errors.
         """
-        refuse_errors(check_scenario(self._workspace, scenario))
-        prepared = self._prepared(scenario, wish)
+        settings = _settings(wish)
+        prepared = prepare_run(
+            check_run(self._workspace, scenario, name=wish.scenario, settings=settings)
+        )
         expected = prepared.expected
         assert expected is not None
         return RunForecast(
@@ -295,48 +299,32 @@ class Runs:
         else:
             active.end(state, error)
 
-    def _simulate(self, active: Active, wish: NewRun) -> tuple[RunState, str | None]:
-        prepared = self._prepared(active.scenario, wish)
+    def _simulate(
+        self, active: Active, run: CheckedRun, wish: NewRun
+    ) -> tuple[RunState, str | None]:
+        prepared = prepare_run(run)
         active.plan = prepared.plan
         active.live.wake()
-
         if wish.carla:
-            return self._mirror(active, prepared.plan, wish)
+            return self._mirror(active, prepared.plan, run.settings, wish)
 
-        def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        def ended(_folder: Path) -> None:
             active.finishing = True
-            loaded = self._loaded(active.scenario)
-            write_report(folder, summary, drawing=loaded.drawing, sumo_map=loaded.sumo)
 
-        out = self._workspace.runs / active.id
-        return _end_of(run_prepared(prepared, out, finish=finish, live=active.live), active)
+        return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
 
     def _go_on(self, active: Active) -> tuple[RunState, str | None]:
         folder = self._workspace.runs / active.id
         return _end_of(resume(self._workspace, folder, live=active.live), active)
-
-    def _prepared(self, scenario: Scenario, wish: NewRun) -> PreparedRun:
-        loaded = self._loaded(scenario)
-        return prepare(
-            scenario,
-            loaded.sumo,
-            loaded.entry.path("net"),
-            self._workspace.assets(),
-            seed=wish.seed,
-            until=wish.until,
-            step_length=wish.step_length,
-            recording=Recording(trajectories=wish.trajectories, every=wish.every),
-        )
-
-    def _loaded(self, scenario: Scenario) -> LoadedMap:
-        return load_map(self._workspace.map_for(scenario.map.name, scenario.map.sha256))
 
     def _refuse_more(self) -> None:
         if sum(one.ended is None for one in self._active.values()) >= MOST:
             msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
             raise ConflictError(msg)
 
-    def _mirror(self, active: Active, plan: Plan, wish: NewRun) -> tuple[RunState, str | None]:
+    def _mirror(
+        self, active: Active, plan: Plan, settings: RunSettings, wish: NewRun
+    ) -> tuple[RunState, str | None]:
         """Run it in SUMO and in CARLA, in a process that has CARLA's client."""
         with TemporaryDirectory(prefix="odscen-") as folder:
             file = Path(folder) / f"{active.id}{SUFFIX}"
@@ -349,8 +337,7 @@ class Runs:
                     address=str(self._carla),
                     step_length=plan.step_length,
                     origin=origin(plan),
-                    seed=wish.seed,
-                    until=wish.until,
+                    settings=settings,
                     paused=wish.paused,
                     speed=wish.speed,
                 ),
@@ -366,6 +353,15 @@ class Runs:
             if free not in self._active and not (self._workspace.runs / free).exists():
                 return free
         raise AssertionError
+
+
+def _settings(wish: NewRun) -> RunSettings:
+    return RunSettings(
+        seed=wish.seed,
+        until=wish.until,
+        step_length=wish.step_length,
+        recording=Recording(trajectories=wish.trajectories, every=wish.every),
+    )
 
 
 def _end_of(result: RunResult, active: Active) -> tuple[RunState, str | None]:

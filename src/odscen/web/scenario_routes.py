@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.responses import Response
 
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX
 from odscen.catalog.store import check_name, name_from_file
 from odscen.categories import Category
 from odscen.errors import InputError, NotFoundError

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from odscen.app.maps import LoadedMap, map_of
 from odscen.catalog.store import Workspace
 from odscen.scenario.region import Region
 from odscen.web.carla import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
 from odscen.web.runs import Runs
-from odscen.workflow import LoadedMap, load_map
 
 if TYPE_CHECKING:
     from odscen.carla.client import Address
@@ -47,7 +47,7 @@ class Services:
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""
-        return load_map(self.workspace.map_for(scenario.map.name, scenario.map.sha256))
+        return map_of(self.workspace, scenario)
 
     def close(self) -> None:
         """End everything that goes on."""

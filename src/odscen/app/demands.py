@@ -1,4 +1,4 @@
-"""Demand as functions: what ``odscen demand`` and scripts call."""
+"""Demand: read from tables, made up, and held against counts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from odscen import workflow
+from odscen.app.maps import load_map, map_of
+from odscen.app.scenarios import read_scenario
 from odscen.errors import InputError, ScenarioError, in_file
 from odscen.scenario import demand_edits, edits
 from odscen.scenario.profiles import DAY
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from odscen.app.maps import LoadedMap
     from odscen.catalog.store import Workspace
     from odscen.scenario.document import Scenario
     from odscen.sumo.fit import Fit
     from odscen.sumo.town_day import Load
-    from odscen.workflow import LoadedMap
 
 
 def import_table(
@@ -60,7 +61,7 @@ def import_table(
     ScenarioError
         If the scenario has no such places.
     """
-    loaded = _loaded(workspace, scenario)
+    loaded = map_of(workspace, scenario)
     with in_file(str(file)):
         return import_text(loaded, scenario, _text(file), kind=kind, name=name, day=day, **fields)
 
@@ -117,7 +118,7 @@ def add_background(
     workspace: Workspace, scenario: Scenario, *, name: str, **fields: Any
 ) -> Scenario:
     """Add background traffic; ``fields`` are those of ``Background``, such as ``per_km``."""
-    graph = _loaded(workspace, scenario).sumo.graph
+    graph = map_of(workspace, scenario).sumo.graph
     return demand_edits.set_background(scenario, graph, background=name, **fields)
 
 
@@ -130,7 +131,7 @@ def whole_day(
     seed: int = 0,
 ) -> tuple[Scenario, Load]:
     """Make 24 hours of traffic on a whole map, from midnight on; see :func:`town_day`."""
-    loaded = workflow.load_map(workspace.map(map_name))
+    loaded = load_map(workspace.map(map_name))
     scenario = edits.new_scenario(loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed)
     return with_whole_day(loaded, scenario, trips=trips, day=day)
 
@@ -179,11 +180,11 @@ def fit(workspace: Workspace, what: Path) -> Fit:
         If the scenario has no counts, or the run no trajectories.
     """
     folder = what if what.is_dir() else None
-    scenario = workflow.read_scenario(what if folder is None else folder / SCENARIO_FILE)
+    scenario = read_scenario(what if folder is None else folder / SCENARIO_FILE)
     if not scenario.demand.counts:
         msg = "the scenario has no counts; import some with: odscen demand import --counts"
         raise InputError(msg, file=str(what))
-    loaded = _loaded(workspace, scenario)
+    loaded = map_of(workspace, scenario)
     if folder is None:
         return planned_fit(scenario, loaded.sumo)
     trajectories = trajectory_files(folder)
@@ -223,10 +224,6 @@ def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> 
             raise ScenarioError(found[0]) from error
         msg = f"{len(found)} problems"
         raise ScenarioError(msg, problems=found) from error
-
-
-def _loaded(workspace: Workspace, scenario: Scenario) -> LoadedMap:
-    return workflow.load_map(workspace.map_for(scenario.map.name, scenario.map.sha256))
 
 
 def _text(file: Path) -> str:

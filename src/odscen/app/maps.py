@@ -1,0 +1,64 @@
+"""Maps as scenarios are made and run on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from odscen.sumo.signals import scenario_lights
+from odscen.sumo.sumo_map import SumoMap
+from odscen.sumo.usable import usable_places
+
+if TYPE_CHECKING:
+    from odscen.catalog.drawing import MapDrawing
+    from odscen.catalog.store import MapEntry, Workspace
+    from odscen.scenario.document import Scenario
+    from odscen.scenario.signals import Light
+    from odscen.scenario.supply import Usable
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedMap:
+    """A map of the catalogue with what scenarios are made and run on, loaded once.
+
+    Attributes
+    ----------
+    entry
+        Its folder and what is known of it.
+    sumo
+        Lane graph, pedestrian graph and SUMO network, with the table between them.
+    usable
+        What SUMO can use of it.
+    drawing
+        What is drawn of it.
+    lights
+        Its traffic lights, as scenarios name them.
+    """
+
+    entry: MapEntry
+    sumo: SumoMap
+    usable: Usable
+    drawing: MapDrawing
+    lights: tuple[Light, ...]
+
+
+@lru_cache(maxsize=4)
+def load_map(entry: MapEntry) -> LoadedMap:
+    """Load a map; the last few stay in memory."""
+    sumo = SumoMap.of(entry.graph(), entry.lane_table())
+    lights = scenario_lights(sumo.lights)
+    return LoadedMap(entry, sumo, usable_places(sumo), entry.drawing(), lights)
+
+
+def map_of(workspace: Workspace, scenario: Scenario) -> LoadedMap:
+    """Load the map that a scenario was made on.
+
+    Raises
+    ------
+    NotFoundError
+        If the workspace has no map of that name and none of that content.
+    InputError
+        If the map of that name has other content.
+    """
+    return load_map(workspace.map_for(scenario.map.name, scenario.map.sha256))

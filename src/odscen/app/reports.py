@@ -1,0 +1,137 @@
+"""The report of a run, written from the files in its folder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from odscen.app.maps import load_map
+from odscen.errors import NotFoundError
+from odscen.results.corridors import busiest_corridor, corridor_along, way_between
+from odscen.results.place_shapes import place_shapes
+from odscen.results.records import Plan, events_from_json
+from odscen.results.report import render_report
+from odscen.results.summary import actors_from_json
+from odscen.results.traffic import over_run
+from odscen.results.traffic_files import read_tables
+from odscen.sumo import layout
+from odscen.sumo.corridor_traces import corridor_traces
+from odscen.sumo.ended import read_summary
+from odscen.sumo.recorded import read_conflicts, read_trajectories
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+    from typing import Any
+
+    from odscen.app.maps import LoadedMap
+    from odscen.catalog.store import Workspace
+    from odscen.results.corridors import Corridor
+
+REPORT_ROWS = 2_000_000
+"""Rows of trajectories that a report is made from at most; a day of a town has far more."""
+
+
+def write_report(
+    folder: Path,
+    summary: Mapping[str, Any],
+    *,
+    loaded: LoadedMap | None = None,
+    corridor: Corridor | None = None,
+    out: Path | None = None,
+) -> Path:
+    """Write the report of a run from the files in its folder.
+
+    Parameters
+    ----------
+    summary
+        As in ``summary.json``.
+    loaded
+        The run's map: drawn below the routes, and for figures by place and a corridor. Without it
+        the report has none of these.
+    corridor
+        To follow vehicles along; the busiest if not given.
+    out
+        File to write; ``report.html`` in the run folder if not given.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+
+    def text(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    recorded = read_trajectories(folder, most=REPORT_ROWS)
+    figures = read_tables(folder / layout.FIGURES_FOLDER)
+    sumo_map = None if loaded is None else loaded.sumo
+    if corridor is None and figures is not None and sumo_map is not None:
+        corridor = busiest_corridor(over_run(figures.movements), sumo_map.graph)
+    followed = None
+    if corridor is not None and sumo_map is not None:
+        followed = corridor_traces(folder, sumo_map, corridor)
+    page = render_report(
+        summary,
+        Plan.from_json(text(layout.PLAN_FILE)),
+        actors_from_json(text(layout.ACTORS_FILE)),
+        events_from_json(text(layout.EVENTS_FILE)),
+        recorded.rows if recorded is not None else pl.DataFrame(),
+        drawing=None if loaded is None else loaded.drawing,
+        every=recorded.every if recorded is not None else 1,
+        figures=figures,
+        shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
+        corridor=followed,
+        conflicts=read_conflicts(folder),
+    )
+    report = out or folder / layout.REPORT_FILE
+    report.write_text(page, encoding="utf-8")
+    return report
+
+
+def renew_report(
+    workspace: Workspace,
+    run: Path,
+    *,
+    corridor: Sequence[str] = (),
+    ends: tuple[str, str] | None = None,
+    out: Path | None = None,
+) -> Path:
+    """Write the report of a finished run anew.
+
+    Parameters
+    ----------
+    run
+        Its folder, or its name in the workspace.
+    corridor
+        Segments along which vehicles are followed; junctions between them may be left out.
+    ends
+        First and last segment instead: the shortest path between them. The busiest corridor if
+        neither is given.
+    out
+        File to write; the run's ``report.html`` if not given.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    InputError
+        If it has not ended, its map is not in the workspace, or one cannot drive so.
+    """
+    folder = run if run.is_dir() else workspace.runs / run
+    if not folder.is_dir():
+        names = [path.name for path in workspace.runs.glob("*")]
+        msg = "run"
+        raise NotFoundError(msg, str(run), names)
+    summary = read_summary(folder)
+    loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+    graph = loaded.sumo.graph
+    segments = way_between(graph, *ends) if ends is not None else corridor
+    along = corridor_along(graph, segments) if segments else None
+    return write_report(folder, summary, loaded=loaded, corridor=along, out=out)

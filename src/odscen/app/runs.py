@@ -1,0 +1,337 @@
+"""A scenario is run: checked, prepared, simulated, reported. The only place that does it.
+
+The command line, the page, suites of tests, and CARLA beside or instead of SUMO all go this way:
+:func:`check_run`, then :func:`prepare_run`, then :func:`carry_out`; or :func:`run_all` and
+:func:`run`, which do all of it. What a run is to be like is one
+:class:`~odscen.sumo.run_settings.RunSettings` from here down to SUMO's process.
+
+>>> from odscen.catalog.store import Workspace
+>>> from odscen.app import runs, scenarios
+>>> workspace = Workspace.open()
+>>> workspace.add_map(Path("Town01.xodr"))
+>>> paths = scenarios.generate(workspace)
+>>> results = runs.run(workspace, paths, settings=RunSettings(until=300.0))
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.app.maps import load_map
+from odscen.app.reports import write_report
+from odscen.app.scenarios import read_scenario, scenario_name
+from odscen.errors import InputError, in_file
+from odscen.scenario.checks import check
+from odscen.scenario.problems import refuse_errors
+from odscen.sumo import long_runs
+from odscen.sumo.prepare import prepare
+from odscen.sumo.run_settings import AS_DESIGNED
+from odscen.sumo.runner import RunJob, run_many, run_prepared
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from odscen.app.maps import LoadedMap
+    from odscen.catalog.assets import Assets
+    from odscen.catalog.store import MapEntry, Workspace
+    from odscen.scenario.document import Scenario
+    from odscen.sumo.process import Companion, Ended
+    from odscen.sumo.progress import OnProgress, Progress
+    from odscen.sumo.run_settings import RunSettings
+    from odscen.sumo.runner import PreparedRun, RunResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckedRun:
+    """A run of a scenario that has been checked, see :func:`check_run`.
+
+    The same scenario can be run several times, with ``dataclasses.replace``.
+
+    Attributes
+    ----------
+    name
+        What progress calls it.
+    scenario
+        Without errors on its map.
+    entry
+        The map.
+    assets
+        Size of models and parameters of weather.
+    folder
+        The run's folder, made by :func:`carry_out`.
+    settings
+        How it is run.
+    """
+
+    name: str
+    scenario: Scenario
+    entry: MapEntry
+    assets: Assets
+    folder: Path
+    settings: RunSettings
+
+    @property
+    def map(self) -> LoadedMap:
+        """The map, loaded when it is needed."""
+        return load_map(self.entry)
+
+
+def check_run(
+    workspace: Workspace,
+    scenario: Scenario,
+    *,
+    name: str,
+    out: Path | None = None,
+    settings: RunSettings = AS_DESIGNED,
+    entry: MapEntry | None = None,
+) -> CheckedRun:
+    """Check a scenario that is to be run.
+
+    Parameters
+    ----------
+    name
+        Of the run's folder.
+    out
+        Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    settings
+        How it is run.
+    entry
+        The map; the one of the workspace that the scenario names if not given.
+
+    Raises
+    ------
+    ScenarioError
+        With every error of the scenario.
+    NotFoundError
+        If the workspace does not have its map.
+    """
+    if entry is None:
+        entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    loaded, assets = load_map(entry), workspace.assets()
+    refuse_errors(check(scenario, loaded.sumo.graph, assets, loaded.lights))
+    return CheckedRun(name, scenario, entry, assets, (out or workspace.runs) / name, settings)
+
+
+def check_file(
+    workspace: Workspace,
+    path: Path,
+    *,
+    name: str | None = None,
+    out: Path | None = None,
+    settings: RunSettings = AS_DESIGNED,
+) -> CheckedRun:
+    """Read and check a scenario that is to be run; parameters as of :func:`check_run`.
+
+    Parameters
+    ----------
+    path
+        Scenario file. Its name is the run's if none is given.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    ScenarioError
+        With every error of the scenario; names the file.
+    """
+    scenario, name = read_scenario(path), name or scenario_name(path)
+    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    with in_file(str(path)):
+        return check_run(workspace, scenario, name=name, out=out, settings=settings, entry=entry)
+
+
+def prepare_run(run: CheckedRun) -> PreparedRun:
+    """Make everything that a run is made of; nothing is written yet.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    net = run.entry.path("net")
+    return prepare(run.scenario, run.map.sumo, net, run.assets, settings=run.settings)
+
+
+def carry_out(
+    run: CheckedRun,
+    prepared: PreparedRun,
+    *,
+    progress: OnProgress | None = None,
+    ended: Callable[[Path], None] | None = None,
+    live: Companion | None = None,
+    simulate: Callable[[Path], Ended] | None = None,
+) -> RunResult:
+    """Simulate what has been prepared, and write its results and its report.
+
+    Parameters
+    ----------
+    prepared
+        From :func:`prepare_run`.
+    progress
+        Called in this thread, a few times a second.
+    ended
+        Called with the folder when the simulation has completed, before the report is written: the
+        place for further files.
+    live
+        Makes it a run that can be watched and steered, or that goes in step with another simulator.
+    simulate
+        Runs what is in a folder and writes the results there, instead of SUMO's worker.
+
+    Returns
+    -------
+    RunResult
+        Of a run that has completed or failed: what goes wrong inside SUMO does not raise.
+
+    Raises
+    ------
+    WorkspaceError
+        If the folder cannot be written, or the disk cannot hold the run.
+    ConflictError
+        If a run that has not ended is in the folder.
+    """
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        if ended is not None:
+            ended(folder)
+        write_report(folder, summary, loaded=run.map)
+
+    return run_prepared(
+        prepared, run.folder, progress=progress, finish=finish, live=live, simulate=simulate
+    )
+
+
+def run_all(
+    runs: Sequence[CheckedRun],
+    *,
+    processes: int = 1,
+    reports: bool = True,
+    progress: Callable[[RunJob, Progress], None] | None = None,
+    done: Callable[[RunJob, RunResult], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> tuple[RunResult, ...]:
+    """Prepare and carry out several runs.
+
+    Parameters
+    ----------
+    processes
+        How many run at a time.
+    reports
+        Whether reports are written.
+    progress, done
+        Called from the threads that wait for the runs, ``done`` in the order in which they end.
+    tell
+        Called with what the user should know before a long run.
+
+    Returns
+    -------
+    tuple of RunResult
+        In the order of ``runs``.
+    """
+    jobs = [_job(run, report=reports) for run in runs]
+    return run_many(jobs, processes=processes, progress=progress, done=done, tell=tell)
+
+
+def run(
+    workspace: Workspace,
+    paths: Sequence[Path],
+    *,
+    settings: RunSettings = AS_DESIGNED,
+    out: Path | None = None,
+    processes: int = 1,
+    progress: Callable[[RunJob, Progress], None] | None = None,
+    done: Callable[[RunJob, RunResult], None] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> tuple[RunResult, ...]:
+    """Check scenarios, run them in SUMO, and write their reports.
+
+    Parameters
+    ----------
+    paths
+        Scenario files, see :func:`odscen.app.scenarios.scenario_files`.
+    settings
+        How they are run.
+    out
+        Folder that gets one folder per scenario; the workspace's ``runs`` if not given.
+    processes, progress, done, tell
+        See :func:`run_all`.
+
+    Returns
+    -------
+    tuple of RunResult
+        In the order of ``paths``.
+
+    Raises
+    ------
+    ScenarioError
+        If a scenario has errors; none is run then.
+    """
+    names: set[str] = set()
+    runs = [
+        check_file(
+            workspace, path, name=_own_name(scenario_name(path), names), out=out, settings=settings
+        )
+        for path in paths
+    ]
+    return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
+
+
+def resume(
+    workspace: Workspace,
+    run: Path,
+    *,
+    time_limit: float | None = None,
+    progress: OnProgress | None = None,
+    tell: Callable[[str], None] | None = None,
+    live: Companion | None = None,
+) -> RunResult:
+    """Resume an interrupted run and write its report.
+
+    Parameters
+    ----------
+    run
+        Its folder, or its name in the workspace.
+    time_limit
+        Wall seconds after which it is interrupted again.
+    tell
+        Called with where it goes on, and what is damaged.
+    live
+        Makes it a run that can be watched and steered.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    ConflictError
+        If it has ended, or is going on.
+    """
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        loaded = None
+        with suppress(InputError):  # the map has been removed meanwhile
+            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+        write_report(folder, summary, loaded=loaded)
+
+    folder = run if run.is_dir() else workspace.runs / run
+    return long_runs.resume(
+        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
+    )
+
+
+def _job(run: CheckedRun, *, report: bool) -> RunJob:
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        write_report(folder, summary, loaded=run.map)
+
+    return RunJob(run.name, lambda: prepare_run(run), run.folder, finish if report else None)
+
+
+def _own_name(name: str, taken: set[str]) -> str:
+    """Return a name that no other scenario of the same call has."""
+    own, number = name, 1
+    while own in taken:
+        number += 1
+        own = f"{name}-{number}"
+    taken.add(own)
+    return own

@@ -1,0 +1,110 @@
+"""How a scenario is run: one frozen object that goes unchanged from the door to the worker."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+from odscen.errors import InputError
+from odscen.results.expectations import Expectation, needs_criticality, parse_expectation
+from odscen.sumo.recording import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+SliceLength = float | Literal["auto"] | None
+"""Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
+
+_SEEDS = 2**31
+_LONGEST = 1e9
+"""Seconds that a run may last, as in the document."""
+
+
+def _refuse_time(name: str, seconds: float | None, *, most: float = math.inf) -> None:
+    if seconds is not None and not (0 < seconds <= most and math.isfinite(seconds)):
+        limit = f" and at most {most:g}" if math.isfinite(most) else ""
+        msg = f"{name} must be above 0{limit} s, not {seconds:g}"
+        raise InputError(msg)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSettings:
+    """How a scenario is run; times are in seconds.
+
+    Attributes
+    ----------
+    seed
+        Random seed, 0 to 2^31 - 1; the scenario's own if ``None``.
+    until
+        Simulated time at which the run ends at the latest, above 0; the scenario's own duration if
+        ``None``.
+    step_length
+        Simulated time of a step, above 0 and at most 1; the scenario's own if ``None``.
+    weather
+        Whether weather acts on driving; the scenario can also switch it off itself.
+    recording
+        What is recorded. :attr:`recorded` is that with what the expectations ask for.
+    meso
+        Queues on road sections instead of single vehicles that follow each other: for scale.
+    slice_length
+        A longer run goes in slices of this simulated time and can be resumed; ``auto`` for what
+        suits it (see :func:`odscen.sumo.realize.slices_of`), ``None`` for one piece, however long.
+    time_limit
+        Wall time after which the run is stopped and has failed; ``None`` for no limit.
+    expectations
+        What must come out; the summary says of each whether it is met.
+
+    Raises
+    ------
+    InputError
+        If a value is not possible, or criticality is to be measured in meso.
+    """
+
+    seed: int | None = None
+    until: float | None = None
+    step_length: float | None = None
+    weather: bool = True
+    recording: Recording = field(default_factory=Recording)
+    meso: bool = False
+    slice_length: SliceLength = "auto"
+    time_limit: float | None = None
+    expectations: tuple[Expectation, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.seed is not None and not 0 <= self.seed < _SEEDS:
+            msg = f"seed must lie between 0 and {_SEEDS - 1}, not {self.seed}"
+            raise InputError(msg)
+        _refuse_time("until", self.until, most=_LONGEST)
+        _refuse_time("step_length", self.step_length, most=1.0)
+        if self.slice_length != "auto":
+            _refuse_time("slice_length", self.slice_length)
+        _refuse_time("time_limit", self.time_limit)
+        if self.meso and self.recorded.criticality:
+            msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"
+            raise InputError(msg)
+
+    @property
+    def recorded(self) -> Recording:
+        """What is recorded: criticality too where an expectation asks for it."""
+        return self.recording.with_criticality(needs_criticality(self.expectations))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As values that JSON can hold."""
+        return {**asdict(self), "expectations": [one.text for one in self.expectations]}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Inverse of :meth:`to_dict`, after JSON too."""
+        recording: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in data["recording"].items()
+        }
+        expectations = tuple(parse_expectation(text) for text in data["expectations"])
+        own = {"recording": Recording(**recording), "expectations": expectations}
+        values: dict[str, Any] = {**data, **own}
+        return cls(**values)
+
+
+AS_DESIGNED = RunSettings()
+"""A run as its scenario says, without any wish."""
