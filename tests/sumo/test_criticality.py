@@ -13,8 +13,6 @@ from odscen.results.conflicts import SEEN_TTC
 from odscen.results.measures import safety
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
-from odscen.sumo.config import RunSettings, sumo_config
-from odscen.results.conflicts import SEEN_TTC, conflict_figures
 from odscen.sumo.config import SumocfgSettings, sumo_config
 from odscen.sumo.recorded import read_conflicts, read_trajectories
 from odscen.sumo.recording import Recording

@@ -6,13 +6,10 @@ import hashlib
 import shutil
 import tempfile
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from odscen.app.runs import check_run, run_all
 from odscen.app.scenarios import read_scenario
@@ -31,8 +28,6 @@ from odscen.regression.measure import measure
 from odscen.regression.verdict import hold_against
 from odscen.results.expectations import evaluate, needs_criticality
 from odscen.results.outcomes import RunStatus
-from odscen.scenario.problems import refuse_errors
-from odscen.sumo.prepare import prepare, write_report
 from odscen.sumo.recording import Recording
 from odscen.sumo.run_settings import RunSettings
 

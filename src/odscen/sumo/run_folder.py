@@ -21,7 +21,6 @@ from odscen.results.summary import actors_from_json
 from odscen.results.traffic import TABLES
 from odscen.sumo import layout
 from odscen.sumo.measured import read_run_data, write_figures
-from odscen.sumo.measured import write_figures
 from odscen.sumo.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:

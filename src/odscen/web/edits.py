@@ -20,9 +20,8 @@ from odscen.scenario.edit_registry import EDIT_ENTRIES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from odscen.scenario.document import Part, Scenario
-    from odscen.workflow import LoadedMap
     from odscen.app.maps import LoadedMap
+    from odscen.scenario.document import Part, Scenario
 
 _KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
 """Arguments that the server has itself, and the names of their types, which need no message."""

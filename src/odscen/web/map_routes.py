@@ -41,7 +41,6 @@ from odscen.web.wire.map_messages import (
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
-from odscen.workflow import load_map
 
 if TYPE_CHECKING:
     from odscen.catalog.store import MapEntry, Progress

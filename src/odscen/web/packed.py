@@ -11,9 +11,8 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
-from odscen.web.wire.media_types import Responses
-from odscen.workflow import load_map
 from odscen.app.maps import load_map
+from odscen.web.wire.media_types import Responses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,7 +14,6 @@ from odscen.sumo.layout import SCENARIO_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import ANY_FILE
-from odscen.workflow import read_scenario
 
 router = APIRouter(prefix="/api/runs/{run}")
 

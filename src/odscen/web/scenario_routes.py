@@ -39,7 +39,6 @@ from odscen.web.messages import (
 )
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.media_types import Responses
-from odscen.workflow import SUFFIX, load_map
 
 if TYPE_CHECKING:
     from odscen.scenario.region import Region

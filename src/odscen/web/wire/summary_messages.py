@@ -5,27 +5,25 @@ Runs of earlier versions lack some fields, which then have their defaults.
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import TYPE_CHECKING
 
-from odscen.results.gridlock import Trouble
-from odscen.sumo.run_folder import RunStatus
+from pydantic import Field, create_model
+
+from odscen.results.gridlock import Incident
+from odscen.results.measures.registry import COUNTS
+from odscen.results.outcomes import RunStatus
 from odscen.web.messages import Answer
 
-
-class SummaryCounts(Answer):
-    """How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
-
-    A failed run knows only how many were planned.
-    """
-
-    planned: int
-    inserted: int | None = None
-    arrived: int | None = None
-    running: int | None = None
-    waiting: int | None = None
-    teleported: int | None = None
-    collided: int | None = None
-    emergency_stopped: int | None = None
+if TYPE_CHECKING:
+    SummaryCounts = Answer
+else:
+    SummaryCounts = create_model(
+        "SummaryCounts",
+        __base__=Answer,
+        __doc__="Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.",
+        planned=(int, ...),
+        **{name: (int | None, None) for name in COUNTS if name != "planned"},
+    )
 
 
 class GridlockInfo(Answer):
@@ -35,7 +33,7 @@ class GridlockInfo(Answer):
     jams_at_the_end: int
     moved_on: int
     kept_out: int
-    places: list[Trouble]
+    places: list[Incident]
 
 
 class ExpectationInfo(Answer):
