@@ -172,7 +172,7 @@ test("what another tab has done is loaded; one's own change can be made again on
   await store.getState().edit({ kind: "add_actor" });
   expect(store.getState().scenario?.version).toBe(5);
   await store.getState().refusal?.again?.();
-  expect(asked[3].body).toEqual({ version: 5, edits: [{ kind: "add_actor" }] });
+  expect(asked[3]?.body).toEqual({ version: 5, edits: [{ kind: "add_actor" }] });
   expect(store.getState()).toMatchObject({ refusal: null, selection: ["y"] });
 });
 
@@ -181,7 +181,7 @@ test("several edits go out as one", async () => {
   const store = createEditorStore("s");
   await store.getState().load();
   await store.getState().edit([{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }], "Add 2 segments");
-  expect(asked[1].body).toEqual({
+  expect(asked[1]?.body).toEqual({
     version: 1, label: "Add 2 segments", edits: [{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }],
   });
 });

@@ -28,7 +28,7 @@ const shown = (time: number): Record<string, [number, number]> => {
   const found: Record<string, [number, number]> = {};
   for (const who of replay.crowd.everybody()) {
     const row = replay.crowd.row(who.id);
-    if (row >= 0) found[who.id] = [pose[5 * row], pose[5 * row + 1]];
+    if (row >= 0) found[who.id] = [pose[5 * row] ?? NaN, pose[5 * row + 1] ?? NaN];
   }
   return found;
 };
@@ -73,7 +73,7 @@ test("incidents are told in words and marked from when they happen", () => {
   expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
   expect(marksAt([crash], 2.9)).toEqual([]);
   expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
-  expect(marksAt([crash], 30)[0].fresh).toBe(false);
+  expect(marksAt([crash], 30)[0]?.fresh).toBe(false);
   expect(marksAt([{ time: 0, kind: "emergency_stop", actor: "a" }], 1)).toEqual([]);
 });
 

@@ -52,8 +52,9 @@ export function ActorForm({ actor, assets, onEdit }: {
 export function ManyForm({ actors, onChange }: {
   actors: readonly Actor[]; onChange: (fields: Partial<Actor>, what: string) => void;
 }) {
+  const [first, ...others] = actors;
   const same = <K extends keyof Actor>(key: K): Actor[K] | undefined =>
-    actors.every((one) => one[key] === actors[0][key]) ? actors[0][key] : undefined;
+    others.every((one) => one[key] === first?.[key]) ? first?.[key] : undefined;
   const speed = same("speed");
   return (
     <Stack gap="sm">

@@ -62,7 +62,7 @@ export function Editor({ store, drawing, loaded, assets }: {
     const chosen = new Set(selection);
     return ones.filter((one) => chosen.has(one.id));
   }, [ones, selection]);
-  const one = selected.length === 1 ? selected[0] : null;
+  const one = selected.length === 1 ? selected[0] ?? null : null;
   const { goals, path } = useWays(name, one, roiKey, graph);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
   const changes = useChanges(store, ones, starts);
@@ -193,7 +193,8 @@ export function Editor({ store, drawing, loaded, assets }: {
     selectAll: () => { setStep("actors"); select(ones.map((each) => each.id)); },
     tool: (n) => {
       setStep("actors");
-      arm(n < CATEGORIES.length ? { does: "place", category: CATEGORIES[n] } : { does: "stream", walk: n > CATEGORIES.length });
+      const category = CATEGORIES[n];
+      arm(category ? { does: "place", category } : { does: "stream", walk: n > CATEGORIES.length });
     },
   });
 

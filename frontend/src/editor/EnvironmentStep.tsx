@@ -52,10 +52,13 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
         {fine ? "Hide fine-tuning" : "Fine-tune"}
       </Button>
       <Collapse in={fine}>
-        {PARAMETERS.filter(({ name }) => values[name] !== undefined).map(({ name, word }) => (
-          <Parameter key={`${name} ${String(values[name])}`} word={word} name={name} value={values[name]}
-            onChange={(value) => onEdit({ kind: "set_environment", parameters: { ...environment.parameters, [name]: value } })} />
-        ))}
+        {PARAMETERS.map(({ name, word }) => {
+          const value = values[name];
+          return value !== undefined && (
+            <Parameter key={`${name} ${value}`} word={word} name={name} value={value}
+              onChange={(next) => onEdit({ kind: "set_environment", parameters: { ...environment.parameters, [name]: next } })} />
+          );
+        })}
       </Collapse>
     </>
   );

@@ -7,12 +7,13 @@ import { tell } from "../ui/notices";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 
-const KINDS: readonly { value: TableKind; label: string; stem: string | null; text: string }[] = [
-  { value: "od", label: "Trips from where to where", stem: "trips", text: "How many go from one place to another. Columns “begin” and “end” may say when." },
-  { value: "counts", label: "Counts", stem: "counts", text: "How many vehicles passed a place. Traffic is made that reproduces them. A place is a segment, or segments one after another: r1>j2>r3." },
-  { value: "profile", label: "A day profile", stem: "my-day", text: "How much comes in each equal slice of a day, from midnight on." },
-  { value: "zones", label: "Zones", stem: null, text: "Names for several segments, which tables of trips can use." },
-];
+const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
+  od: { label: "Trips from where to where", stem: "trips", text: "How many go from one place to another. Columns “begin” and “end” may say when." },
+  counts: { label: "Counts", stem: "counts", text: "How many vehicles passed a place. Traffic is made that reproduces them. A place is a segment, or segments one after another: r1>j2>r3." },
+  profile: { label: "A day profile", stem: "my-day", text: "How much comes in each equal slice of a day, from midnight on." },
+  zones: { label: "Zones", stem: null, text: "Names for several segments, which tables of trips can use." },
+};
+const isKind = (value: string | null): value is TableKind => value !== null && value in KINDS;
 
 interface Refusal {
   file: string;
@@ -33,13 +34,12 @@ export function TableForm({ store, demand: known, roads }: {
   const reset = useRef<() => void>(null);
   const alert = useRef<HTMLDivElement>(null);
   useEffect(() => { if (refusal) alert.current?.scrollIntoView({ block: "nearest" }); }, [refusal]);
-  const chosen = KINDS.find((one) => one.value === kind) ?? KINDS[0];
+  const chosen = KINDS[kind];
   const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
-    const found = KINDS.find((one) => one.value === next);
-    if (!found) return;
-    setKind(found.value);
-    setPart(found.stem ?? "");
+    if (!isKind(next)) return;
+    setKind(next);
+    setPart(KINDS[next].stem ?? "");
     setRefusal(null);
   };
   const send = (file: File | null): void => {
@@ -53,7 +53,7 @@ export function TableForm({ store, demand: known, roads }: {
   };
   return (
     <div className="fold">
-      <Select label="What the table has" data={KINDS.map(({ value, label }) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
+      <Select label="What the table has" data={Object.entries(KINDS).map(([value, { label }]) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
       <Text size="sm">{chosen.text}</Text>
       <div>
         <Text size="xs" c="dimmed">For example, as text with commas, semicolons or tabs:</Text>

@@ -1,6 +1,8 @@
 import { Button, CloseButton, Group, Text } from "@mantine/core";
 import { useState } from "react";
 
+import { nth } from "../lists";
+
 const KEY = "odscen.tour";
 const STEPS: readonly [title: string, text: string][] = [
   ["1. Choose where", "Click a road or junction: it is the first segment of your region. Light-blue segments can be added."],
@@ -29,7 +31,7 @@ export function tourSeen(): void {
 /** Three cards beside the map; the page can be used while they are there. */
 export function Tour({ onClose }: { onClose: () => void }) {
   const [at, setAt] = useState(0);
-  const [title, text] = STEPS[at];
+  const [title, text] = nth(STEPS, at);
   const last = at === STEPS.length - 1;
   return (
     <div className="tour" role="dialog" aria-label="Short tour" onKeyDown={(event) => { if (event.key === "Escape") { onClose(); event.stopPropagation(); } }}>

@@ -1,4 +1,5 @@
 import type { Actor, Category, Flow, ScenarioDocument } from "../api/types";
+import { nth } from "../lists";
 import type { Graph, Place } from "../map/graph";
 import type { Picker } from "../map/picking";
 
@@ -68,7 +69,7 @@ export class Starts {
     const [first, end] = this.graph.lanePlaces(from);
     const segment = (from.walk ? this.graph.columns.walks : this.graph.columns).segment;
     for (let i = from.index + step; i >= first && i < end; i += step) {
-      if (!this.inside.has(segment[i])) return null;
+      if (!this.inside.has(nth(segment, i))) return null;
       if (this.free(i, from.walk)) return this.at(i, from.walk);
     }
     return null;
@@ -92,7 +93,7 @@ export class Starts {
    * free start nearest to where that is; those that find none are left out.
    */
   shifted(ones: readonly (Actor | Flow)[], to: Place): Moves {
-    const lead = ones.length > 0 ? this.graph.place(ones[0].spawn) : undefined;
+    const lead = this.graph.place(ones[0]?.spawn ?? "");
     if (!lead) return [];
     const used = new Set<string>();
     return ones.flatMap((one, n) => {
@@ -113,7 +114,7 @@ export class Starts {
   private *all(walk: boolean): Generator<Place> {
     const { segment } = walk ? this.graph.columns.walks : this.graph.columns;
     for (let i = 0; i < segment.length; i++) {
-      if (this.inside.has(segment[i]) && this.free(i, walk)) yield this.at(i, walk);
+      if (this.inside.has(nth(segment, i)) && this.free(i, walk)) yield this.at(i, walk);
     }
   }
 }

@@ -31,7 +31,7 @@ export function useChanges(store: EditorStore, ones: readonly (Actor | Flow)[], 
       const actors = gone.filter((one) => !isFlow(one)).map((one) => one.id);
       const edits: Edit[] = gone.filter(isFlow).map((one) => ({ kind: "remove_flow", flow: one.id }));
       if (actors.length > 0) edits.unshift({ kind: "remove_actors", actors });
-      if (edits.length > 0) change(edits, gone.length === 1 ? `Remove ${gone[0].id}` : `Remove ${gone.length} road users`);
+      if (edits.length > 0) change(edits, gone.length === 1 ? `Remove ${gone[0]?.id}` : `Remove ${gone.length} road users`);
     },
     /** Uses a tool at a place; whether it is used up then. */
     use: (tool: Tool, to: Place): boolean => {
@@ -44,7 +44,7 @@ export function useChanges(store: EditorStore, ones: readonly (Actor | Flow)[], 
         const moves = starts.shifted(moved, to);
         leftOut(moved.length, moves.length);
         const word = tool.does === "copy" ? "Copy" : "Move";
-        const label = moved.length === 1 ? `${word} ${moved[0].id}` : `${word} ${moves.length} road users`;
+        const label = moved.length === 1 ? `${word} ${moved[0]?.id}` : `${word} ${moves.length} road users`;
         if (moves.length === 0) return true;
         if (tool.does === "copy") {
           change({ kind: "copy_actors", copies: Object.fromEntries(moves.map(([id, spawn]) => [spawn, id])) }, label);

@@ -170,8 +170,9 @@ export function MapCanvas({
       ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step],
     };
     const middle = (): Pointed => pointed(size.current.width / 2, size.current.height / 2, event.shiftKey);
-    if (moves[event.key]) {
-      apply(panBy(view.current, ...moves[event.key]));
+    const move = moves[event.key];
+    if (move) {
+      apply(panBy(view.current, ...move));
       onPoint?.(middle());
     } else if (event.key === "+" || event.key === "=") zoom(1.4);
     else if (event.key === "-") zoom(1 / 1.4);

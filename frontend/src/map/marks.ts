@@ -1,3 +1,4 @@
+import { nth } from "../lists";
 import { FLOW, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, ROI_BASE, VEHICLE_NODE } from "./colors";
 import type { Graph, Place } from "./graph";
 import type { Scene, SceneActor, SceneFlow } from "./scene";
@@ -12,10 +13,10 @@ export function dots(
   context.fillStyle = color;
   context.beginPath();
   for (const i of rows) {
-    if (view.scale < 5) context.rect(at.x[i] - r, at.y[i] - r, 2 * r, 2 * r);
+    if (view.scale < 5) context.rect(nth(at.x, i) - r, nth(at.y, i) - r, 2 * r, 2 * r);
     else {
-      context.moveTo(at.x[i] + r, at.y[i]);
-      context.arc(at.x[i], at.y[i], r, 0, 2 * Math.PI);
+      context.moveTo(nth(at.x, i) + r, nth(at.y, i));
+      context.arc(nth(at.x, i), nth(at.y, i), r, 0, 2 * Math.PI);
     }
   }
   context.fill();
@@ -27,9 +28,9 @@ export function drawWalkEdges(
   const { walks } = graph.columns;
   context.beginPath();
   for (let e = 0; e < walks.source.length; e++) {
-    if (!rows.has(walks.source[e])) continue;
-    context.moveTo(walks.x[walks.source[e]], walks.y[walks.source[e]]);
-    context.lineTo(walks.x[walks.target[e]], walks.y[walks.target[e]]);
+    if (!rows.has(nth(walks.source, e))) continue;
+    context.moveTo(nth(walks.x, nth(walks.source, e)), nth(walks.y, nth(walks.source, e)));
+    context.lineTo(nth(walks.x, nth(walks.target, e)), nth(walks.y, nth(walks.target, e)));
   }
   context.strokeStyle = "#a58a00";
   context.lineWidth = 1.1 / view.scale;
@@ -55,9 +56,9 @@ export function drawLane(context: CanvasRenderingContext2D, graph: Graph, place:
   const at = place.walk ? graph.columns.walks : graph.columns;
   const [first, end] = graph.lanePlaces(place);
   context.beginPath();
-  for (let i = first; i < end; i++) context.lineTo(at.x[i], at.y[i]);
+  for (let i = first; i < end; i++) context.lineTo(nth(at.x, i), nth(at.y, i));
   context.lineCap = "butt";
-  context.lineWidth = at.width[place.index];
+  context.lineWidth = nth(at.width, place.index);
   context.strokeStyle = place.walk ? `${PEDESTRIAN_NODE}55` : `${VEHICLE_NODE}44`;
   context.stroke();
 }

@@ -2,6 +2,7 @@ import { Button, Group, Text, TextInput } from "@mantine/core";
 import { useEffect, useState } from "react";
 
 import type { Category } from "../api/types";
+import { nth } from "../lists";
 import { CategoryGlyph, IconSearch } from "../ui/icons";
 import { CATEGORY_WORD, count, kmh } from "../ui/words";
 import type { Picture } from "./usePicture";
@@ -63,8 +64,8 @@ function onTheRoad(latest: ReturnType<Picture["latest"]>): Row[] {
   const { frame, crowd } = latest;
   const rows: Row[] = [];
   for (let i = 0; i < frame.count; i++) {
-    const who = crowd.named(frame.rows[6 * i]);
-    if (who) rows.push({ id: who.id, category: who.category, ego: who.ego ?? false, speed: frame.rows[6 * i + 4] });
+    const who = crowd.named(nth(frame.rows, 6 * i));
+    if (who) rows.push({ id: who.id, category: who.category, ego: who.ego ?? false, speed: nth(frame.rows, 6 * i + 4) });
   }
   return rows.sort((a, b) => Number(b.ego) - Number(a.ego) || natural.compare(a.id, b.id));
 }

@@ -12,7 +12,7 @@ const BOX = { left: 44, right: W - 12, top: 22, bottom: H - 36 };
 export function Scatter({ rows }: { rows: readonly FitRow[] }) {
   const id = useId();
   const marks = ticks(Math.max(1, ...rows.flatMap((row) => [row.counted, row.modelled])));
-  const most = marks[marks.length - 1];
+  const most = marks.at(-1) ?? 1;
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / most;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / most;
   const unmet = rows.filter((row) => !row.met);

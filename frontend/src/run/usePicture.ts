@@ -1,5 +1,6 @@
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 
+import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
 import type { Crowd, Frame } from "./frames";
@@ -43,7 +44,7 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     last.current = { frame, crowd, moving };
     handle.current?.setMoving(moving);
     const row = moving.followed;
-    if (row >= 0) handle.current?.centre(moving.pose[5 * row], moving.pose[5 * row + 1]);
+    if (row >= 0) handle.current?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
     pending.current ||= window.setTimeout(() => {
       pending.current = 0;
       if (!last.current) return;
@@ -72,7 +73,7 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     for (const { id } of crowd.everybody()) {
       const row = crowd.row(id);
       if (row < 0) continue;
-      const away = Math.hypot(moving.pose[5 * row] - at.x, moving.pose[5 * row + 1] - at.y);
+      const away = Math.hypot(nth(moving.pose, 5 * row) - at.x, nth(moving.pose, 5 * row + 1) - at.y);
       if (away < least) [best, least] = [id, away];
     }
     return best;

@@ -1,0 +1,6 @@
+/** The element that must be there; asking for another one is a fault of the page, and said as such. */
+export function nth<T>(list: ArrayLike<T>, index: number): T {
+  const found = list[index];
+  if (found === undefined) throw new RangeError(`there is no element ${index} of ${list.length}`);
+  return found;
+}
