@@ -4,7 +4,7 @@ import type { MapInfo } from "../src/api/types";
 import { coverage, type Entry, grouped } from "../src/catalogue/conversion";
 import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
-import { hashOf, parseRoute } from "../src/ui/route";
+import { hashOf, parseAddress } from "../src/ui/address";
 import { clock, length, mapFacts, modelWord } from "../src/ui/words";
 
 const map = (name: string, junctions: number): MapInfo => ({
@@ -24,10 +24,10 @@ test("maps are found by all words and sorted by name as people count", () => {
 
 test("an address leads back to the same view, whatever the name", () => {
   for (const name of ["plain", "a/b #1 ü %", "100%"]) {
-    expect(parseRoute(hashOf({ view: "editor", scenario: name }))).toEqual({ view: "editor", scenario: name });
-    expect(parseRoute(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({ view: "run", scenario: name, run: "r1" });
+    expect(parseAddress(hashOf({ view: "editor", scenario: name }))).toEqual({ view: "editor", scenario: name });
+    expect(parseAddress(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({ view: "run", scenario: name, run: "r1" });
   }
-  expect(parseRoute("#/nonsense")).toEqual({ view: "catalogue" });
+  expect(parseAddress("#/nonsense")).toEqual({ view: "catalogue" });
 });
 
 test("figures are said as people say them", () => {
@@ -65,7 +65,7 @@ test("a conversion report says the same of many places once, what was lost first
     { fate: "lost", title: "Could not be used", findings: [
       { text: "Lanes of the kind “shoulder” are not driven on and are left out", places: ["road 1", "road 2"] },
       { text: "The simulation knows no such thing", places: ["road 9"] }] },
-    { fate: "kept", title: "Was taken over as it is", findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }] },
+    { fate: "kept", title: "Imported unchanged", findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }] },
   ]);
   expect(coverage(report)).toEqual({ driving: 99, walking: null });
 });

@@ -39,16 +39,16 @@ const columns: GraphColumns = {
 };
 const graph = new Graph(columns);
 
-test("the first piece is dark blue, the rest of the region blue, what can be added light blue", () => {
+test("the first segment is dark blue, the rest of the region blue, what can be added light blue", () => {
   const styles = segmentStyles(graph, ["b", "a"], ["c"], true);
   expect([...styles].sort()).toEqual([[0, "member"], [1, "base"], [2, "eligible"]]);
 });
 
-test("before the first piece nothing stands out, though all may be chosen", () => {
+test("before the first segment nothing stands out, though all may be chosen", () => {
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
 });
 
-test("a new road user or stream is selected; after a removal the others stay selected", () => {
+test("a new road user or flow is selected; after a removal the others stay selected", () => {
   const [a, b] = [actor("a"), actor("b")];
   expect(selectionAfter(["a"], scenario([a]), scenario([a, b]))).toEqual(["b"]);
   expect(selectionAfter(["a"], scenario([a]), scenario([a], ["a"], [flow("f", "1.0.-1.1")]))).toEqual(["f"]);
@@ -62,13 +62,13 @@ test("a road user is drawn to the left of its lane by its offset, and red when i
   expect(found[0]).toMatchObject({ x: 0, y: 0.5, offset: 0.5, selected: true, problem: true });
 });
 
-test("a stream is drawn where it begins, with what it brings in an hour", () => {
+test("a flow is drawn at its start, with its volume per hour", () => {
   const document = scenario([], ["a"], [flow("f", "1.0.-1.1")]);
   const wrong = wrongOnes([problem("flows[0].spawn")], document);
   expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([{ id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true }]);
 });
 
-test("a problem leads to its road user or stream and to its place on the map", () => {
+test("a problem leads to its road user or flow and to its place on the map", () => {
   const document = scenario([actor("a"), actor("b", "1.0.-1.2")], ["a"], [flow("f", "1.0.-1.1")]);
   expect(ofProblem(problem("actors[1].spawn"), document)?.id).toBe("b");
   expect(ofProblem(problem("flows[0].spawn"), document)?.id).toBe("f");
@@ -98,7 +98,7 @@ test("only free and usable places of the region are offered, of the right kind",
 test("who cannot start somewhere is told why", () => {
   expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain("No bicycle may start here");
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
-  expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("taken");
+  expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");
   expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("yellow");
 });
 

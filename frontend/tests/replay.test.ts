@@ -5,7 +5,7 @@ import { compared } from "../src/run/figures";
 import { marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
-import { hashOf, parseRoute } from "../src/ui/route";
+import { hashOf, parseAddress } from "../src/ui/address";
 
 const columns = (): ReplayColumns => ({
   times: [0, 1, 2],
@@ -26,7 +26,7 @@ const shown = (time: number): Record<string, [number, number]> => {
   const frame = replay.at(time);
   const { pose } = replay.crowd.arrange(frame, null, null);
   const found: Record<string, [number, number]> = {};
-  for (const who of replay.crowd.everybody()) {
+  for (const who of replay.crowd.all()) {
     const row = replay.crowd.row(who.id);
     if (row >= 0) found[who.id] = [pose[5 * row] ?? NaN, pose[5 * row + 1] ?? NaN];
   }
@@ -98,5 +98,5 @@ test("a long table is thinned evenly with its end kept", () => {
 });
 
 test("the list of a scenario's runs has an address", () => {
-  expect(parseRoute(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
+  expect(parseAddress(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
 });

@@ -6,7 +6,7 @@ import type { MapInfo } from "../api/types";
 import { forgetMaps } from "../map/loaded";
 import { IconSearch } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 import { AddMap } from "./AddMap";
@@ -15,7 +15,7 @@ import { MapCard } from "./MapCard";
 import { arranged, type Order, ORDERS, type Wish, WISHES } from "./order";
 import { Scenarios } from "./Scenarios";
 
-/** The first screen: choose a map, or go on with a scenario. */
+/** The first screen: choose a map, or open a scenario. */
 export function CatalogueView() {
   const maps = useLoaded(api.maps);
   const scenarios = useLoaded(api.scenarios);
@@ -70,7 +70,7 @@ export function CatalogueView() {
         </>
       )}
       {all.length > 0 && found.length === 0 && (
-        <Text my="xl">No map is like that. <Button variant="subtle" size="compact-sm" onClick={() => { setSearch(""); setWishes([]); }}>Show all maps</Button></Text>
+        <Text my="xl">No matching maps. <Button variant="subtle" size="compact-sm" onClick={() => { setSearch(""); setWishes([]); }}>Show all maps</Button></Text>
       )}
       <ul className="cards" aria-label="Maps">
         {found.map((map) => (
@@ -90,7 +90,7 @@ export function CatalogueView() {
       <Modal opened={removing !== null} onClose={() => setRemoving(null)} centered
         title={`Remove ${removing?.name ?? ""}?`}>
         <Text size="sm">{removing?.what === "map"
-          ? "The map and what was prepared for it are deleted. Scenarios on it stay, but need it to run."
+          ? "The map and all that was built from it are deleted. Scenarios on it stay, but need it to run."
           : "The scenario is deleted. The results of its runs stay."}</Text>
         <Group justify="flex-end" mt="lg">
           <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>Keep it</Button>

@@ -8,10 +8,10 @@ import { coverage, type Finding, type Group, grouped } from "./conversion";
 /** Places named in the list; the rest are in the file. */
 const NAMED = 40;
 
-/** How a map was taken over, in plain words. */
+/** The import report of a map. */
 export function Conversion({ map, onClose }: { map: string; onClose: () => void }) {
   return (
-    <Modal opened onClose={onClose} size="lg" title={`How ${map} was taken over`}>
+    <Modal opened onClose={onClose} size="lg" title={`Import report of ${map}`}>
       <Body map={map} />
     </Modal>
   );

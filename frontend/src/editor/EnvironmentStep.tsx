@@ -46,7 +46,7 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
         ))}
       </div>
       {chosen && <Text size="sm">Now: <b>{weatherWord(chosen)}</b>{Object.keys(environment.parameters).length > 0 && ", fine-tuned"}</Text>}
-      <Switch label="Weather changes how people drive" checked={environment.affects_driving}
+      <Switch label="Weather affects driver behaviour" checked={environment.affects_driving}
         onChange={(event) => onEdit({ kind: "set_environment", affects_driving: event.currentTarget.checked })} />
       <Button variant="subtle" size="compact-sm" justify="flex-start" aria-expanded={fine} onClick={() => setFine(!fine)}>
         {fine ? "Hide fine-tuning" : "Fine-tune"}

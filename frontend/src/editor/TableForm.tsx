@@ -8,10 +8,10 @@ import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 
 const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
-  od: { label: "Trips from where to where", stem: "trips", text: "How many go from one place to another. Columns “begin” and “end” may say when." },
-  counts: { label: "Counts", stem: "counts", text: "How many vehicles passed a place. Traffic is made that reproduces them. A place is a segment, or segments one after another: r1>j2>r3." },
-  profile: { label: "A day profile", stem: "my-day", text: "How much comes in each equal slice of a day, from midnight on." },
-  zones: { label: "Zones", stem: null, text: "Names for several segments, which tables of trips can use." },
+  od: { label: "Trips between zones", stem: "trips", text: "Origin-destination trips: how many go from one segment or zone to another. Columns “begin” and “end” may say when." },
+  counts: { label: "Counts", stem: "counts", text: "How many vehicles passed a count station. Traffic is generated that reproduces them. A count station is a segment, or consecutive segments: r1>j2>r3." },
+  profile: { label: "A day profile", stem: "my-day", text: "The share of the traffic in each equal slice of a day, from midnight." },
+  zones: { label: "Zones", stem: null, text: "Names for groups of segments, for use in tables of trips." },
 };
 const isKind = (value: string | null): value is TableKind => value !== null && value in KINDS;
 
@@ -20,7 +20,7 @@ interface Refusal {
   problems: string[];
 }
 
-/** Reads a table into the scenario, all of it or nothing. */
+/** Imports a table into the scenario, all of it or nothing. */
 export function TableForm({ store, demand: known, roads }: {
   store: EditorStore; demand: Demand;
   /** Roads of the region, for the example. */
@@ -43,28 +43,28 @@ export function TableForm({ store, demand: known, roads }: {
     setRefusal(null);
   };
   const send = (file: File | null): void => {
-    reset.current?.();  // the same file can be chosen again once it is mended
+    reset.current?.();  // the same file can be chosen again once it is corrected
     if (!file) return;
     setBusy(true);
     setRefusal(null);
     take((version) => demand.table(name, version, kind, file, chosen.stem && part.trim()))
-      .then(() => tell(`${file.name} is read in.`), (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }))
+      .then(() => tell(`${file.name} is imported.`), (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }))
       .finally(() => setBusy(false));
   };
   return (
     <div className="fold">
-      <Select label="What the table has" data={Object.entries(KINDS).map(([value, { label }]) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
+      <Select label="Contents of the table" data={Object.entries(KINDS).map(([value, { label }]) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
       <Text size="sm">{chosen.text}</Text>
       <div>
         <Text size="xs" c="dimmed">For example, as text with commas, semicolons or tabs:</Text>
         <pre className="example" tabIndex={0} aria-label="An example">{example}</pre>
         <Anchor size="sm" underline="always" href={`data:text/csv;charset=utf-8,${encodeURIComponent(example)}`} download={`${chosen.stem ?? "zones"}.csv`}>Download this example</Anchor>
       </div>
-      {kind !== "profile" && <Text size="xs" c="dimmed">Point at a road or junction on the map to see what tables call it.</Text>}
-      {chosen.stem && <TextInput label="Name" description="what has this name already is replaced" inputWrapperOrder={["label", "input", "description"]}
+      {kind !== "profile" && <Text size="xs" c="dimmed">Point at a road or junction on the map to see its id for tables.</Text>}
+      {chosen.stem && <TextInput label="Name" description="replaces what has this name already" inputWrapperOrder={["label", "input", "description"]}
         value={part} onChange={(event) => setPart(event.currentTarget.value)} />}
       {refusal && (
-        <Alert ref={alert} color="red" title={`${refusal.file} was not read in`} style={{ overflowWrap: "anywhere" }}>
+        <Alert ref={alert} color="red" title={`${refusal.file} was not imported`} style={{ overflowWrap: "anywhere" }}>
           {refusal.problems.length === 1 ? refusal.problems[0]
             : <List size="sm">{refusal.problems.map((problem) => <List.Item key={problem}>{problem}</List.Item>)}</List>}
         </Alert>
@@ -81,6 +81,6 @@ export function TableForm({ store, demand: known, roads }: {
 /** All reasons for a refusal; each begins with a capital letter. */
 function problemsOf(error: unknown): string[] {
   const body = error instanceof ApiError ? error.body : null;
-  const told = body?.problems?.map((one) => typeof one === "string" ? one : one.message) ?? [];
-  return (told.length > 0 ? told : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
+  const reported = body?.problems?.map((one) => typeof one === "string" ? one : one.message) ?? [];
+  return (reported.length > 0 ? reported : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
 }

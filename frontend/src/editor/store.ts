@@ -12,7 +12,7 @@ export interface EditorState {
   saving: Saving;
   /** What went wrong last, in the server's words. */
   refusal: Refusal | null;
-  /** Ids of road users and streams. */
+  /** Ids of road users and flows. */
   selection: readonly string[];
   load: () => Promise<void>;
   /**
@@ -20,7 +20,7 @@ export interface EditorState {
    * document, or null if it was refused.
    */
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
-  /** Asks for a change that is no edit; a refusal is thrown, for whoever has asked to show it. */
+  /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
   take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
@@ -108,7 +108,7 @@ export function createEditorStore(name: string): EditorStore {
           return;
         }
         const title = "Changed in another tab";
-        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it; you can make it again on top.", again } });
+        set({ refusal: { title, message: "You now see the newest state without your last change, which you can apply again.", again } });
         return;
       }
       const failed = status <= 0 || status >= 500;

@@ -9,7 +9,7 @@ export const ROI_BASE = "#123F8C";
 export const ROI_MEMBER = "#2B62BD";
 export const ELIGIBLE = "#7CC8FF";
 export const GOAL = "#5AC3FF";
-/** Streams of vehicles; those of people have the colour of their places. */
+/** Flows of vehicles; those of pedestrians have the colour of their places. */
 export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
 
@@ -58,4 +58,4 @@ export const CATEGORY_COLOR: Record<Category, string> = {
   motorcycle: "#c2255c", bicycle: "#2b8a3e", pedestrian: "#f2b600",
 };
 export const EGO = "#e03131";
-export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", lifted: "#5f3dc4", met: "#0b7285", unmet: "#d9480f" };
+export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", teleported: "#5f3dc4", met: "#0b7285", unmet: "#d9480f" };

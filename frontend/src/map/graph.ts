@@ -3,7 +3,7 @@ import { nth } from "../lists";
 
 /** A place on the map where something can start or go. */
 export interface Place {
-  /** Whether it is a place for people on foot. */
+  /** Whether it is a place for pedestrians. */
   walk: boolean;
   index: number;
   id: string;
@@ -60,7 +60,7 @@ export class Graph {
     };
   }
 
-  /** Whether the simulator can place somebody exactly here. */
+  /** Whether the simulator can insert a road user exactly here. */
   usable(index: number, walk: boolean): boolean {
     return (walk ? this.columns.walks.walkable : this.columns.spawnable)[index] === 1;
   }
@@ -77,7 +77,7 @@ export class Graph {
   }
 }
 
-/** What the names of places for people on foot begin with. */
+/** What the names of places for pedestrians begin with. */
 export const WALK_PREFIX = "ped.";
 
 /** A strip of one lane that lies in one segment: a ring, x and y in turn. */

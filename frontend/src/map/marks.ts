@@ -37,10 +37,10 @@ export function drawWalkEdges(
   context.stroke();
 }
 
-export function drawPath(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
-  if (scene.path.length < 2) return;
+export function drawRoute(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
+  if (scene.route.length < 2) return;
   context.beginPath();
-  scene.path.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  scene.route.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
   context.lineCap = "round";
   context.lineJoin = "round";
   context.strokeStyle = "#ffffff";
@@ -63,7 +63,7 @@ export function drawLane(context: CanvasRenderingContext2D, graph: Graph, place:
   context.stroke();
 }
 
-/** How far beside the middle of its lane somebody stands. */
+/** How far beside the middle of its lane a road user starts. */
 export function drawOffset(
   context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, palette: Palette,
 ): void {
@@ -88,7 +88,7 @@ export function spot(context: CanvasRenderingContext2D, [x, y]: [number, number]
   context.fill();
 }
 
-/** Chevrons in the direction of travel, and how many come in an hour. */
+/** Chevrons in the direction of travel, and the volume per hour. */
 export function drawFlow(
   context: CanvasRenderingContext2D, [x, y]: [number, number], flow: SceneFlow, palette: Palette,
 ): void {
@@ -109,7 +109,7 @@ export function drawFlow(
     context.stroke();
   }
   context.restore();
-  tag(context, `${Math.round(flow.perHour)} an hour`, x, y - 22);
+  tag(context, `${Math.round(flow.perHour)} per hour`, x, y - 22);
 }
 
 export function drawGoal(

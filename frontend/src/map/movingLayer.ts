@@ -164,7 +164,7 @@ function mark(
 const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
   collision: (context) => { line(context, -4, -4, 4, 4); line(context, -4, 4, 4, -4); },
   braking: (context) => { line(context, 0, -5, 0, 1); line(context, 0, 4, 0, 4.5); },
-  lifted: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
+  teleported: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
   met: (context) => { line(context, -4, 0.5, -1, 3.5); line(context, -1, 3.5, 4, -3.5); },
   unmet: (context) => { line(context, -4, -2, 4, -2); line(context, -4, 2, 4, 2); line(context, 2.5, -5, -2.5, 5); },
 };

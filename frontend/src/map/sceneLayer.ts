@@ -6,7 +6,7 @@ import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
 import {
-  badge, body, dots, drawFlow, drawGoal, drawLane, drawOffset, drawPath, drawWalkEdges, spot, tag,
+  badge, body, dots, drawFlow, drawGoal, drawLane, drawOffset, drawRoute, drawWalkEdges, spot, tag,
 } from "./marks";
 import type { Picker } from "./picking";
 import type { Scene, SceneActor, SegmentStyle } from "./scene";
@@ -15,8 +15,8 @@ import type { Bounds, Category } from "../api/types";
 
 const NODES_FROM = 2.6;
 const EDGES_FROM = 7;
-/** From so many on, everybody is a dot while the whole crowd is in sight. */
-const CROWD = 300;
+/** From so many on, each is a dot while the whole map is in sight. */
+const MANY = 300;
 /** More names than these would lie on top of each other. */
 const FEW = 3;
 /** Least length of the arrow at the pointer, pixels. */
@@ -32,7 +32,7 @@ const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
   problem: { fill: PROBLEM, alpha: 0.6 },
 };
 
-/** What the user has made of the map: region, places, actors, goals and ways. */
+/** What the user has made of the map: region, places, actors, goals and route. */
 export class SceneLayer {
   private readonly segments: Path2D[] = [];
   private readonly bounds: Bounds[] = [];
@@ -59,7 +59,7 @@ export class SceneLayer {
     if (this.graph && this.picker && view.scale >= NODES_FROM) {
       this.drawGraph(context, view, size, scene, palette);
     }
-    drawPath(context, view, scene);
+    drawRoute(context, view, scene);
     if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (x: number, y: number): [number, number] => [
@@ -69,7 +69,7 @@ export class SceneLayer {
     for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
-    const plain = scene.actors.length > CROWD && view.scale < NODES_FROM;
+    const plain = scene.actors.length > MANY && view.scale < NODES_FROM;
     const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
     const seen = visible(view, size);
     for (const actor of scene.actors) {
@@ -132,7 +132,7 @@ export class SceneLayer {
     }
   }
 
-  /** Places in their colour; grey where nobody can start. */
+  /** Places in their colour; grey where no start is possible. */
   private drawPlaces(
     context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean,
   ): void {

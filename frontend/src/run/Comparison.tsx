@@ -2,7 +2,7 @@ import { Alert, Anchor, Loader, Table, Text, Title, VisuallyHidden } from "@mant
 import { useCallback } from "react";
 
 import { type RunInfo, runs, type Summary } from "../api/runs";
-import { hashOf } from "../ui/route";
+import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { compared, when } from "./figures";
 

@@ -26,15 +26,15 @@ const KNOWN: Known[] = [
   { label: "Simulated time", path: ["sim_seconds"], say: (n) => longClock(n, n), sayDifference: seconds },
   { label: "Planned", path: ["actors", "planned"], say: plain },
   { label: "Arrived", path: ["actors", "arrived"], say: plain },
-  { label: "Still on the way", path: ["actors", "running"], say: plain },
-  { label: "Never got on the road", path: ["actors", "waiting"], say: plain },
+  { label: "Still on the road", path: ["actors", "running"], say: plain },
+  { label: "Not inserted", path: ["actors", "waiting"], say: plain },
   { label: "In collisions", path: ["actors", "collided"], say: plain },
-  { label: "Had to brake hard", path: ["actors", "emergency_stopped"], say: plain },
-  { label: "Stuck, taken off the road", path: ["actors", "teleported"], say: plain },
+  { label: "Braked in an emergency", path: ["actors", "emergency_stopped"], say: plain },
+  { label: "Teleported (removed after waiting)", path: ["actors", "teleported"], say: plain },
   { label: "Mean speed", path: ["figures", "mean_speed"], say: kmh, sayDifference: (n) => `${(n * 3.6).toFixed(1)} km/h` },
-  { label: "Mean trip", path: ["figures", "mean_travel_time"], say: clock, sayDifference: seconds },
+  { label: "Mean travel time", path: ["figures", "mean_travel_time"], say: clock, sayDifference: seconds },
   { label: "Mean delay", path: ["figures", "mean_delay"], say: seconds },
-  { label: "Mean walk", path: ["figures", "pedestrian_mean_travel_time"], say: clock, sayDifference: seconds },
+  { label: "Mean walking time", path: ["figures", "pedestrian_mean_travel_time"], say: clock, sayDifference: seconds },
 ];
 
 function get(summary: Summary, path: readonly string[]): number | null {
@@ -43,7 +43,7 @@ function get(summary: Summary, path: readonly string[]): number | null {
   return typeof found === "number" ? found : null;
 }
 
-/** The key figures of a run in plain words; those that the run has not are left out. */
+/** The key figures of a run; those that the run has not are left out. */
 export function keyFigures(summary: Summary): Figure[] {
   return KNOWN.flatMap(({ label, path, say }) => {
     const value = get(summary, path);
@@ -72,7 +72,7 @@ const ENDED = ["completed", "stopped", "failed", "interrupted"];
 export const hasEnded = (state: string): boolean => ENDED.includes(state);
 
 export const STATE_WORD: Record<string, string> = {
-  preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
+  preparing: "Preparing", running: "Running", paused: "Paused", finishing: "Writing the results",
   completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
 };
 
@@ -87,7 +87,7 @@ export const SPEEDS: Speed[] = [
   { value: "0.1", label: "0.1 ×", speed: 0.1 }, { value: "0.25", label: "0.25 ×", speed: 0.25 },
   { value: "0.5", label: "0.5 ×", speed: 0.5 }, { value: "1", label: "Real time", speed: 1 },
   { value: "2", label: "2 ×", speed: 2 }, { value: "5", label: "5 ×", speed: 5 },
-  { value: "10", label: "10 ×", speed: 10 }, { value: "max", label: "As fast as it can", speed: null },
+  { value: "10", label: "10 ×", speed: 10 }, { value: "max", label: "As fast as possible", speed: null },
 ];
 /** A recording has no limit but the eye. */
 export const REPLAY_SPEEDS: Speed[] = SPEEDS.filter(({ speed }) => speed !== null);

@@ -58,13 +58,13 @@ export class Crowd {
     for (const actor of actors) this.known.set(actor.index, actor);
   }
 
-  everybody(): Introduced[] {
+  all(): Introduced[] {
     return [...this.known.values()];
   }
 
-  /** Ids of the road users that are marked as the person's own. */
+  /** Ids of the road users that are marked as ego. */
   egos(): string[] {
-    return this.everybody().filter((one) => one.ego).map((one) => one.id);
+    return this.all().filter((one) => one.ego).map((one) => one.id);
   }
 
   named(index: number): Introduced | undefined {
@@ -76,7 +76,7 @@ export class Crowd {
     return id === null ? -1 : (this.rowOf.get(id) ?? -1);
   }
 
-  /** The frame as it is drawn; whoever has not been introduced yet is left out. */
+  /** The frame as it is drawn; those not introduced yet are left out. */
   arrange(frame: Frame, ego: string | null, followed: string | null): Moving {
     const pose = new Float64Array(5 * frame.count);
     const category = new Uint8Array(frame.count);

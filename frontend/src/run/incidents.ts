@@ -9,24 +9,24 @@ const FRESH = 4;
 const DRAWN = 300;
 
 const KIND: Record<string, MarkKind> = {
-  collision: "collision", emergency_stop: "braking", teleport_start: "lifted", teleport_end: "lifted",
+  collision: "collision", emergency_stop: "braking", teleport_start: "teleported", teleport_end: "teleported",
 };
 
 export const MARK_WORD: Record<MarkKind, string> = {
-  collision: "Collision", braking: "Emergency braking", lifted: "Stuck, taken off the road",
+  collision: "Collision", braking: "Emergency braking", teleported: "Teleported",
   met: "Count met", unmet: "Count not met",
 };
 
-export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "lifted";
+export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "teleported";
 
-/** What happened in plain words, with whom. */
+/** An incident in a sentence, with whom. */
 export function sentence(incident: Incident, categories: ReadonlyMap<string, Category>): string {
   const who = named(incident.actor, categories);
   switch (incident.kind) {
     case "collision":
       return incident.partner ? `${who} collided with ${named(incident.partner, categories)}` : `${who} collided`;
-    case "emergency_stop": return `${who} had to brake as hard as it could`;
-    case "teleport_start": return `${who} was stuck for too long and was taken off the road`;
+    case "emergency_stop": return `${who} braked in an emergency`;
+    case "teleport_start": return `${who} was teleported: removed after waiting too long`;
     case "teleport_end": return `${who} was put back on the road`;
     default: return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
@@ -37,7 +37,7 @@ function named(id: string, categories: ReadonlyMap<string, Category>): string {
   return !category || id.toLowerCase().startsWith(category) ? id : `${CATEGORY_WORD[category]} ${id}`;
 }
 
-/** What is drawn of it at a time: everything up to then, the newest most visible. */
+/** What is drawn at a time: all incidents up to then, the newest most visible. */
 export function marksAt(incidents: readonly Incident[], time: number): Mark[] {
   return incidents
     .filter((one) => one.time <= time + 1e-6)

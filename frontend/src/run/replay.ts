@@ -24,7 +24,7 @@ export class Replay {
     this.crowd.introduce(columns.actors.map((actor, index) => ({ ...actor, index })));
   }
 
-  /** Everybody on the road at a time, as a live frame would say it; `arrived` is not known. */
+  /** All on the road at a time, as a live frame has them; `arrived` is not known. */
   at(time: number): Frame {
     const { times, first, actor, x, y, hdg, speed } = this.columns;
     if (times.length === 0) return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
@@ -53,7 +53,7 @@ interface Pose {
 
 /**
  * Place between two that are `span` seconds apart, along a curve that leaves and arrives with the
- * recorded heading and speed. Whoever was put elsewhere stays until then.
+ * recorded heading and speed. One that was put elsewhere stays until then.
  */
 export function between(a: Pose, b: Pose, span: number, share: number): Pose {
   const far = Math.hypot(b.x - a.x, b.y - a.y);

@@ -13,7 +13,7 @@ export interface Now {
   pace: number;
   running: number;
   arrived: number;
-  /** Whether whoever is followed is on the road. */
+  /** Whether the one that is followed is on the road. */
   there: boolean;
 }
 
@@ -26,7 +26,7 @@ export interface Picture {
   redraw: () => void;
   clear: () => void;
   follow: (id: string | null) => void;
-  /** Who is near a place, if anybody. */
+  /** The road user near a point. */
   near: (at: Pointed) => string | null;
   /** The newest frame, read when it is needed. */
   latest: () => { frame: Frame; crowd: Crowd } | null;
@@ -70,7 +70,7 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     const { crowd, moving } = last.current;
     let best: string | null = null;
     let least = Math.max(at.reach, 3);
-    for (const { id } of crowd.everybody()) {
+    for (const { id } of crowd.all()) {
       const row = crowd.row(id);
       if (row < 0) continue;
       const away = Math.hypot(nth(moving.pose, 5 * row) - at.x, nth(moving.pose, 5 * row + 1) - at.y);

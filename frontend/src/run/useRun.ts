@@ -16,16 +16,16 @@ const ENOUGH = 20;
 export interface Run {
   info: RunInfo | null;
   failure: string | null;
-  /** What the live picture tells sooner than one asks. */
+  /** What the live picture reports sooner than one asks. */
   learn: (state: string, speed?: number | null) => void;
 }
 
-/** How a run stands; asked rarely, as the picture comes by itself. */
+/** The state of a run; asked rarely, as the picture comes by itself. */
 export function useRun(run: string): Run {
   const [info, setInfo] = useState<RunInfo | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const ended = info !== null && hasEnded(info.state);
-  // The live picture may tell of the end before its results, or its reason, are there.
+  // The live picture may report the end before its results, or its reason, are there.
   const complete = ended && (info.summary != null || info.error != null);
   useEffect(() => {
     if (complete) return;

@@ -31,9 +31,9 @@ export const IconStop = icon(<rect x="6" y="6" width="12" height="12" rx="1.500"
 export const IconBack = icon(<path d="m14 6-6 6 6 6" />);
 export const IconWarn = icon(<path d="M12 4 2.500 20h19zM12 10v4m0 3v.01" />);
 export const IconCheck = icon(<path d="m5 12.500 4.500 4.500L19 7.500" />);
-export const IconKeys = icon(<><rect x="2.500" y="6" width="19" height="12" rx="2" /><path d="M6.500 10h.01M10 10h.01M13.500 10h.01M17 10h.01M8 14h8" /></>);
+export const IconTour = icon(<path d="M6 21V4m0 1h12l-3 4 3 4H6" />);
 export const IconDown = icon(<path d="M12 4v11m-5-5 5 5 5-5M5 20h14" />);
-export const IconStream = icon(<path d="m3 6 5 6-5 6M10 6l5 6-5 6M17 6l5 6-5 6" strokeWidth={2.500} />);
+export const IconFlow = icon(<path d="m3 6 5 6-5 6M10 6l5 6-5 6M17 6l5 6-5 6" strokeWidth={2.500} />);
 export const IconDice = icon(<><rect x="4" y="4" width="16" height="16" rx="3" /><path d="M8.500 8.500h.01M15.500 8.500h.01M12 12h.01M8.500 15.500h.01M15.500 15.500h.01" strokeWidth={2.800} /></>);
 export const IconMenu = icon(<path d="M4 7h16M4 12h16M4 17h16" />);
 export const IconHelp = icon(<><circle cx="12" cy="12" r="9" /><path d="M9.500 9.500a2.500 2.500 0 1 1 3.500 2.300c-.7.3-1 .8-1 1.700m0 3v.01" /></>);

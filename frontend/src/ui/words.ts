@@ -1,6 +1,6 @@
 import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types";
 
-/** Words for people: no term of any standard or simulator on the page. */
+/** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
   car: "Car", van: "Van", truck: "Truck", bus: "Bus", motorcycle: "Motorcycle",
   bicycle: "Bicycle", pedestrian: "Pedestrian",
@@ -9,6 +9,9 @@ export const CATEGORY_WORD: Record<Category, string> = {
 export const STYLE_WORD: Record<Style, string> = {
   cautious: "Cautious", normal: "Normal", sporty: "Sporty",
 };
+
+/** A flow in words, by whether its road users are on foot. */
+export const flowWord = (walks: boolean): string => walks ? "Pedestrian flow" : "Vehicle flow";
 
 const KIND_WORD: Record<string, string> = {
   clear: "Clear", cloudy: "Cloudy", wet: "Wet roads", rain_light: "Light rain",
@@ -61,10 +64,16 @@ export function longClock(seconds: number, longest: number): string {
   return `${Math.floor(s / 3600)}:${String(Math.floor(s / 60) % 60).padStart(2, "0")}:${String(s % 60).padStart(2, "0")}`;
 }
 
-/** From when to when, as hours and minutes after the start. */
+/** From when to when after the start, in the unit that fits: `0–15 min`, `0:15–10:00 h`. */
 export function span(begin: number, end: number): string {
-  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${String(Math.floor(seconds / 60) % 60).padStart(2, "0")}`;
-  return `${at(begin)}–${at(end)}`;
+  const two = (n: number): string => String(Math.floor(n) % 60).padStart(2, "0");
+  if (begin % 60 !== 0 || end % 60 !== 0) {
+    const at = (seconds: number): string => `${Math.floor(seconds / 60)}:${two(seconds)}`;
+    return `${at(begin)}–${at(end)} min`;
+  }
+  if (end <= 3600) return `${begin / 60}–${end / 60} min`;
+  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${two(seconds / 60)}`;
+  return `${at(begin)}–${at(end)} h`;
 }
 
 export function bytes(n: number): string {
