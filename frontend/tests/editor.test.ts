@@ -1,43 +1,13 @@
 import { afterEach, expect, test, vi } from "vitest";
 
-import type { Actor, Flow, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
+import type { ScenarioDocument, ScenarioState } from "../src/api/types";
 import { boundsOfProblem, inFrame, nearestOne, ofProblem, sceneActors, sceneFlows, segmentStyles, wrongOnes } from "../src/editor/scene";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
 import { Starts } from "../src/editor/placing";
 import { rowsInSight } from "../src/editor/windowed";
-import { Graph } from "../src/map/graph";
 import { Picker } from "../src/map/picking";
-
-const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
-  id, category: "car", model: null, spawn, goal: null, speed: null, lateral_offset: 0.5, depart: 0,
-  style: "normal", ego: false, crosses_anywhere: false, ignores_red: false,
-});
-const flow = (id: string, spawn: string): Flow => ({
-  id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null, profile: null,
-});
-const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
-  name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
-  environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows,
-  demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
-  signals: { control: "fixed", junctions: [] },
-  simulation: { duration: 60, step_length: 0.5 },
-});
-const problem = (where: string, nodes: string[] = []): Problem => ({
-  severity: "error", code: "x", where, message: "m", nodes, segments: ["b"],
-});
-const walks = {
-  lane_keys: ["1.0.3"], first_node: [0, 2], lane: [0, 0], x: [0, 2], y: [9, 9], hdg: [0, 0], width: [2, 2],
-  walkable: [1, 1], segment: [0, 1], source: [], target: [], kind: [],
-};
-const columns: GraphColumns = {
-  spacing: 2, lane_keys: ["1.0.-1"], lane_types: ["driving"], lane_junctions: [null], first_node: [0, 3], lane: [0, 0, 0],
-  s: [0, 2, 4], x: [0, 2, 4], y: [0, 0, 0], hdg: [0, 0, 0], width: [3, 3, 3], segment: [0, 1, 2],
-  speed_limit: [13.889, null, null], spawnable: [1, 1, 0],
-  segments: ["a", "b", "c"].map((id) => ({ id, kind: "road", neighbours: [] })),
-  edges: { source: [], target: [], relation: [] }, walks,
-};
-const graph = new Graph(columns);
+import { actor, flow, graph, place, problem, scenario } from "./example";
 
 test("the first segment is dark blue, the rest of the region blue, what can be added light blue", () => {
   const styles = segmentStyles(graph, ["b", "a"], ["c"], true);
@@ -103,8 +73,7 @@ test("who cannot start somewhere is told why", () => {
 });
 
 test("a start moves along its lane past those who stand there, and not out of the region", () => {
-  const at = graph.place("1.0.-1.0");
-  if (!at) throw new Error("the test's own place");
+  const at = place("1.0.-1.0");
   expect(startsOf(scenario([actor("a")]), 0, 1).along(at, 1)?.id).toBe("1.0.-1.1");
   expect(startsOf(scenario([actor("a")]), 0).along(at, 1)).toBeNull();
   expect(startsOf(scenario([actor("a"), actor("b", "1.0.-1.1")]), 0, 1).along(at, 1)).toBeNull();
@@ -112,8 +81,7 @@ test("a start moves along its lane past those who stand there, and not out of th
 
 test("copies keep their distances, no two on one place", () => {
   const ones = [actor("a"), { ...actor("p", "ped.1.0.3.0"), category: "pedestrian" as const }];
-  const to = graph.place("1.0.-1.1");
-  if (!to) throw new Error("the test's own place");
+  const to = place("1.0.-1.1");
   expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([["a", "1.0.-1.1"], ["p", "ped.1.0.3.1"]]);
 });
 
