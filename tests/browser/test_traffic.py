@@ -95,7 +95,7 @@ def test_background_traffic_is_added_changed_and_taken_back(
     assert user.document()["demand"]["background"][0]["end"] is None
 
 
-def test_a_table_with_a_mistake_names_line_and_column_and_mended_it_is_read_in(
+def test_a_table_with_a_mistake_names_line_and_column_and_corrected_it_is_imported(
     user: OdscenPage, crossing: str, tmp_path: Path
 ) -> None:
     open_traffic(user, crossing)
@@ -103,12 +103,12 @@ def test_a_table_with_a_mistake_names_line_and_column_and_mended_it_is_read_in(
     user.page.get_by_role("button", name="Import a table").click()
     table = tmp_path / "commuters.csv"
     table.write_text("from,to,trips\nr1,r2,30\nr1,r77,20\n")
-    send_table(user, "Trips from where to where", table)
+    send_table(user, "Trips between zones", table)
     refused = user.page.get_by_role("alert").filter(has_text="commuters.csv was not imported")
     expect(refused).to_contain_text("Line 3, column 'to': 'r77' is neither a zone nor a segment")
     assert user.document() == before
     table.write_text("from,to,trips\nr1,r2,30\nr1,r3,20\n")
-    send_table(user, "Trips from where to where", table)
+    send_table(user, "Trips between zones", table)
     expect(refused).to_have_count(0)
     card = user.page.get_by_role("region", name="Trips between zones trips")
     expect(card).to_contain_text("50 trips in 2 rows")
@@ -117,7 +117,7 @@ def test_a_table_with_a_mistake_names_line_and_column_and_mended_it_is_read_in(
     assert user.document() == before
 
 
-def test_a_day_of_the_whole_town_is_made_and_what_it_asks_of_the_junctions_told(
+def test_a_day_on_the_whole_map_is_generated_and_its_load_on_the_junctions_reported(
     user: OdscenPage, crossing: str
 ) -> None:
     open_traffic(user, crossing)
