@@ -5,6 +5,7 @@ import { api } from "../api/client";
 import { addShipped, followJob } from "../api/maps";
 import type { Job } from "../api/types";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { stepWords } from "./steps";
 
 interface Work {
@@ -42,7 +43,7 @@ export function AddMap({ empty, onAdded, onReport }: {
         onStep(job);
       });
     } catch (error) {
-      setRefusals((old) => [...old, { file: what, reason: (error as Error).message }]);
+      setRefusals((old) => [...old, { file: what, reason: reasonOf(error) }]);
       return null;
     }
   };

@@ -58,10 +58,10 @@ export function CatalogueView() {
             <TextInput label="Search" placeholder="Part of the name" leftSection={<IconSearch />} value={search}
               onChange={(event) => setSearch(event.currentTarget.value)} />
             <Select label="Sort by" data={ORDERS} value={order} allowDeselect={false}
-              onChange={(value) => setOrder((value ?? "name") as Order)} />
+              onChange={(value) => setOrder(ORDERS.find((one) => one.value === value)?.value ?? "name")} />
             <Text size="sm" c="dimmed" pb={8} role="status">{count(found.length, "map")}</Text>
           </div>
-          <Chip.Group multiple value={wishes} onChange={(value) => setWishes(value as Wish[])}>
+          <Chip.Group multiple value={wishes} onChange={(chosen) => setWishes(WISHES.map(({ value }) => value).filter((one) => chosen.includes(one)))}>
             <Group gap={8} mb="md" role="group" aria-label="Only maps with">
               <Text size="sm" aria-hidden="true">Only maps with</Text>
               {WISHES.map(({ value, label }) => <Chip key={value} value={value} size="sm" variant="outline">{label}</Chip>)}

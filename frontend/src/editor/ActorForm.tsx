@@ -1,6 +1,7 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
-import type { Actor, Assets, Edit, Style } from "../api/types";
+import type { Actor, Assets, Edit } from "../api/types";
+import { isKey } from "../lists";
 import { modelWord, STYLE_WORD } from "../ui/words";
 import { Committed } from "./Committed";
 import { bodyOf } from "./scene";
@@ -34,7 +35,7 @@ export function ActorForm({ actor, assets, onEdit }: {
           <Committed label="Offset to the left" suffix=" m" min={-3} max={3} step={0.1} digits={2} value={actor.lateral_offset}
             onCommit={(value) => change({ lateral_offset: value ?? 0 })} />
           <Select label="Driving style" allowDeselect={false} value={actor.style} data={STYLES}
-            onChange={(style) => change({ style: (style ?? "normal") as Style })} />
+            onChange={(style) => { if (isKey(STYLE_WORD, style)) change({ style }); }} />
         </Group>
       )}
       {!walks && <Checkbox label="Ego: my vehicle under test" checked={actor.ego}
@@ -65,7 +66,7 @@ export function ManyForm({ actors, onChange }: {
           value={same("depart") ?? ""} onCommit={(value) => onChange({ depart: value ?? 0 }, "Departure")} />
       </Group>
       <Select label="Driving style of all" placeholder="different" allowDeselect={false} value={same("style") ?? null} data={STYLES}
-        onChange={(style) => onChange({ style: (style ?? "normal") as Style }, "Driving style")} />
+        onChange={(style) => { if (isKey(STYLE_WORD, style)) onChange({ style }, "Driving style"); }} />
     </Stack>
   );
 }

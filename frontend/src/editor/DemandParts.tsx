@@ -74,7 +74,8 @@ export function CountsList({ counts, onEdit, onShow, onRemove }: {
 }) {
   const stations = [...new Set(counts.rows.map(([station]) => station))];
   const total = counts.rows.reduce((sum, [, , , number]) => sum + number, 0);
-  const note = `${count(counts.rows.length, "count")} at ${count(stations.length, "count station")}, ${count(Math.round(total), "vehicle")} in total`;
+  const where = `${count(counts.rows.length, "count")} at ${count(stations.length, "count station")}`;
+  const note = `${where}, ${count(Math.round(total), "vehicle")} in total`;
   return (
     <PartCard name={counts.id} what="Counts to be reproduced" note={note} onRemove={onRemove}>
       <MixFold mix={counts.mix} onChange={(mix) => onEdit({ kind: "set_counts", counts: counts.id, mix })} />

@@ -10,6 +10,7 @@ export function FillForm({ actors, busy, onFill }: {
 }) {
   const [share, setShare] = useState(30);
   const [seed, setSeed] = useState(1);
+  const replaced = actors === 1 ? "the road user of the scenario; undo restores it" : `the ${count(actors, "road user")} of the scenario; undo restores them`;
   return (
     <div className="fold">
       <div>
@@ -24,7 +25,7 @@ export function FillForm({ actors, busy, onFill }: {
         </Tooltip>
       </Group>
       <Text size="sm" c="dimmed">
-        The same seed gives the same road users.{actors > 0 && ` They replace the ${count(actors, "road user")} of the scenario; undo restores ${actors === 1 ? "it" : "them"}.`}
+        The same seed gives the same road users.{actors > 0 && ` They replace ${replaced}.`}
       </Text>
       <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed)}>Fill the region</Button>
     </div>

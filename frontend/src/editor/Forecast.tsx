@@ -2,6 +2,7 @@ import { Alert, Button, Text } from "@mantine/core";
 import { useEffect, useRef, useState } from "react";
 
 import { type Forecast as Found, runs, type RunWish } from "../api/runs";
+import { reasonOf } from "../ui/reason";
 import { bytes, count } from "../ui/words";
 
 /** What the run will need; asked for on demand, as it takes as long as preparing a run. */
@@ -17,7 +18,7 @@ export function Forecast({ wish, version }: { wish: RunWish; version: number }) 
   const ask = (): void => {
     setBusy(true);
     setFailure(null);
-    runs.forecast({ scenario, trajectories, every }).then(setFound, (error: unknown) => setFailure((error as Error).message)).finally(() => setBusy(false));
+    runs.forecast({ scenario, trajectories, every }).then(setFound, (error: unknown) => setFailure(reasonOf(error))).finally(() => setBusy(false));
   };
   return (
     <>

@@ -46,7 +46,7 @@ export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, o
 
   const onKeyDown = (event: KeyboardEvent): void => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-    const row = (event.target as HTMLElement).closest<HTMLElement>("[data-row]");
+    const row = event.target instanceof Element ? event.target.closest<HTMLElement>("[data-row]") : null;
     if (!step || !row) return;
     event.preventDefault();
     const next = row.parentElement?.querySelector<HTMLElement>(`[data-row="${Number(row.dataset.row) + step}"] .row-button`);

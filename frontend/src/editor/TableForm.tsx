@@ -3,17 +3,19 @@ import { useEffect, useRef, useState } from "react";
 
 import { ApiError } from "../api/client";
 import { type Demand, demand, type TableKind } from "../api/demand";
+import { isKey } from "../lists";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 
 const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
-  od: { label: "Trips between zones", stem: "trips", text: "Origin-destination trips: how many go from one segment or zone to another. Columns “begin” and “end” may say when." },
-  counts: { label: "Counts", stem: "counts", text: "How many vehicles passed a count station. Traffic is generated that reproduces them. A count station is a segment, or consecutive segments: r1>j2>r3." },
+  od: { label: "Trips between zones", stem: "trips", text: "How many trips go from one segment or zone to another. Columns “begin” and “end” may say when." },
+  counts: { label: "Counts", stem: "counts", text: "How many vehicles passed a count station, to be reproduced by traffic. "
+    + "A count station is a segment, or consecutive segments: r1>j2>r3." },
   profile: { label: "A day profile", stem: "my-day", text: "The share of the traffic in each equal slice of a day, from midnight." },
   zones: { label: "Zones", stem: null, text: "Names for groups of segments, for use in tables of trips." },
 };
-const isKind = (value: string | null): value is TableKind => value !== null && value in KINDS;
 
 interface Refusal {
   file: string;
@@ -37,7 +39,7 @@ export function TableForm({ store, demand: known, roads }: {
   const chosen = KINDS[kind];
   const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
-    if (!isKind(next)) return;
+    if (!isKey(KINDS, next)) return;
     setKind(next);
     setPart(KINDS[next].stem ?? "");
     setRefusal(null);
@@ -82,5 +84,5 @@ export function TableForm({ store, demand: known, roads }: {
 function problemsOf(error: unknown): string[] {
   const body = error instanceof ApiError ? error.body : null;
   const reported = body?.problems?.map((one) => typeof one === "string" ? one : one.message) ?? [];
-  return (reported.length > 0 ? reported : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
+  return (reported.length > 0 ? reported : [reasonOf(error)]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
 }

@@ -7,7 +7,7 @@ const KEY = "odscen.tour";
 const STEPS: readonly [title: string, text: string][] = [
   ["1. Choose where", "Click a road or junction: it is the first segment of your region. Light-blue segments can be added."],
   ["2. Choose who", "Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for pedestrians."],
-  ["3. Run it", "Open “Run” and press Run to watch the traffic. Everything is saved automatically, and every change can be undone."],
+  ["3. Run it", "Open “Run” and press Run to watch the traffic. Every change is saved automatically and can be undone."],
 ];
 
 /** Whether this is the first visit; without storage no visit is. */

@@ -2,16 +2,18 @@ import { Alert, Button, NumberInput, SegmentedControl, Text } from "@mantine/cor
 import { useState } from "react";
 
 import { demand } from "../api/demand";
+import { isKey } from "../lists";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { count } from "../ui/words";
 import type { EditorStore } from "./store";
 
-const DAYS = [{ value: "weekday", label: "Weekday" }, { value: "weekend", label: "Weekend" }];
+const DAYS = { weekday: "Weekday", weekend: "Weekend" };
 
 /** Generates a day of traffic on the whole map. */
 export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => void }) {
   const { name, take } = store();
-  const [day, setDay] = useState<"weekday" | "weekend">("weekday");
+  const [day, setDay] = useState<keyof typeof DAYS>("weekday");
   const [trips, setTrips] = useState(51_000);
   const [busy, setBusy] = useState(false);
   const [failure, setFailure] = useState<string | null>(null);
@@ -21,16 +23,18 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
     take(async (version) => {
       const made = await demand.day(name, version, day, trips);
       const load = Math.round((100 * made.volume) / made.capacity);
-      tell(`${count(Math.round(made.trips), "trip")}, ${Math.round(made.peak_trips).toLocaleString("en")} in the peak hour. ` +
+      const peak = Math.round(made.peak_trips).toLocaleString("en");
+      tell(`${count(Math.round(made.trips), "trip")}, ${peak} in the peak hour. ` +
         `The busiest approach of a junction then reaches ${load} % of its capacity.` +
         (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : ""));
       return made.scenario;
-    }).then(onDone, (error: unknown) => setFailure((error as Error).message)).finally(() => setBusy(false));
+    }).then(onDone, (error: unknown) => setFailure(reasonOf(error))).finally(() => setBusy(false));
   };
   return (
     <div className="fold">
       <Text size="sm">24 hours from midnight: trips with random starts and goals, fewer through busy junctions. The region becomes the whole map. Undo restores the scenario.</Text>
-      <SegmentedControl fullWidth data={DAYS} value={day} aria-label="Kind of day" onChange={(value) => setDay(value as "weekday" | "weekend")} />
+      <SegmentedControl fullWidth data={Object.entries(DAYS).map(([value, label]) => ({ value, label }))} value={day} aria-label="Kind of day"
+        onChange={(value) => { if (isKey(DAYS, value)) setDay(value); }} />
       <NumberInput label="Trips per day, at most" min={1} max={1e6} step={1000} thousandSeparator="," allowDecimal={false} value={trips}
         onChange={(value) => setTrips(Number(value) || 1)} />
       {failure && <Alert color="red" title="The day could not be generated">{failure}</Alert>}

@@ -66,7 +66,8 @@ export function secondsOfDay(text: string): number | null {
 /** When traffic is highest and lowest. */
 export function peakWords(shares: readonly number[]): string {
   const at = (n: number): string => timeOfDay((n * 86_400) / shares.length);
-  return `most trips from ${at(shares.indexOf(Math.max(...shares)))}, fewest from ${at(shares.indexOf(Math.min(...shares)))}`;
+  const [most, fewest] = [shares.indexOf(Math.max(...shares)), shares.indexOf(Math.min(...shares))];
+  return `most trips from ${at(most)}, fewest from ${at(fewest)}`;
 }
 
 /** What a table looks like, with roads of the scenario's own; it can be read in as it is. */

@@ -19,8 +19,7 @@ export function useKeys(actions: KeyActions): void {
   useEffect(() => { latest.current = actions; });
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
-      const target = event.target as HTMLElement;
-      if (target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
+      if (event.target instanceof Element && event.target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
       const act = actionOf(event, latest.current);
       if (!act) return;
       act();

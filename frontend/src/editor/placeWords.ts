@@ -36,8 +36,9 @@ export function laneFacts(graph: Graph, id: string): string {
   const { columns } = graph;
   if (place.walk) return `Walkway, ${nth(columns.walks.width, place.index).toFixed(1)} m wide`;
   const kind = nth(columns.lane_types, nth(columns.lane, place.index));
+  const width = nth(columns.width, place.index).toFixed(1);
   const limit = nth(columns.speed_limit, place.index);
-  return `${KIND[kind] ?? "Lane"}, ${nth(columns.width, place.index).toFixed(1)} m wide, ${limit === null ? "no limit" : `limit ${kmh(limit)}`}`;
+  return `${KIND[kind] ?? "Lane"}, ${width} m wide, ${limit === null ? "no limit" : `limit ${kmh(limit)}`}`;
 }
 
 const KIND: Record<string, string> = {

@@ -44,7 +44,8 @@ export class Starts {
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed })) return `Every point here is occupied. Start the ${who} a little further away.`;
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside })) return `No ${who} may start here: the grey points cannot be used.`;
     if (this.picker.place(x, y, wide, options)) return `That is outside the region. Start the ${who} inside it, or extend the region.`;
-    return `No ${who} may start here. ${walk ? "Pedestrians start on the yellow points beside the road." : "Vehicles start on the blue points of the lanes."}`;
+    const where = walk ? "Pedestrians start on the yellow points beside the road." : "Vehicles start on the blue points of the lanes.";
+    return `No ${who} may start here. ${where}`;
   }
 
   /** The first free start, in the order of the map; far enough from others. */

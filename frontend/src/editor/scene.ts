@@ -98,9 +98,9 @@ export function boundsOfProblem(
 ): Bounds | null {
   const one = ofProblem(problem, document);
   const nodes = [...problem.nodes, ...(one ? [one.spawn] : [])];
-  const boxes: Bounds[] = nodes.flatMap((id) => {
+  const boxes = nodes.flatMap((id): Bounds[] => {
     const place = graph.place(id);
-    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25] as Bounds] : [];
+    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25]] : [];
   });
   if (boxes.length === 0) return segmentsBounds(graph, problem.segments);
   return boxes.reduce(join);

@@ -2,6 +2,7 @@ import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
 import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import { reasonOf } from "../ui/reason";
 import { everyone } from "./placing";
 
 export type Saving = "saved" | "saving" | "failed";
@@ -99,12 +100,12 @@ export function createEditorStore(name: string): EditorStore {
     };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
-      const message = error instanceof Error ? error.message : String(error);
+      const message = reasonOf(error);
       if (status === 409) {
         try {
           await get().load();
         } catch (failure) {
-          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: String((failure as Error).message), again } });
+          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again } });
           return;
         }
         const title = "Changed in another tab";

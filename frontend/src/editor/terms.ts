@@ -20,7 +20,7 @@ export const TERMS: readonly (readonly [term: string, meaning: string])[] = [
   ["Intergreen", "The time between two conflicting greens: yellow and all-red."],
   ["Not inserted", "A vehicle for which there was no room on the road at its time of departure; it waits until there is."],
   ["Gridlock", "Vehicles that block each other in a circle, so that none of them can move."],
-  ["Teleported", "Removed from the road after waiting 300 s (unless set otherwise), and put back further along its route when there is room."],
+  ["Teleported", "Removed from the road after waiting 300 s (unless set otherwise), and put back further along its route."],
   ["Control delay", "The time that a signal or sign costs a vehicle, compared with driving on freely."],
   ["Delay", "Travel time beyond that of driving freely at the speed limit."],
   ["Level of service", "Grade of a junction or road from A (free) to F (over capacity), by its delay or density."],

@@ -59,6 +59,7 @@ interface Drag {
   does: "pan" | "carry" | "frame";
 }
 
+const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
 const CLICK_SLACK = 4;
 const TOUCH = 14;
 
@@ -192,7 +193,7 @@ export function MapCanvas({
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
-      aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
+      aria-label={`${label}. ${KEYS}`}
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {

@@ -20,7 +20,8 @@ export function Interrupted({ info, onBack, onResume }: { info: RunInfo; onBack:
     <section aria-label="Result of the run">
       <Title order={2} size="h3">The run was interrupted</Title>
       <Text size="sm" mt="sm">{saved > 0
-        ? `${hoursMinutes(saved)} of ${hoursMinutes(until)} are completed and saved. The run resumes from there, with the same results as without the interruption.`
+        ? <>{hoursMinutes(saved)} of {hoursMinutes(until)} are completed and saved. The run resumes from there, with the same
+          results as without the interruption.</>
         : "It did not complete its first hour and starts again from the beginning."}</Text>
       <Progress mt="sm" value={until ? (100 * saved) / until : 0} aria-label="Progress of the run" />
       <Group mt="md" mb="lg" gap="xs">

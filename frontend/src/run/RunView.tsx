@@ -29,8 +29,6 @@ import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
 import { useGround, useRun } from "./useRun";
 
-type Tab = "result" | "charts" | "counts" | "users" | "incidents" | "runs";
-
 /** Watches one run from above; one that is resumed is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const [turn, setTurn] = useState(0);
@@ -55,7 +53,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { incidents, add } = useIncidents(run, complete);
   const counts = useCounts(run, replayable);
   const [fit, setFit] = useState<readonly FitRow[] | null>(null);
-  const [tab, setTab] = useState<Tab | null>(null);
+  const [tab, setTab] = useState<string | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
 
   const { map, drawing, loaded } = ground;
@@ -118,7 +116,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
         </div>
         <aside className="run-side" aria-label="About the run">
           {info.carla && mode === "live" && <CameraPanel run={run} over={ended} />}
-          <Tabs className="run-tabs" value={shownTab} onChange={(value) => setTab(value as Tab)} keepMounted={false}>
+          <Tabs className="run-tabs" value={shownTab} onChange={setTab} keepMounted={false}>
             <Tabs.List>
               {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}
               {replayable && <Tabs.Tab value="charts">Charts</Tabs.Tab>}

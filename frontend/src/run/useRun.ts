@@ -7,6 +7,7 @@ import { insideRows, segmentsBounds } from "../editor/scene";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { EMPTY_SCENE, type Scene } from "../map/scene";
+import { reasonOf } from "../ui/reason";
 import { hasEnded } from "./figures";
 
 const POLL = 700;
@@ -35,7 +36,7 @@ export function useRun(run: string): Run {
       if (ended && left-- <= 0) return;
       runs.info(run).then(
         (found) => { if (current) setInfo(found); },
-        (error: unknown) => { if (current) setFailure(String((error as Error).message)); });
+        (error: unknown) => { if (current) setFailure(reasonOf(error)); });
     };
     ask();
     const timer = setInterval(ask, POLL);
@@ -65,7 +66,7 @@ export function useGround(name: string | null, scenario: string): Ground {
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     if (!name) return;
-    const fail = (error: unknown): void => setFailure(String((error as Error).message));
+    const fail = (error: unknown): void => setFailure(reasonOf(error));
     // Side by side, for a person waits.
     api.map(name).then(setMap, fail);
     loadDrawing(name).then(setDrawing, fail);

@@ -20,7 +20,8 @@ export const IconMinus = icon(<path d="M5 12h14" />);
 export const IconFit = icon(<path d="M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5" />);
 export const IconUndo = icon(<path d="M9 14 4 9l5-5M4 9h10a6 6 0 0 1 0 12h-3" />);
 export const IconRedo = icon(<path d="m15 14 5-5-5-5M20 9H10a6 6 0 0 0 0 12h3" />);
-export const IconSun = icon(<><circle cx="12" cy="12" r="4" /><path d="M12 2v2m0 16v2M4.900 4.900l1.400 1.400m11.400 11.400 1.400 1.400M2 12h2m16 0h2M4.900 19.100l1.400-1.400M17.700 6.300l1.400-1.400" /></>);
+export const IconSun = icon(<><circle cx="12" cy="12" r="4" /><path d="M12 2v2m0 16v2M4.900 4.900l1.400 1.400m11.400 11.400 1.400 1.400" />
+  <path d="M2 12h2m16 0h2M4.900 19.100l1.400-1.400M17.700 6.300l1.400-1.400" /></>);
 export const IconMoon = icon(<path d="M20 14.500A8.500 8.500 0 1 1 9.500 4a6.800 6.800 0 0 0 10.500 10.500z" />);
 export const IconTrash = icon(<path d="M4 7h16M10 11v6m4-6v6M6 7l1 13h10l1-13M9 7V4h6v3" />);
 export const IconSearch = icon(<><circle cx="11" cy="11" r="6" /><path d="m20 20-4.500-4.500" /></>);
