@@ -4,8 +4,8 @@ import { CATEGORY_WORD, count } from "../ui/words";
 
 /** Ways to give the amount of background traffic, with what to begin with. */
 export const AMOUNTS = [
-  { key: "fill", word: "Density, percent of the maximum", unit: "Density", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
-  { key: "per_km", word: "Density, vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
+  { key: "fill", word: "Percent of the maximum density", unit: "Density", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
+  { key: "per_km", word: "Vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
   { key: "trips", word: "Number of trips", unit: "Trips", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
 ] as const;
 export type Amount = (typeof AMOUNTS)[number];
