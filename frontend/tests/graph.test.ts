@@ -55,8 +55,9 @@ test("a segment is found by its lanes", () => {
 test("every lane gives a strip per segment, as wide as the lane and without gaps", () => {
   const found = strips(example());
   expect(found.map((one) => one.segment)).toEqual([0, 1, 0, 1]);
-  const xs = [...found[0].ring].filter((_, i) => i % 2 === 0);
-  const ys = [...found[0].ring].filter((_, i) => i % 2 === 1);
+  const ring = [...(found[0]?.ring ?? [])];
+  const xs = ring.filter((_, i) => i % 2 === 0);
+  const ys = ring.filter((_, i) => i % 2 === 1);
   expect([Math.min(...xs), Math.max(...xs)]).toEqual([-1, 3]);
   expect([Math.min(...ys), Math.max(...ys)]).toEqual([-1.5, 1.5]);
 });

@@ -6,7 +6,7 @@ import { FIGURES } from "./figures";
 import { marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
-import { hashOf, parseRoute } from "../src/ui/route";
+import { hashOf, parseAddress } from "../src/ui/address";
 import { summary } from "./messages";
 
 const columns = (): ReplayColumns => ({
@@ -28,9 +28,9 @@ const shown = (time: number): Record<string, [number, number]> => {
   const frame = replay.at(time);
   const { pose } = replay.crowd.arrange(frame, null, null);
   const found: Record<string, [number, number]> = {};
-  for (const who of replay.crowd.everybody()) {
+  for (const who of replay.crowd.all()) {
     const row = replay.crowd.row(who.id);
-    if (row >= 0) found[who.id] = [pose[5 * row], pose[5 * row + 1]];
+    if (row >= 0) found[who.id] = [pose[5 * row] ?? NaN, pose[5 * row + 1] ?? NaN];
   }
   return found;
 };
@@ -75,7 +75,7 @@ test("incidents are told in words and marked from when they happen", () => {
   expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
   expect(marksAt([crash], 2.9)).toEqual([]);
   expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
-  expect(marksAt([crash], 30)[0].fresh).toBe(false);
+  expect(marksAt([crash], 30)[0]?.fresh).toBe(false);
   expect(marksAt([{ time: 0, kind: "emergency_stop", actor: "a" }], 1)).toEqual([]);
 });
 
@@ -101,5 +101,5 @@ test("a long table is thinned evenly with its end kept", () => {
 });
 
 test("the list of a scenario's runs has an address", () => {
-  expect(parseRoute(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
+  expect(parseAddress(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
 });

@@ -12,7 +12,7 @@ const WORD: Record<Shown, string> = {
   ended: "CARLA, from above: the last picture",
 };
 
-/** The picture that CARLA's camera gives of a run while it goes on. */
+/** The picture that CARLA's camera gives of a run that is running. */
 export function CameraPanel({ run, over }: { run: string; over: boolean }) {
   const [state, setState] = useState<Shown>("waiting");
   const shown = over && state === "moving" ? "ended" : state;

@@ -4,7 +4,7 @@ import { carla, type CarlaInfo } from "../api/carla";
 
 const PAUSE = 5000;
 
-/** Whether CARLA is there, asked again and again; null until it is known. */
+/** Whether CARLA is connected, asked again and again; null until it is known. */
 export function useCarla(): CarlaInfo | null {
   const [info, setInfo] = useState<CarlaInfo | null>(null);
   useEffect(() => {

@@ -5,6 +5,7 @@ import { api } from "../api/client";
 import { addShipped, followJob } from "../api/maps";
 import type { Job } from "../api/types";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { stepWords } from "./steps";
 
 interface Work {
@@ -20,9 +21,9 @@ interface Refusal {
   reason: string;
 }
 
-/** Takes map files, one after another, by drop or by choice, and shows how far their preparation is. */
+/** Takes map files, one after another, by drop or by choice, and shows the progress of their import. */
 export function AddMap({ empty, onAdded, onReport }: {
-  /** Whether there is no map yet; the maps that come along are offered then. */
+  /** Whether there is no map yet; the example maps are offered then. */
   empty: boolean;
   onAdded: () => void;
   onReport: (map: string) => void;
@@ -42,7 +43,7 @@ export function AddMap({ empty, onAdded, onReport }: {
         onStep(job);
       });
     } catch (error) {
-      setRefusals((old) => [...old, { file: what, reason: (error as Error).message }]);
+      setRefusals((old) => [...old, { file: what, reason: reasonOf(error) }]);
       return null;
     }
   };
@@ -68,7 +69,7 @@ export function AddMap({ empty, onAdded, onReport }: {
     if (busy.current) return;
     busy.current = true;
     let last = "";
-    const job = await attempt("The maps that come along", addShipped, ({ step }) => {
+    const job = await attempt("The example maps", addShipped, ({ step }) => {
       const map = step?.split(":")[0] ?? "";
       if (map !== last && last) onAdded();
       last = map;
@@ -92,16 +93,16 @@ export function AddMap({ empty, onAdded, onReport }: {
           <div style={{ flex: 1 }} role="status">
             <Text fw={600}>{work.what}{work.waiting > 0 && `, then ${work.waiting} more`}</Text>
             <Text size="sm" c="dimmed">{work.step} …</Text>
-            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="How far the map is prepared" />
+            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="Import progress" />
           </div>
         ) : (
           <>
             <div>
               <Text fw={600}>{empty ? "No maps yet" : "Add a map of your own"}</Text>
-              <Text size="sm" c="dimmed">{empty ? "Begin with the maps that come along, or drop an OpenDRIVE file (.xodr) of your own here." : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}</Text>
+              <Text size="sm" c="dimmed">{empty ? "Begin with the example maps, or drop an OpenDRIVE file (.xodr) of your own here." : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}</Text>
             </div>
             <div style={{ display: "flex", gap: 10, flexWrap: "wrap" }}>
-              {empty && <Button onClick={() => void addThose()}>Add the maps that come along</Button>}
+              {empty && <Button onClick={() => void addThose()}>Add the example maps</Button>}
               <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
                 {(props) => <Button variant="default" {...props}>Choose a file</Button>}
               </FileButton>
@@ -111,7 +112,7 @@ export function AddMap({ empty, onAdded, onReport }: {
       </div>
       {added.map((name) => (
         <Alert key={name} color="blue" mt="sm" role="status" title={`${name} is ready`}>
-          <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>How {name} was taken over</Button>
+          <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>Import report of {name}</Button>
         </Alert>
       ))}
       {refusals.map(({ file, reason }, n) => (

@@ -8,10 +8,10 @@ import { coverage, type Finding, type Group, grouped } from "./conversion";
 /** Places named in the list; the rest are in the file. */
 const NAMED = 40;
 
-/** How a map was taken over, in plain words. */
+/** The import report of a map. */
 export function Conversion({ map, onClose }: { map: string; onClose: () => void }) {
   return (
-    <Modal opened onClose={onClose} size="lg" title={`How ${map} was taken over`}>
+    <Modal opened onClose={onClose} size="lg" title={`Import report of ${map}`}>
       <Body map={map} />
     </Modal>
   );
@@ -26,7 +26,7 @@ function Body({ map }: { map: string }) {
     <>
       {driving !== null && <Text><b>{driving} %</b> of the lanes can be driven on in the simulation.</Text>}
       {walking !== null && <Text><b>{walking} %</b> of the footways can be walked on.</Text>}
-      {grouped(value).map((group) => <Section key={group.fate} group={group} />)}
+      {grouped(value).map((group) => <Section key={group.outcome} group={group} />)}
       <Anchor href={reportUrl(map)} target="_blank" rel="noreferrer" size="sm">Everything in detail, for experts (JSON)</Anchor>
     </>
   );

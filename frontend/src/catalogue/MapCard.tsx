@@ -23,7 +23,7 @@ export function MapCard({ map, starting, onStart, onRemove, onReport }: {
           {mapFacts(map.statistics).map((fact) => <li key={fact}>{fact}</li>)}
         </ul>
         <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>New scenario</Button>
-        <Button fullWidth mt={6} variant="subtle" size="compact-sm" onClick={onReport} aria-label={`How it was taken over: ${map.name}`}>How it was taken over</Button>
+        <Button fullWidth mt={6} variant="subtle" size="compact-sm" onClick={onReport} aria-label={`Import report of ${map.name}`}>Import report</Button>
       </div>
     </Card>
   );

@@ -5,10 +5,10 @@ import { api } from "../api/client";
 import type { ScenarioEntry } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { tellError } from "../ui/notices";
-import { go, hashOf } from "../ui/route";
+import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
 
-/** The scenarios there are; one can be brought along as a file. */
+/** The scenarios there are; one can be opened from a file. */
 export function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove: (name: string) => void }) {
   const [busy, setBusy] = useState(false);
   const bring = (file: File | null): void => {

@@ -1,6 +1,7 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
-import type { Actor, Assets, Edit, Style } from "../api/types";
+import type { Actor, Assets, Edit } from "../api/types";
+import { isKey } from "../lists";
 import { modelWord, STYLE_WORD } from "../ui/words";
 import { Committed } from "./Committed";
 import { bodyOf } from "./scene";
@@ -24,20 +25,20 @@ export function ActorForm({ actor, assets, onEdit }: {
         clearButtonProps={{ "aria-label": "Any model" }} onChange={(model) => change({ model })} />
       <Group grow align="flex-start">
         <Committed label={walks ? "Walking speed" : "Desired speed"} suffix=" km/h" min={1} max={walks ? 15 : 250} digits={1}
-          placeholder={walks ? "usual" : "the limit"} value={actor.speed === null ? "" : actor.speed * 3.6}
+          placeholder={walks ? "default" : "speed limit"} value={actor.speed === null ? "" : actor.speed * 3.6}
           onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })} />
-        <Committed label="Starts after" suffix=" s" min={0} max={86_400} digits={1} value={actor.depart}
+        <Committed label="Departs after" suffix=" s" min={0} max={86_400} digits={1} value={actor.depart}
           onCommit={(value) => change({ depart: value ?? 0 })} />
       </Group>
       {!walks && (
         <Group grow align="flex-start">
-          <Committed label="Left of lane centre" suffix=" m" min={-3} max={3} step={0.1} digits={2} value={actor.lateral_offset}
+          <Committed label="Offset to the left" suffix=" m" min={-3} max={3} step={0.1} digits={2} value={actor.lateral_offset}
             onCommit={(value) => change({ lateral_offset: value ?? 0 })} />
           <Select label="Driving style" allowDeselect={false} value={actor.style} data={STYLES}
-            onChange={(style) => change({ style: (style ?? "normal") as Style })} />
+            onChange={(style) => { if (isKey(STYLE_WORD, style)) change({ style }); }} />
         </Group>
       )}
-      {!walks && <Checkbox label="This is my vehicle under test (ego)" checked={actor.ego}
+      {!walks && <Checkbox label="Ego: my vehicle under test" checked={actor.ego}
         onChange={(event) => onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })} />}
       {/* No run acts on it yet: shown only where a document has it. */}
       {walks && actor.crosses_anywhere && <Checkbox label="Crosses the road anywhere" checked={actor.crosses_anywhere}
@@ -52,19 +53,20 @@ export function ActorForm({ actor, assets, onEdit }: {
 export function ManyForm({ actors, onChange }: {
   actors: readonly Actor[]; onChange: (fields: Partial<Actor>, what: string) => void;
 }) {
+  const [first, ...others] = actors;
   const same = <K extends keyof Actor>(key: K): Actor[K] | undefined =>
-    actors.every((one) => one[key] === actors[0][key]) ? actors[0][key] : undefined;
+    others.every((one) => one[key] === first?.[key]) ? first?.[key] : undefined;
   const speed = same("speed");
   return (
     <Stack gap="sm">
       <Group grow align="flex-start">
-        <Committed label="Speed of all" suffix=" km/h" min={1} max={250} digits={1} placeholder={speed === undefined ? "different" : "usual"}
+        <Committed label="Desired speed of all" suffix=" km/h" min={1} max={250} digits={1} placeholder={speed === undefined ? "different" : "default"}
           value={speed ? speed * 3.6 : ""} onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, "Speed")} />
-        <Committed label="All start after" suffix=" s" min={0} max={86_400} digits={1} placeholder="different"
-          value={same("depart") ?? ""} onCommit={(value) => onChange({ depart: value ?? 0 }, "Start time")} />
+        <Committed label="All depart after" suffix=" s" min={0} max={86_400} digits={1} placeholder="different"
+          value={same("depart") ?? ""} onCommit={(value) => onChange({ depart: value ?? 0 }, "Departure")} />
       </Group>
       <Select label="Driving style of all" placeholder="different" allowDeselect={false} value={same("style") ?? null} data={STYLES}
-        onChange={(style) => onChange({ style: (style ?? "normal") as Style }, "Driving style")} />
+        onChange={(style) => { if (isKey(STYLE_WORD, style)) onChange({ style }, "Driving style"); }} />
     </Stack>
   );
 }

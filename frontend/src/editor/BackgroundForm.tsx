@@ -7,7 +7,7 @@ import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { AMOUNTS, amountOf } from "./demand";
 import { MixFold, PartCard, WindowFields } from "./DemandParts";
 
-/** Vehicles that come and go anywhere: how many, when, and of which kinds. */
+/** Vehicles with random starts and goals: how many, when, and their mix. */
 export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
   background: Background; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
 }) {
@@ -15,7 +15,7 @@ export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
   const change = (fields: FieldsOf<"set_background", "background">): void => onEdit({ kind: "set_background", background: background.id, ...fields });
   return (
     <PartCard name={background.id} what="Background traffic" onRemove={onRemove}>
-      <Select label="How much" data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))} value={amount.key} allowDeselect={false}
+      <Select label="Amount given as" data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))} value={amount.key} allowDeselect={false}
         onChange={(key) => {
           const chosen = AMOUNTS.find((one) => one.key === key);
           if (chosen && chosen !== amount) change({ [chosen.key]: chosen.begin });

@@ -10,19 +10,19 @@ const H = 44;
 const WORD: Record<string, string> = { weekday: "Weekday", weekend: "Weekend" };
 export const profileWord = (id: string): string => WORD[id] ?? id;
 
-/** All day profiles that a scenario can use: those that come along and its own. */
+/** All day profiles that a scenario can use: the built-in ones and its own. */
 export const profilesOf = (demand: Demand, builtIn: Profiles): Profiles => ({
   ...builtIn, ...Object.fromEntries(demand.profiles.map(({ id, shares }) => [id, shares])),
 });
 
-/** When of the day traffic comes, with a picture of it. */
+/** How traffic varies over the day, with a picture of it. */
 export function ProfileChoice({ value, profiles, onChange }: {
   value: string | null; profiles: Profiles; onChange: (profile: string | null) => void;
 }) {
-  const data = [{ value: "", label: "Evenly" }, ...Object.keys(profiles).map((id) => ({ value: id, label: profileWord(id) }))];
+  const data = [{ value: "", label: "Uniform" }, ...Object.keys(profiles).map((id) => ({ value: id, label: profileWord(id) }))];
   return (
     <div>
-      <Select label="Spread over the day" data={data} value={value ?? ""} allowDeselect={false} onChange={(chosen) => onChange(chosen || null)} />
+      <Select label="Day profile" data={data} value={value ?? ""} allowDeselect={false} onChange={(chosen) => onChange(chosen || null)} />
       {value !== null && profiles[value] && <ProfileChart name={profileWord(value)} shares={profiles[value]} />}
     </div>
   );

@@ -10,7 +10,7 @@ import { ProfileChart, ProfileChoice, type Profiles, profileWord } from "./DayPr
 import { mixWords, timeOfDay, tripsOf } from "./demand";
 import { MixForm } from "./MixForm";
 
-/** One part of the traffic, with what it is called and a way to be rid of it. */
+/** One part of the traffic, with its name and a button to remove it. */
 export function PartCard({ name, what, note, onRemove, children }: {
   name: string; what: string; note?: string; onRemove: () => void; children?: ReactNode;
 }) {
@@ -28,7 +28,7 @@ export function PartCard({ name, what, note, onRemove, children }: {
   );
 }
 
-/** From when until when a part of the traffic comes, in minutes of the run. */
+/** From when until when a part of the traffic departs, in minutes of the run. */
 export function WindowFields({ begin, end, onChange }: {
   begin: number; end: number | null; onChange: (fields: { begin?: number; end?: number | null }) => void;
 }) {
@@ -42,14 +42,14 @@ export function WindowFields({ begin, end, onChange }: {
   );
 }
 
-/** The kinds in a line; the shares open on demand. */
-export function MixFold({ mix, people, onChange }: { mix: Mix; people?: boolean; onChange: (mix: Mix) => void }) {
+/** The mix in a line; the shares open on demand. */
+export function MixFold({ mix, pedestrians, onChange }: { mix: Mix; pedestrians?: boolean; onChange: (mix: Mix) => void }) {
   const [open, setOpen] = useState(false);
   return (
     <div>
       <Text size="sm">{mixWords(mix)}</Text>
-      <Button variant="subtle" size="compact-sm" px={0} aria-expanded={open} onClick={() => setOpen(!open)}>{open ? "Hide the kinds" : "Change the kinds"}</Button>
-      <Collapse in={open}>{open && <MixForm mix={mix} people={people} onChange={onChange} />}</Collapse>
+      <Button variant="subtle" size="compact-sm" px={0} aria-expanded={open} onClick={() => setOpen(!open)}>{open ? "Hide the mix" : "Change the mix"}</Button>
+      <Collapse in={open}>{open && <MixForm mix={mix} pedestrians={pedestrians} onChange={onChange} />}</Collapse>
     </div>
   );
 }
@@ -58,13 +58,13 @@ export function MatrixForm({ matrix, profiles, onEdit, onRemove }: {
   matrix: Matrix; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
 }) {
   const change = (fields: FieldsOf<"set_matrix", "matrix">): void => onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
-  const when = matrix.end === null ? "until the end of the run" : `from ${span(matrix.begin, matrix.end).replace("–", " to ")} h of the run`;
+  const when = matrix.end === null ? "until the end of the run" : `${span(matrix.begin, matrix.end)} of the run`;
   const note = `${count(Math.round(tripsOf(matrix)), "trip")} in ${count(matrix.trips.length, "row")}, ${when}`;
   return (
-    <PartCard name={matrix.id} what="Trips from where to where" note={note} onRemove={onRemove}>
+    <PartCard name={matrix.id} what="Trips between zones" note={note} onRemove={onRemove}>
       <WindowFields begin={matrix.begin} end={matrix.end} onChange={change} />
       <ProfileChoice value={matrix.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
-      <MixFold mix={matrix.mix} people onChange={(mix) => change({ mix })} />
+      <MixFold mix={matrix.mix} pedestrians onChange={(mix) => change({ mix })} />
     </PartCard>
   );
 }
@@ -72,13 +72,14 @@ export function MatrixForm({ matrix, profiles, onEdit, onRemove }: {
 export function CountsList({ counts, onEdit, onShow, onRemove }: {
   counts: Counts; onEdit: (edit: Edit) => void; onShow: (segments: readonly string[]) => void; onRemove: () => void;
 }) {
-  const places = [...new Set(counts.rows.map(([place]) => place))];
+  const stations = [...new Set(counts.rows.map(([station]) => station))];
   const total = counts.rows.reduce((sum, [, , , number]) => sum + number, 0);
-  const note = `${count(counts.rows.length, "count")} at ${count(places.length, "place")}, ${count(Math.round(total), "vehicle")} in all`;
+  const where = `${count(counts.rows.length, "count")} at ${count(stations.length, "count station")}`;
+  const note = `${where}, ${count(Math.round(total), "vehicle")} in total`;
   return (
-    <PartCard name={counts.id} what="Counts to reproduce" note={note} onRemove={onRemove}>
+    <PartCard name={counts.id} what="Counts to be reproduced" note={note} onRemove={onRemove}>
       <MixFold mix={counts.mix} onChange={(mix) => onEdit({ kind: "set_counts", counts: counts.id, mix })} />
-      <Group><Button size="compact-sm" variant="default" onClick={() => onShow(places.flatMap((place) => place.split(">")))}>Show the places</Button></Group>
+      <Group><Button size="compact-sm" variant="default" onClick={() => onShow(stations.flatMap((station) => station.split(">")))}>Show the count stations</Button></Group>
     </PartCard>
   );
 }
@@ -102,7 +103,7 @@ export function ZoneList({ zones, onShow, onRemove }: {
   );
 }
 
-/** A small picture of each day profile; own ones can be removed. */
+/** A small picture of each day profile; those of the scenario can be removed. */
 export function ProfileList({ profiles, own, onRemove }: {
   profiles: Profiles; own: readonly string[]; onRemove: (profile: string) => void;
 }) {
@@ -116,7 +117,7 @@ export function ProfileList({ profiles, own, onRemove }: {
             <Text size="sm" fw={500}>{profileWord(id)}</Text>
             {own.includes(id)
               ? <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${id}`} onClick={() => onRemove(id)}><IconTrash /></ActionIcon>
-              : <Text size="xs" c="dimmed">one bar for each {timeOfDay(86_400 / shares.length) === "01:00" ? "hour" : "slice"}</Text>}
+              : <Text size="xs" c="dimmed">one bar per {timeOfDay(86_400 / shares.length) === "01:00" ? "hour" : "slice"}</Text>}
           </Group>
           <ProfileChart name={profileWord(id)} shares={shares} />
         </div>

@@ -8,7 +8,7 @@ const UNITS = [
 /** The largest unit in which a time is a whole number, in seconds. */
 export const unitOf = (seconds: number): number => [3600, 60].find((unit) => seconds > unit && seconds % unit === 0) ?? 1;
 
-/** A length of time in the unit that one thinks in; told in seconds when it is finished. */
+/** A length of time in the unit that one thinks in; committed in seconds when it is finished. */
 export function Duration({ label, seconds, onCommit }: { label: string; seconds: number; onCommit: (seconds: number) => void }) {
   const [unit, setUnit] = useState(unitOf(seconds));
   const commit = (text: string): void => {

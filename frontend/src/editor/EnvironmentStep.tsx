@@ -46,16 +46,19 @@ export function EnvironmentStep({ assets, document, onEdit }: Props) {
         ))}
       </div>
       {chosen && <Text size="sm">Now: <b>{weatherWord(chosen)}</b>{Object.keys(environment.parameters).length > 0 && ", fine-tuned"}</Text>}
-      <Switch label="Weather changes how people drive" checked={environment.affects_driving}
+      <Switch label="Weather affects driver behaviour" checked={environment.affects_driving}
         onChange={(event) => onEdit({ kind: "set_environment", affects_driving: event.currentTarget.checked })} />
       <Button variant="subtle" size="compact-sm" justify="flex-start" aria-expanded={fine} onClick={() => setFine(!fine)}>
         {fine ? "Hide fine-tuning" : "Fine-tune"}
       </Button>
       <Collapse in={fine}>
-        {PARAMETERS.filter(({ name }) => values[name] !== undefined).map(({ name, word }) => (
-          <Parameter key={`${name} ${String(values[name])}`} word={word} name={name} value={values[name]}
-            onChange={(value) => onEdit({ kind: "set_environment", parameters: { ...environment.parameters, [name]: value } })} />
-        ))}
+        {PARAMETERS.map(({ name, word }) => {
+          const value = values[name];
+          return value !== undefined && (
+            <Parameter key={`${name} ${value}`} word={word} name={name} value={value}
+              onChange={(next) => onEdit({ kind: "set_environment", parameters: { ...environment.parameters, [name]: next } })} />
+          );
+        })}
       </Collapse>
     </>
   );

@@ -3,9 +3,9 @@ import { useEffect, useRef, useState } from "react";
 import { createPortal } from "react-dom";
 
 import { api } from "../api/client";
-import { IconDown, IconHelp, IconKeys, IconMenu, IconRedo, IconUndo } from "../ui/icons";
+import { IconDown, IconHelp, IconMenu, IconRedo, IconTour, IconUndo } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { NameDialog, OpenDialog } from "./fileDialogs";
 import type { EditorStore } from "./store";
 
@@ -15,7 +15,7 @@ const named = (label: unknown): string => (typeof label === "string" && label ? 
 type Dialog = "rename" | "copy" | "open" | null;
 
 /** Undo, redo, autosave and files, in the head of the page. */
-export function HeadTools({ store, onKeys, onTour }: { store: EditorStore; onKeys: () => void; onTour: () => void }) {
+export function HeadTools({ store, onHelp, onTour }: { store: EditorStore; onHelp: () => void; onTour: () => void }) {
   const { scenario, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
   const [dialog, setDialog] = useState<Dialog>(null);
@@ -55,10 +55,10 @@ export function HeadTools({ store, onKeys, onTour }: { store: EditorStore; onKey
       <input ref={file} type="file" accept=".json,.graphml,.xml" hidden aria-label="Scenario file to upload"
         onChange={(event) => { upload(event.currentTarget.files?.[0]); event.currentTarget.value = ""; }} />
       <Tooltip label="Short tour">
-        <ActionIcon variant="subtle" color="gray" size="lg" aria-label="Short tour" onClick={onTour}><IconHelp /></ActionIcon>
+        <ActionIcon variant="subtle" color="gray" size="lg" aria-label="Short tour" onClick={onTour}><IconTour /></ActionIcon>
       </Tooltip>
-      <Tooltip label="Keyboard shortcuts (?)">
-        <ActionIcon variant="subtle" color="gray" size="lg" aria-label="Keyboard shortcuts" onClick={onKeys}><IconKeys /></ActionIcon>
+      <Tooltip label="Help: keyboard shortcuts and glossary (?)">
+        <ActionIcon variant="subtle" color="gray" size="lg" aria-label="Help: keyboard shortcuts and glossary" onClick={onHelp}><IconHelp /></ActionIcon>
       </Tooltip>
       {dialog === "rename" && <NameDialog title="Rename the scenario" label="Name" value={scenario.document.name} action="Rename" onClose={close}
         onName={async (title) => { if (await edit({ kind: "rename", name: title })) close(); }} />}

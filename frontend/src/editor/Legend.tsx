@@ -3,8 +3,8 @@ import type { Step } from "./scene";
 
 const ROWS: Partial<Record<Step, [color: string, word: string][]>> = {
   region: [[ROI_BASE, "First segment"], [ROI_MEMBER, "Region"], [ELIGIBLE, "Can be added"]],
-  actors: [[VEHICLE_NODE, "Vehicles can start"], [PEDESTRIAN_NODE, "People can start"], ["#8b949d", "Nobody can start"],
-    [GOAL, "Possible goal"], [FLOW, "Stream of traffic"]],
+  actors: [[VEHICLE_NODE, "Vehicle start"], [PEDESTRIAN_NODE, "Pedestrian start"], ["#8b949d", "No start possible"],
+    [GOAL, "Possible goal"], [FLOW, "Vehicle flow"]],
 };
 
 export function Legend({ step }: { step: Step }) {

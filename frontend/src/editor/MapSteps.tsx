@@ -2,9 +2,9 @@ import { Button, Group, Text } from "@mantine/core";
 import { useCallback } from "react";
 
 import { api } from "../api/client";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
-import { mapFacts } from "../ui/words";
+import { count, mapFacts } from "../ui/words";
 import type { Region } from "./asked";
 
 export function MapStep({ name, onShow }: { name: string; onShow: () => void }) {
@@ -21,8 +21,8 @@ export function MapStep({ name, onShow }: { name: string; onShow: () => void }) 
   );
 }
 
-export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
-  segments: number; roi: Region; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
+export function RegionStep({ segments, region, onNext, onAll, onBegin, onShow }: {
+  segments: number; region: Region; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
 }) {
   if (segments === 0) {
     return (
@@ -36,7 +36,11 @@ export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
     <>
       <Text size="sm">Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.</Text>
       <Group>
-        <Button size="compact-sm" variant="default" disabled={!roi.current || roi.candidates.length === 0} onClick={onAll}>Add all {roi.candidates.length} neighbours</Button>
+        {(!region.current || region.candidates.length > 0) && (
+          <Button size="compact-sm" variant="default" disabled={!region.current} onClick={onAll}>
+            {region.current ? `Add all ${count(region.candidates.length, "neighbour")}` : "Add all neighbours"}
+          </Button>
+        )}
         <Button size="compact-sm" variant="subtle" onClick={onShow}>Show the region</Button>
       </Group>
       <Button onClick={onNext}>Next: weather and time</Button>

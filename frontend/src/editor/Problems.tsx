@@ -4,7 +4,7 @@ import type { Problem } from "../api/types";
 import { IconWarn } from "../ui/icons";
 import { count } from "../ui/words";
 
-/** More than these nobody reads; solving some shows the rest. */
+/** Length of the list; solving some shows the rest. */
 const SHOWN = 50;
 
 /** What the server finds wrong, each leading to its place. */
@@ -13,7 +13,7 @@ export function Problems({ problems, onShow }: { problems: readonly Problem[]; o
   const sorted = [...problems].sort((a, b) => Number(b.severity === "error") - Number(a.severity === "error"));
   return (
     <section className="problems" aria-label="Problems">
-      <Text size="sm" fw={700} px={8} pb={2} role="status">{count(problems.length, "thing")} to look at</Text>
+      <Text size="sm" fw={700} px={8} pb={2} role="status">{count(problems.length, "problem")} found</Text>
       {sorted.slice(0, SHOWN).map((problem) => (
         <button type="button" className="problem" key={`${problem.where} ${problem.code} ${problem.message}`} onClick={() => onShow(problem)}>
           <span className="problem-sign" data-severity={problem.severity} role="img" aria-label={problem.severity === "error" ? "Must be solved" : "Warning"}><IconWarn /></span>

@@ -3,8 +3,8 @@ import { type KeyboardEvent, memo, useEffect, useMemo, useRef, useState } from "
 
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
-import { CategoryGlyph, IconStream, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD, count, kmh, modelWord, STYLE_WORD } from "../ui/words";
+import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
+import { CATEGORY_WORD, count, flowWord, kmh, modelWord, STYLE_WORD } from "../ui/words";
 import { placeWord } from "./placeWords";
 import { isFlow } from "./placing";
 import { rowsInSight } from "./windowed";
@@ -12,9 +12,9 @@ import { rowsInSight } from "./windowed";
 const ROW = 34;
 /** From so many on it is worth searching. */
 const MANY = 8;
-const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Starts after", "Style", "Ego"];
+const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Departs", "Driving style", "Ego"];
 
-/** Everybody in the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
+/** All road users and flows of the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
 export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, onRemove }: {
   ones: readonly (Actor | Flow)[]; graph: Graph; selection: readonly string[];
   onSelect: (id: string, more: boolean) => void; onSelectAll: (ids: string[]) => void; onRemove: (ids: readonly string[]) => void;
@@ -46,7 +46,7 @@ export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, o
 
   const onKeyDown = (event: KeyboardEvent): void => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-    const row = (event.target as HTMLElement).closest<HTMLElement>("[data-row]");
+    const row = event.target instanceof Element ? event.target.closest<HTMLElement>("[data-row]") : null;
     if (!step || !row) return;
     event.preventDefault();
     const next = row.parentElement?.querySelector<HTMLElement>(`[data-row="${Number(row.dataset.row) + step}"] .row-button`);
@@ -74,7 +74,7 @@ export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, o
             {end < rows.length && <tr aria-hidden="true" style={{ height: (rows.length - end) * ROW }} />}
           </tbody>
         </table>
-        {rows.length === 0 && <p className="table-empty">Nobody is called “{filter}”.</p>}
+        {rows.length === 0 && <p className="table-empty">No road user matches “{filter}”.</p>}
       </div>
     </>
   );
@@ -95,13 +95,13 @@ const Row = memo(function Row({ one, n, graph, chosen, actions }: {
         <button type="button" className="row-button" aria-pressed={chosen}
           onClick={(event) => { event.stopPropagation(); actions.select(one.id, event.shiftKey || event.ctrlKey); }}>{one.id}</button>
       </td>
-      <td><span className="kind">{isFlow(one) ? <IconStream size={20} /> : <CategoryGlyph category={one.category} size={22} />}{kindWord(one)}</span></td>
+      <td><span className="kind">{isFlow(one) ? <IconFlow size={20} /> : <CategoryGlyph category={one.category} size={22} />}{kindWord(one)}</span></td>
       <td>{isFlow(one) ? "–" : one.model ? modelWord(one.model) : "any"}</td>
       <td><Tooltip label={one.spawn}><span>{placeWord(graph, one.spawn)}</span></Tooltip></td>
-      <td>{one.goal ? <Tooltip label={one.goal}><span>{placeWord(graph, one.goal)}</span></Tooltip> : "by chance"}</td>
+      <td>{one.goal ? <Tooltip label={one.goal}><span>{placeWord(graph, one.goal)}</span></Tooltip> : "random"}</td>
       <td>{speedWord(one)}</td>
-      <td>{isFlow(one) ? `${one.begin} s, until ${one.end} s` : `${one.depart} s`}</td>
-      <td>{isFlow(one) ? `${Math.round(one.per_hour)} an hour` : one.category === "pedestrian" ? "–" : STYLE_WORD[one.style]}</td>
+      <td>{isFlow(one) ? `${one.begin} to ${one.end} s` : `after ${one.depart} s`}</td>
+      <td>{isFlow(one) ? `${Math.round(one.per_hour)} per hour` : one.category === "pedestrian" ? "–" : STYLE_WORD[one.style]}</td>
       <td>{!isFlow(one) && one.ego ? "yes" : ""}</td>
       <td>
         <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Remove ${one.id}`}
@@ -115,10 +115,11 @@ const walks = (one: Actor | Flow): boolean => isFlow(one) ? "pedestrian" in one.
 
 function kindWord(one: Actor | Flow): string {
   if (!isFlow(one)) return CATEGORY_WORD[one.category];
-  return `Stream: ${CATEGORIES.filter((category) => one.mix[category]).map((category) => CATEGORY_WORD[category].toLowerCase()).join(", ")}`;
+  if (walks(one)) return flowWord(true);
+  return `Flow: ${CATEGORIES.filter((category) => one.mix[category]).map((category) => CATEGORY_WORD[category].toLowerCase()).join(", ")}`;
 }
 
 function speedWord(one: Actor | Flow): string {
   if (one.speed !== null) return kmh(one.speed);
-  return walks(one) ? "usual" : "the limit";
+  return walks(one) ? "default" : "speed limit";
 }

@@ -5,7 +5,7 @@ import type { Graph, Place } from "../map/graph";
 import { placeWord } from "./placeWords";
 import type { Starts } from "./placing";
 
-/** Where one starts and goes: all that a click on the map does, without the map. */
+/** Start and goal: all that a click on the map does, without the map. */
 export function StartAndGoal({ one, graph, starts, goals, onStart, onGoal, onShowGoals }: {
   one: Actor | Flow; graph: Graph; starts: Starts; goals: readonly Place[] | null;
   onStart: (spawn: string) => void; onGoal: (goal: string | null) => void; onShowGoals: () => void;
@@ -30,13 +30,13 @@ export function StartAndGoal({ one, graph, starts, goals, onStart, onGoal, onSho
         </Group>
       </div>
       {goals?.length === 0 && !one.goal
-        ? <Text size="sm" c="red">No goal can be reached from here. Move the start or let the region grow.</Text>
+        ? <Text size="sm" c="red">No goal can be reached from here. Move the start or extend the region.</Text>
         : <Group gap={6} align="flex-end">
           <Select style={{ flex: "1 1 170px" }} label="Goal" searchable disabled={goals === null} allowDeselect={false} value={one.goal ?? ""}
-            data={[{ value: "", label: `By chance${goals ? ` among ${goals.length}` : ""}` }, ...all.map((id) => ({ value: id, label: placeWord(graph, id) }))]}
-            nothingFoundMessage="No such place" onChange={(goal) => { if ((goal || null) !== one.goal) onGoal(goal || null); }} />
+            data={[{ value: "", label: `Random${goals ? ` (one of ${goals.length})` : ""}` }, ...all.map((id) => ({ value: id, label: placeWord(graph, id) }))]}
+            nothingFoundMessage="No such goal" onChange={(goal) => { if ((goal || null) !== one.goal) onGoal(goal || null); }} />
           <Button variant="default" px="sm" disabled={!goals?.length} onClick={onShowGoals}>Show goals</Button>
-          {one.goal && <Button variant="default" px="sm" onClick={() => onGoal(null)}>By chance</Button>}
+          {one.goal && <Button variant="default" px="sm" onClick={() => onGoal(null)}>Random goal</Button>}
         </Group>}
     </>
   );

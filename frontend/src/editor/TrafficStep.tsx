@@ -12,7 +12,7 @@ import { WholeDay } from "./WholeDay";
 
 type Adding = "day" | "table" | null;
 
-/** Everybody who comes besides those placed by hand: background, trips from tables, counts. */
+/** All traffic besides the road users placed by hand: background, trips from tables, counts. */
 export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }: {
   store: EditorStore; document: ScenarioDocument; roads: readonly string[]; profiles: Profiles; onEdit: (edit: Edit) => void;
   /** Shows segments on the map. */
@@ -37,13 +37,13 @@ export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }
       {demand.zones.length > 0 && <ZoneList zones={demand.zones} onShow={onShow} onRemove={remove} />}
       <Stack gap={6}>
         <Button variant="default" onClick={() => onEdit({ kind: "set_background", background: freeName(demand, "background"), per_km: 5 })}>Add background traffic</Button>
-        <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>A weekday of the whole town</Button>
+        <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>Whole day on the whole map</Button>
         {adding === "day" && <WholeDay store={store} onDone={() => setAdding(null)} />}
-        <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>Add from a table</Button>
+        <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>Import a table</Button>
         {adding === "table" && <TableForm store={store} demand={demand} roads={roads} />}
       </Stack>
       <ProfileList profiles={profiles} own={demand.profiles.map(({ id }) => id)} onRemove={remove} />
-      <Text size="xs" c="dimmed">Whoever was placed by hand keeps place and time, whatever is added here.</Text>
+      <Text size="xs" c="dimmed">Road users that were placed by hand keep their start and departure.</Text>
     </>
   );
 }

@@ -5,7 +5,7 @@ import { runs, type RunWish } from "../api/runs";
 import type { Actor, Flow, Roi } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 
 const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
 
@@ -25,16 +25,17 @@ export function useRegion(name: string, roiKey: string): Region {
   return useMemo(() => ({ ...roi, current: key === roiKey }), [roi, key, roiKey]);
 }
 
-export interface Ways {
+export interface Goals {
   /** Null until they are known. */
   goals: Place[] | null;
-  path: [number, number][];
+  /** Points of the route to the goal that is chosen. */
+  route: [number, number][];
 }
 
-/** Where the chosen one can go, and the way to its goal. */
-export function useWays(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Ways {
+/** Where the selected one can go, and its route to its goal. */
+export function useGoals(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Goals {
   const [goals, setGoals] = useState<Place[] | null>(null);
-  const [path, setPath] = useState<[number, number][]>([]);
+  const [route, setRoute] = useState<[number, number][]>([]);
   const spawn = one?.spawn ?? null;
   const goal = one?.goal ?? null;
   useEffect(() => {
@@ -48,13 +49,13 @@ export function useWays(name: string, one: Actor | Flow | null, roiKey: string, 
     return () => { current = false; };
   }, [name, spawn, roiKey, graph]);
   useEffect(() => {
-    setPath([]);
+    setRoute([]);
     if (spawn === null || goal === null) return;
     let current = true;
-    api.path(name, spawn, goal).then((found) => { if (current) setPath(found.points); }, () => undefined);
+    api.path(name, spawn, goal).then((found) => { if (current) setRoute(found.points); }, () => undefined);
     return () => { current = false; };
   }, [name, spawn, goal, roiKey]);
-  return { goals, path };
+  return { goals, route };
 }
 
 /** Starts a run and leads to it. */

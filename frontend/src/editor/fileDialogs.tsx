@@ -2,7 +2,8 @@ import { Alert, Button, Group, Loader, Modal, Stack, Text, TextInput } from "@ma
 import { type FormEvent, useState } from "react";
 
 import { api } from "../api/client";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
+import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 
@@ -18,7 +19,7 @@ export function NameDialog({ title, label, value, action, onName, onClose }: {
     event.preventDefault();
     setBusy(true);
     setFailure(null);
-    onName(name.trim()).catch((error: unknown) => setFailure(String((error as Error).message))).finally(() => setBusy(false));
+    onName(name.trim()).catch((error: unknown) => setFailure(reasonOf(error))).finally(() => setBusy(false));
   };
   return (
     <Modal opened onClose={onClose} title={title} centered>

@@ -9,7 +9,7 @@ export interface KeyActions {
   copy: () => void;
   move: () => void;
   selectAll: () => void;
-  /** 1 to 7 a kind of road user, 8 and 9 a stream. */
+  /** 1 to 7 a kind of road user, 8 and 9 a flow. */
   tool: (n: number) => void;
 }
 
@@ -19,8 +19,7 @@ export function useKeys(actions: KeyActions): void {
   useEffect(() => { latest.current = actions; });
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
-      const target = event.target as HTMLElement;
-      if (target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
+      if (event.target instanceof Element && event.target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
       const act = actionOf(event, latest.current);
       if (!act) return;
       act();
@@ -53,18 +52,18 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
 export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
   ["Ctrl+Z / Ctrl+Y", "Undo / redo"],
   ["1 – 7", "Place a car, van, truck, bus, motorcycle, bicycle, pedestrian"],
-  ["8 / 9", "Place a stream of traffic / of people"],
+  ["8 / 9", "Place a vehicle flow / pedestrian flow"],
   ["Ctrl+C", "Copy what is selected: then choose where"],
   ["M", "Move what is selected: then choose where"],
-  ["Ctrl+A", "Select everybody"],
+  ["Ctrl+A", "Select all"],
   ["Shift + click", "Select several"],
   ["Shift + drag", "Select all in a rectangle"],
   ["Delete", "Remove what is selected"],
-  ["Escape", "Stop placing, select nothing"],
+  ["Escape", "Stop placing, clear the selection"],
   ["Arrow keys", "On the map: move it (with Shift: a little)"],
   ["+ / −", "On the map: zoom"],
   ["0", "On the map: show everything"],
   ["Enter", "On the map: choose what is in the middle"],
   ["↑ / ↓", "In the table: the row before or after"],
-  ["?", "This sheet"],
+  ["?", "This help"],
 ];

@@ -15,7 +15,7 @@ export function segmentStyles(
     const row = graph.segmentRow.get(id);
     if (row !== undefined) styles.set(row, style);
   };
-  // With no region yet everything may be chosen: nothing stands out.
+  // With no region yet everything may be chosen: nothing is highlighted.
   if (growing && roi.length > 0) for (const id of candidates) put(id, "eligible");
   if (growing) roi.forEach((id, n) => put(id, n === 0 ? "base" : "member"));
   return styles;
@@ -35,7 +35,8 @@ export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets 
 /** Whom a problem is about, from a place such as `actors[3].goal`. */
 export function ofProblem(problem: Problem, document: ScenarioDocument): Actor | Flow | null {
   const found = /^(actors|flows)\[(\d+)\]/.exec(problem.where);
-  return found ? (document[found[1] as "actors" | "flows"][Number(found[2])] ?? null) : null;
+  const row = Number(found?.[2]);
+  return (found?.[1] === "actors" ? document.actors[row] : document.flows[row]) ?? null;
 }
 
 /** Ids of those that cannot be run as they are. */
@@ -97,9 +98,9 @@ export function boundsOfProblem(
 ): Bounds | null {
   const one = ofProblem(problem, document);
   const nodes = [...problem.nodes, ...(one ? [one.spawn] : [])];
-  const boxes: Bounds[] = nodes.flatMap((id) => {
+  const boxes = nodes.flatMap((id): Bounds[] => {
     const place = graph.place(id);
-    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25] as Bounds] : [];
+    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25]] : [];
   });
   if (boxes.length === 0) return segmentsBounds(graph, problem.segments);
   return boxes.reduce(join);
@@ -109,7 +110,8 @@ export function segmentsBounds(graph: Graph, ids: readonly string[]): Bounds | n
   const all = segmentBounds(graph.columns);
   const boxes = ids.flatMap((id) => {
     const row = graph.segmentRow.get(id);
-    return row === undefined || !Number.isFinite(all[row][0]) ? [] : [all[row]];
+    const bounds = row === undefined ? undefined : all[row];
+    return bounds && Number.isFinite(bounds[0]) ? [bounds] : [];
   });
   return boxes.length > 0 ? boxes.reduce(join) : null;
 }

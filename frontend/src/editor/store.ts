@@ -2,6 +2,7 @@ import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
 import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import { reasonOf } from "../ui/reason";
 import { everyone } from "./placing";
 
 export type Saving = "saved" | "saving" | "failed";
@@ -12,7 +13,7 @@ export interface EditorState {
   saving: Saving;
   /** What went wrong last, in the server's words. */
   refusal: Refusal | null;
-  /** Ids of road users and streams. */
+  /** Ids of road users and flows. */
   selection: readonly string[];
   load: () => Promise<void>;
   /**
@@ -20,7 +21,7 @@ export interface EditorState {
    * document, or null if it was refused.
    */
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
-  /** Asks for a change that is no edit; a refusal is thrown, for whoever has asked to show it. */
+  /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
   take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
@@ -99,16 +100,16 @@ export function createEditorStore(name: string): EditorStore {
     };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
-      const message = error instanceof Error ? error.message : String(error);
+      const message = reasonOf(error);
       if (status === 409) {
         try {
           await get().load();
         } catch (failure) {
-          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: String((failure as Error).message), again } });
+          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again } });
           return;
         }
         const title = "Changed in another tab";
-        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it; you can make it again on top.", again } });
+        set({ refusal: { title, message: "You now see the newest state without your last change, which you can apply again.", again } });
         return;
       }
       const failed = status <= 0 || status >= 500;

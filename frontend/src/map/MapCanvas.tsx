@@ -59,6 +59,7 @@ interface Drag {
   does: "pan" | "carry" | "frame";
 }
 
+const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
 const CLICK_SLACK = 4;
 const TOUCH = 14;
 
@@ -170,8 +171,9 @@ export function MapCanvas({
       ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step],
     };
     const middle = (): Pointed => pointed(size.current.width / 2, size.current.height / 2, event.shiftKey);
-    if (moves[event.key]) {
-      apply(panBy(view.current, ...moves[event.key]));
+    const move = moves[event.key];
+    if (move) {
+      apply(panBy(view.current, ...move));
       onPoint?.(middle());
     } else if (event.key === "+" || event.key === "=") zoom(1.4);
     else if (event.key === "-") zoom(1 / 1.4);
@@ -191,7 +193,7 @@ export function MapCanvas({
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
-      aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
+      aria-label={`${label}. ${KEYS}`}
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {

@@ -1,4 +1,5 @@
 import type { Bounds } from "../api/types";
+import { nth } from "../lists";
 import type { Palette } from "./colors";
 import { type Lines, type PackedDrawing, type PackedLines, tiles, unpack } from "./drawing";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
@@ -95,9 +96,9 @@ function item(look: Look, packed: PackedLines, closed: boolean): Item {
 function pathOf(lines: Lines, rows: number[], closed: boolean): Path2D {
   const path = new Path2D();
   for (const k of rows) {
-    for (let i = lines.start[k]; i < lines.start[k + 1]; i++) {
-      if (i === lines.start[k]) path.moveTo(lines.xy[2 * i], lines.xy[2 * i + 1]);
-      else path.lineTo(lines.xy[2 * i], lines.xy[2 * i + 1]);
+    for (let i = nth(lines.start, k); i < nth(lines.start, k + 1); i++) {
+      if (i === lines.start[k]) path.moveTo(nth(lines.xy, 2 * i), nth(lines.xy, 2 * i + 1));
+      else path.lineTo(nth(lines.xy, 2 * i), nth(lines.xy, 2 * i + 1));
     }
     if (closed) path.closePath();
   }
@@ -112,7 +113,7 @@ function style(
   context.lineCap = "butt";
   switch (look.what) {
     case "area":
-      context.fillStyle = palette.areas[look.kind] ?? palette.areas.shoulder;
+      context.fillStyle = palette.areas[look.kind] ?? palette.otherArea;
       // A hair of stroke closes the seams between rings that touch.
       context.strokeStyle = context.fillStyle;
       context.lineWidth = 0.5 / scale;

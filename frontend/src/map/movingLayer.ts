@@ -1,4 +1,5 @@
 import { CATEGORIES } from "../api/types";
+import { nth } from "../lists";
 import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette } from "./colors";
 import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
@@ -34,9 +35,10 @@ export class MovingLayer {
     context: CanvasRenderingContext2D, view: View, size: Size, palette: Palette, moving: Moving,
   ): void {
     const rows = byCategory(moving, view, size);
-    rows.forEach((of, n) => {
-      if (of.length === 0) return;
-      context.fillStyle = CATEGORY_COLOR[CATEGORIES[n]];
+    for (const [n, category] of CATEGORIES.entries()) {
+      const of = nth(rows, n);
+      if (of.length === 0) continue;
+      context.fillStyle = CATEGORY_COLOR[category];
       context.beginPath();
       for (const row of of) outline(context, moving, row, view, size);
       context.fill();
@@ -45,10 +47,10 @@ export class MovingLayer {
         context.lineWidth = 1;
         context.stroke();
       }
-      if (view.scale >= DETAIL_FROM && CATEGORIES[n] !== "pedestrian") {
+      if (view.scale >= DETAIL_FROM && category !== "pedestrian") {
         for (const row of of) details(context, moving, row, view, size);
       }
-    });
+    }
     if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
     if (moving.followed >= 0) mark(context, moving, moving.followed, view, size, palette.ink);
   }
@@ -75,10 +77,10 @@ function byCategory(moving: Moving, view: View, size: Size): number[][] {
   const slack = 12;
   const rows: number[][] = CATEGORIES.map(() => []);
   for (let i = 0; i < moving.count; i++) {
-    const x = moving.pose[5 * i];
-    const y = moving.pose[5 * i + 1];
+    const x = nth(moving.pose, 5 * i);
+    const y = nth(moving.pose, 5 * i + 1);
     if (x > x0 - slack && x < x1 + slack && y > y0 - slack && y < y1 + slack) {
-      rows[moving.category[i]].push(i);
+      nth(rows, nth(moving.category, i)).push(i);
     }
   }
   return rows;
@@ -90,12 +92,12 @@ function outline(
 ): void {
   const { pose } = moving;
   const p = 5 * row;
-  const hdg = pose[p + 2];
-  const k = Math.max(view.scale, LEAST / Math.max(pose[p + 3], 0.9));
-  const half = (pose[p + 3] / 2) * k;
-  const side = (pose[p + 4] / 2) * k;
-  const x = (pose[p] - view.x) * view.scale + size.width / 2;
-  const y = (view.y - pose[p + 1]) * view.scale + size.height / 2;
+  const hdg = nth(pose, p + 2);
+  const k = Math.max(view.scale, LEAST / Math.max(nth(pose, p + 3), 0.9));
+  const half = (nth(pose, p + 3) / 2) * k;
+  const side = (nth(pose, p + 4) / 2) * k;
+  const x = (nth(pose, p) - view.x) * view.scale + size.width / 2;
+  const y = (view.y - nth(pose, p + 1)) * view.scale + size.height / 2;
   const cos = Math.cos(hdg);
   const sin = Math.sin(hdg);
   const nose = half - Math.min(side * 0.7, half);
@@ -114,15 +116,15 @@ function details(
 ): void {
   const { pose } = moving;
   const p = 5 * row;
-  const half = pose[p + 3] / 2;
-  const side = pose[p + 4] / 2;
-  const flags = moving.flags[row];
+  const half = nth(pose, p + 3) / 2;
+  const side = nth(pose, p + 4) / 2;
+  const flags = nth(moving.flags, row);
   context.save();
   context.translate(
-    (pose[p] - view.x) * view.scale + size.width / 2,
-    (view.y - pose[p + 1]) * view.scale + size.height / 2,
+    (nth(pose, p) - view.x) * view.scale + size.width / 2,
+    (view.y - nth(pose, p + 1)) * view.scale + size.height / 2,
   );
-  context.rotate(-pose[p + 2]);
+  context.rotate(-nth(pose, p + 2));
   context.scale(view.scale, view.scale);
   if (side > 0.6) {
     context.fillStyle = "#10202caa";
@@ -150,19 +152,19 @@ function mark(
   color: string,
 ): void {
   const p = 5 * row;
-  const x = (moving.pose[p] - view.x) * view.scale + size.width / 2;
-  const y = (view.y - moving.pose[p + 1]) * view.scale + size.height / 2;
+  const x = (nth(moving.pose, p) - view.x) * view.scale + size.width / 2;
+  const y = (view.y - nth(moving.pose, p + 1)) * view.scale + size.height / 2;
   context.strokeStyle = color;
   context.lineWidth = 2.5;
   context.beginPath();
-  context.arc(x, y, Math.max(11, moving.pose[p + 3] * 0.75 * view.scale), 0, 2 * Math.PI);
+  context.arc(x, y, Math.max(11, nth(moving.pose, p + 3) * 0.75 * view.scale), 0, 2 * Math.PI);
   context.stroke();
 }
 
 const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
   collision: (context) => { line(context, -4, -4, 4, 4); line(context, -4, 4, 4, -4); },
   braking: (context) => { line(context, 0, -5, 0, 1); line(context, 0, 4, 0, 4.5); },
-  lifted: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
+  teleported: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
   met: (context) => { line(context, -4, 0.5, -1, 3.5); line(context, -1, 3.5, 4, -3.5); },
   unmet: (context) => { line(context, -4, -2, 4, -2); line(context, -4, 2, 4, 2); line(context, 2.5, -5, -2.5, 5); },
 };

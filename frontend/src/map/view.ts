@@ -61,7 +61,7 @@ export function zoomAt(
   };
 }
 
-/** Keeps the middle of the view on the map, so that nobody gets lost in the void. */
+/** Keeps the middle of the view on the map, so that the map is never lost. */
 export function clampTo(view: View, bounds: Bounds): View {
   const [x0, y0, x1, y1] = bounds;
   return {

@@ -3,7 +3,7 @@ import { useCallback } from "react";
 
 import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary } from "../api/runs";
-import { hashOf } from "../ui/route";
+import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { compared, when } from "./figures";
 

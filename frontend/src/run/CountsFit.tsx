@@ -7,13 +7,13 @@ import { count, span } from "../ui/words";
 import { worstFirst } from "./fit";
 import { Scatter } from "./Scatter";
 
-/** More rows nobody reads; all of them are in the tables that can be downloaded. */
+/** Rows of the list; all of them are in the tables that can be downloaded. */
 const LISTED = 200;
 
 /** How well a run meets the counts of its scenario. */
 export function CountsFit({ run, onFit, onShow }: {
   run: string;
-  /** Told once they are known, and with null when they are out of sight. */
+  /** Called once they are known, and with null when they are out of sight. */
   onFit: (rows: readonly FitRow[] | null) => void;
   onShow: (x: number, y: number) => void;
 }) {
@@ -23,7 +23,7 @@ export function CountsFit({ run, onFit, onShow }: {
     onFit(value?.rows ?? null);
     return () => onFit(null);
   }, [value, onFit]);
-  if (error) return <Alert color="gray" title="Nothing can be said of the counts">{error}</Alert>;
+  if (error) return <Alert color="gray" title="The counts cannot be compared">{error}</Alert>;
   if (!value) return <Loader aria-label="Counting" />;
   const { rows, met, rmse, contradictions } = value;
   const shown = worstFirst(all ? rows : rows.filter((row) => !row.met));
@@ -34,16 +34,16 @@ export function CountsFit({ run, onFit, onShow }: {
         {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}</Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (
-        <Alert color="gray" title="Counts that cannot be right together" mb="md">
+        <Alert color="gray" title="Counts that contradict each other" mb="md">
           <List size="sm">{contradictions.slice(0, 20).map((text) => <List.Item key={text}>{text}</List.Item>)}</List>
         </Alert>
       )}
       <Title order={3} size="h5">{all ? "All counts" : "Not met"}</Title>
-      {rows.length > met && <Text size="xs" c="dimmed">Choose one to see its place.</Text>}
+      {rows.length > met && <Text size="xs" c="dimmed">Choose one to see its count station.</Text>}
       {shown.length === 0 && <Text size="sm">Every count is met.</Text>}
       {shown.length > 0 && (
         <Table mt="xs" verticalSpacing={4} horizontalSpacing={5} fz={13} aria-label={all ? "All counts" : "Counts that are not met"}>
-          <Table.Thead><Table.Tr><Table.Th>Place and time</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
+          <Table.Thead><Table.Tr><Table.Th>Count station and time</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
           {shown.slice(0, LISTED).map((row) => <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />)}
         </Table>
       )}
@@ -60,7 +60,7 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
       <Table.Tr>
         <Table.Th scope="row" fw={400}>{x !== null && y !== null
           ? <button type="button" className="row-button" onClick={() => onShow(x, y)}>{place.replaceAll(">", " > ")}</button>
-          : place.replaceAll(">", " > ")}<div className="fit-time">{span(begin, end)} h</div></Table.Th>
+          : place.replaceAll(">", " > ")}<div className="fit-time">{span(begin, end)}</div></Table.Th>
         <Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
         <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td><Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
       </Table.Tr>

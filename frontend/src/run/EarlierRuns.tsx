@@ -4,7 +4,7 @@ import { useCallback, useState } from "react";
 import { type RunInfo, runs } from "../api/runs";
 import { IconTrash } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
-import { hashOf } from "../ui/route";
+import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { hasEnded, STATE_WORD, when } from "./figures";
 
@@ -24,7 +24,7 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
   return (
     <>
       <Table verticalSpacing={6} fz={14} aria-label="Runs of this scenario">
-        <Table.Thead><Table.Tr><Table.Th>Ended</Table.Th><Table.Th>How</Table.Th><Table.Th><VisuallyHidden>Actions</VisuallyHidden></Table.Th></Table.Tr></Table.Thead>
+        <Table.Thead><Table.Tr><Table.Th>Ended</Table.Th><Table.Th>Outcome</Table.Th><Table.Th><VisuallyHidden>Actions</VisuallyHidden></Table.Th></Table.Tr></Table.Thead>
         <Table.Tbody>
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>
@@ -33,7 +33,7 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
                   {one.run === current ? <Text size="sm" fw={600}>shown</Text>
-                    : <Anchor size="sm" href={hashOf({ view: "run", scenario, run: one.run })} aria-label={`${watchWord(one)} ${one.run}`}>{one.state === "interrupted" ? "Go on" : "Watch"}</Anchor>}
+                    : <Anchor size="sm" href={hashOf({ view: "run", scenario, run: one.run })} aria-label={`${watchWord(one)} ${one.run}`}>{one.state === "interrupted" ? "Resume" : "Watch"}</Anchor>}
                   {hasReport(one) && <Anchor size="sm" href={runs.reportUrl(one.run)} target="_blank" rel="noreferrer" aria-label={`Report of ${one.run}`}>Report</Anchor>}
                   {hasEnded(one.state) && (
                     <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${one.run}`} onClick={() => setRemoving(one.run)}><IconTrash /></ActionIcon>
@@ -55,5 +55,5 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
   );
 }
 
-const watchWord = ({ state }: RunInfo): string => state === "interrupted" ? "Go on:" : "Watch";
+const watchWord = ({ state }: RunInfo): string => state === "interrupted" ? "Resume" : "Watch";
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

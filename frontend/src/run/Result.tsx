@@ -5,20 +5,20 @@ import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { Comparison } from "./Comparison";
 import { keyFigures } from "./figures";
 import { Files } from "./Files";
 import { Interrupted, SliceTable } from "./LongRun";
 
-/** Nobody watches a longer run in real time. */
+/** Longer runs are not watched in real time. */
 const LONG = 3600;
-const TITLE: Record<string, string> = { failed: "The run broke off", stopped: "The run was stopped" };
+const TITLE: Record<string, string> = { failed: "The run failed", stopped: "The run was stopped" };
 
-/** What came of a run, in figures. */
-export function Result({ info, scenario, onBack, onGoOn }: {
-  info: RunInfo; scenario: string; onBack: () => void; onGoOn: () => void;
+/** The result of a run, in figures. */
+export function Result({ info, scenario, onBack, onResume }: {
+  info: RunInfo; scenario: string; onBack: () => void; onResume: () => void;
 }) {
   const [busy, setBusy] = useState(false);
   const known = useLoaded(allFigures);
@@ -28,7 +28,7 @@ export function Result({ info, scenario, onBack, onGoOn }: {
       ({ run }) => go({ view: "run", scenario, run }),
       (error: unknown) => { setBusy(false); tellError(error); });
   };
-  if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onGoOn={onGoOn} />;
+  if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onResume={onResume} />;
   const failed = info.state === "failed";
   return (
     <section aria-label="Result of the run">
@@ -58,14 +58,14 @@ function Failure({ info }: { info: RunInfo }) {
   const words = info.error;
   return (
     <>
-      <Alert color="red" mt="sm" title="The simulation could not go on">
-        Your scenario is as it was, and other runs go on. {info.carla
-          ? "See below what is wrong with CARLA, or run it without."
-          : "Try to run it again; if it breaks off at the same time, remove the road users that came last."}
+      <Alert color="red" mt="sm" title="The simulation could not continue">
+        Your scenario is unchanged, and other runs continue. {info.carla
+          ? "See below what is wrong with CARLA, or run without it."
+          : "Try to run it again; if it fails at the same time, remove the road users that were inserted last."}
       </Alert>
       <details className="words" style={{ marginTop: 12 }}>
-        <summary>What the simulator said</summary>
-        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">It said nothing.</Text>}
+        <summary>Messages of the simulator</summary>
+        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">There are none.</Text>}
       </details>
     </>
   );

@@ -1,6 +1,6 @@
 import { Anchor, Title } from "@mantine/core";
 
-import { hashOf } from "../ui/route";
+import { hashOf } from "../ui/address";
 import { EarlierRuns } from "./EarlierRuns";
 
 /** The runs of one scenario by themselves. */

@@ -12,7 +12,7 @@ const BOX = { left: 44, right: W - 12, top: 22, bottom: H - 36 };
 export function Scatter({ rows }: { rows: readonly FitRow[] }) {
   const id = useId();
   const marks = ticks(Math.max(1, ...rows.flatMap((row) => [row.counted, row.modelled])));
-  const most = marks[marks.length - 1];
+  const most = marks.at(-1) ?? 1;
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / most;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / most;
   const unmet = rows.filter((row) => !row.met);
@@ -39,7 +39,7 @@ export function Scatter({ rows }: { rows: readonly FitRow[] }) {
         <span><i style={{ background: MARK_COLOR.met, borderRadius: "50%", width: 9, height: 9 }} />met ({(rows.length - unmet.length).toLocaleString("en")})</span>
         <span><i style={{ background: MARK_COLOR.unmet, clipPath: "polygon(50% 0, 100% 100%, 0 100%)", width: 11, height: 10 }} />not met ({unmet.length.toLocaleString("en")})</span>
       </div>
-      <p>On the line as many were simulated as were counted. Below it too few came, above it too many.</p>
+      <p>On the line, as many vehicles were simulated as counted; below it too few, above it too many.</p>
     </figure>
   );
 }

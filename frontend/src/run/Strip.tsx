@@ -11,46 +11,46 @@ import type { Now } from "./usePicture";
 import type { Player } from "./useReplay";
 
 const STEP = 0.5;
-/** Simulated seconds from which on it is told how long a run will still take. */
+/** Simulated seconds from which on the remaining time is shown. */
 const LONG = 3600;
 
-/** Steers a run that goes on, and says how far it is. */
+/** Controls a run, and shows its progress. */
 export function LiveStrip({ info, now, onBack, learn }: {
   info: RunInfo; now: Now; onBack: () => void; learn: (state: RunState, speed?: number | null) => void;
 }) {
   const { run, state } = info;
   const control = (action: Action, speed?: number | null): void => {
-    runs.control(run, action, speed).then((told) => learn(told.state, told.speed), tellError);
+    runs.control(run, action, speed).then((answer) => learn(answer.state, answer.speed), tellError);
   };
   const going = state === "running" || state === "paused";
   const until = info.progress?.until ?? 0;
-  // Told only where it matters; at a chosen pace it takes as long as one has chosen.
+  // Only where it matters; at a chosen speed it takes as long as one has chosen.
   const left = until > LONG && info.speed == null ? info.progress?.time_left : null;
   return (
     <div className="strip" role="region" aria-label="The run">
       <Back onBack={onBack} />
       <Group gap={6} role="group" aria-label="Control the run">
         {state === "paused"
-          ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Go on</Button>
+          ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Resume</Button>
           : <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>Pause</Button>}
         {!info.slices && <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>}
         <Button variant="default" leftSection={<IconStop />} disabled={!going && state !== "preparing"} onClick={() => control("stop")}>Stop</Button>
-        {info.slices && <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>Go on later</Button>}
+        {info.slices && <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>Resume later</Button>}
         <SpeedChoice speeds={SPEEDS} speed={info.speed ?? null} onChange={(speed) => control("speed", speed)} />
       </Group>
       <div className="time-line">
-        <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="How much of the run is over" />
+        <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="Progress of the run" />
         <Text size="sm" mt={4}>{STATE_WORD[state]}{left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}</Text>
       </div>
       <Shown label="Time" value={longClock(now.time, until)} />
-      <Shown label="Times real speed" value={now.pace.toFixed(1)} />
+      <Shown label="Real-time factor" value={now.pace.toFixed(1)} />
       <Shown label="On the road" value={String(now.running)} />
       <Shown label="Arrived" value={String(now.arrived)} />
     </div>
   );
 }
 
-/** Plays a recording: a slider over its time, with what went wrong marked above it. */
+/** Plays a recording: a slider over its time, with incidents marked above it. */
 export function ReplayStrip({ player, recorded, running, incidents, onBack, onPlay }: {
   player: Player;
   /** Whether the run left a recording. */

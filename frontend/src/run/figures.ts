@@ -64,7 +64,7 @@ const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupt
 export const hasEnded = (state: RunState): boolean => ENDED.includes(state);
 
 export const STATE_WORD: Record<RunState, string> = {
-  preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
+  preparing: "Preparing", running: "Running", paused: "Paused", finishing: "Writing the results",
   completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
 };
 
@@ -79,7 +79,7 @@ export const SPEEDS: Speed[] = [
   { value: "0.1", label: "0.1 ×", speed: 0.1 }, { value: "0.25", label: "0.25 ×", speed: 0.25 },
   { value: "0.5", label: "0.5 ×", speed: 0.5 }, { value: "1", label: "Real time", speed: 1 },
   { value: "2", label: "2 ×", speed: 2 }, { value: "5", label: "5 ×", speed: 5 },
-  { value: "10", label: "10 ×", speed: 10 }, { value: "max", label: "As fast as it can", speed: null },
+  { value: "10", label: "10 ×", speed: 10 }, { value: "max", label: "As fast as possible", speed: null },
 ];
 /** A recording has no limit but the eye. */
 export const REPLAY_SPEEDS: Speed[] = SPEEDS.filter(({ speed }) => speed !== null);

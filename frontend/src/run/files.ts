@@ -1,11 +1,11 @@
 import type { RunFile } from "../api/runs";
 
 const WORD: Record<string, string> = {
-  "report.html": "Full report", "parity.html": "Compared with CARLA", "summary.json": "Key figures", "figures.json": "Figures by place",
-  "actors.json": "What became of each road user", "events.json": "What happened on the road", "plan.json": "What was planned",
-  "scenario.json": "The scenario as it was run", "sumo.log": "What the simulator said", "trajectories.parquet": "Where everybody was",
+  "report.html": "Full report", "parity.html": "Comparison with CARLA", "summary.json": "Key figures", "figures.json": "Figures by road and junction",
+  "actors.json": "Outcome of each road user", "events.json": "Incidents", "plan.json": "Planned trips",
+  "scenario.json": "The scenario as it was run", "sumo.log": "Messages of the simulator", "trajectories.parquet": "Trajectories",
   "figures/network.csv": "The whole road network over time", "figures/segments.csv": "Each road over time",
-  "figures/junctions.csv": "Each junction over time", "figures/movements.csv": "Each turn over time",
+  "figures/junctions.csv": "Each junction over time", "figures/movements.csv": "Each turning movement over time",
 };
 
 interface Group {

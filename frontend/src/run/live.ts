@@ -6,7 +6,7 @@ export interface LiveEvents {
   onLights: (lights: Record<string, string>) => void;
   onState: (state: RunState, speed?: number | null) => void;
   onIncidents: (incidents: Incident[]) => void;
-  /** Everybody who will ever be on the road is known. */
+  /** All that will ever be on the road are known. */
   onIntroduced: (crowd: Crowd) => void;
 }
 

@@ -1,6 +1,7 @@
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { runs } from "../api/runs";
+import { reasonOf } from "../ui/reason";
 import type { Crowd, Frame } from "./frames";
 import { Replay } from "./replay";
 
@@ -39,7 +40,7 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
         setTime(made.begin);
         show(made.at(made.begin), made.crowd);
       },
-      (reason: unknown) => { if (current) setError((reason as Error).message); });
+      (reason: unknown) => { if (current) setError(reasonOf(reason)); });
     return () => { current = false; };
   }, [run, wanted, show]);
 

@@ -1,5 +1,7 @@
 import { useCallback, useEffect, useState } from "react";
 
+import { reasonOf } from "./reason";
+
 export interface Loaded<T> {
   value: T | null;
   error: string | null;
@@ -15,7 +17,7 @@ export function useLoaded<T>(load: () => Promise<T>): Loaded<T> {
     let current = true;
     load().then(
       (found) => { if (current) { setValue(found); setError(null); } },
-      (reason: unknown) => { if (current) setError(reason instanceof Error ? reason.message : String(reason)); },
+      (reason: unknown) => { if (current) setError(reasonOf(reason)); },
     );
     return () => { current = false; };
   }, [load, turn]);

@@ -1,6 +1,6 @@
 import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types";
 
-/** Words for people: no term of any standard or simulator on the page. */
+/** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
   car: "Car", van: "Van", truck: "Truck", bus: "Bus", motorcycle: "Motorcycle",
   bicycle: "Bicycle", pedestrian: "Pedestrian",
@@ -9,6 +9,9 @@ export const CATEGORY_WORD: Record<Category, string> = {
 export const STYLE_WORD: Record<Style, string> = {
   cautious: "Cautious", normal: "Normal", sporty: "Sporty",
 };
+
+/** A flow in words, by whether its road users are on foot. */
+export const flowWord = (walks: boolean): string => walks ? "Pedestrian flow" : "Vehicle flow";
 
 const KIND_WORD: Record<string, string> = {
   clear: "Clear", cloudy: "Cloudy", wet: "Wet roads", rain_light: "Light rain",
@@ -54,22 +57,30 @@ export function hoursMinutes(seconds: number): string {
   return min === 0 ? `${h} h` : `${h} h ${String(min).padStart(2, "0")} min`;
 }
 
+/** Minutes of the hour, or seconds of the minute, in two digits. */
+const sixtieth = (n: number): string => String(Math.floor(n) % 60).padStart(2, "0");
+
 /** Hours, minutes and seconds of a long run; the tenths of {@link clock} for a short one. */
 export function longClock(seconds: number, longest: number): string {
   if (longest < 3600) return clock(seconds);
-  const s = Math.floor(Math.max(0, seconds));
-  return `${Math.floor(s / 3600)}:${String(Math.floor(s / 60) % 60).padStart(2, "0")}:${String(s % 60).padStart(2, "0")}`;
+  const s = Math.max(0, seconds);
+  return `${Math.floor(s / 3600)}:${sixtieth(s / 60)}:${sixtieth(s)}`;
 }
 
-/** From when to when, as hours and minutes after the start. */
+/** From when to when after the start, in the unit that fits: `0–15 min`, `0:15–10:00 h`. */
 export function span(begin: number, end: number): string {
-  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${String(Math.floor(seconds / 60) % 60).padStart(2, "0")}`;
-  return `${at(begin)}–${at(end)}`;
+  if (begin % 60 !== 0 || end % 60 !== 0) {
+    const at = (seconds: number): string => `${Math.floor(seconds / 60)}:${sixtieth(seconds)}`;
+    return `${at(begin)}–${at(end)} min`;
+  }
+  if (end <= 3600) return `${begin / 60}–${end / 60} min`;
+  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${sixtieth(seconds / 60)}`;
+  return `${at(begin)}–${at(end)} h`;
 }
 
 export function bytes(n: number): string {
-  const unit = n >= 1e9 ? { size: 1e9, word: "GB" } : n >= 1e6 ? { size: 1e6, word: "MB" } : { size: 1e3, word: "kB" };
-  return `${(n / unit.size).toLocaleString("en", { maximumFractionDigits: n >= 10 * unit.size ? 0 : 1 })} ${unit.word}`;
+  const [size, word] = n >= 1e9 ? [1e9, "GB"] : n >= 1e6 ? [1e6, "MB"] : [1e3, "kB"];
+  return `${(n / size).toLocaleString("en", { maximumFractionDigits: n >= 10 * size ? 0 : 1 })} ${word}`;
 }
 
 export const count = (n: number, one: string, many = `${one}s`): string =>
