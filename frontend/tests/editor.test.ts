@@ -14,7 +14,7 @@ test("the first segment is dark blue, the rest of the region blue, what can be a
   expect([...styles].sort()).toEqual([[0, "member"], [1, "base"], [2, "eligible"]]);
 });
 
-test("before the first segment nothing stands out, though all may be chosen", () => {
+test("before the first segment nothing is highlighted, though all may be chosen", () => {
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
 });
 
@@ -65,7 +65,7 @@ test("only free and usable places of the region are offered, of the right kind",
   expect(startsOf(scenario([]), 2).near(0, 0, 1, false)).toBeNull();
 });
 
-test("who cannot start somewhere is told why", () => {
+test("a road user that cannot start somewhere comes with the reason", () => {
   expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain("No bicycle may start here");
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
   expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");
@@ -85,7 +85,7 @@ test("copies keep their distances, no two on one place", () => {
   expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([["a", "1.0.-1.1"], ["p", "ped.1.0.3.1"]]);
 });
 
-test("a place is told in words", () => {
+test("a place is described in words", () => {
   expect(placeWord(graph, "1.0.-1.2")).toBe("Road 1, right lane 1, 4 m");
   expect(placeWord(graph, "ped.1.0.3.1")).toBe("Road 1, left walkway, 2 m");
   expect(laneFacts(graph, "1.0.-1.0")).toBe("Driving lane, 3.0 m wide, limit 50 km/h");
@@ -124,7 +124,7 @@ test("changes go out one at a time, each with the version before it", async () =
   expect(store.getState()).toMatchObject({ saving: "saved", selection: ["b"] });
 });
 
-test("a refusal is told and changes nothing", async () => {
+test("a refusal is reported and changes nothing", async () => {
   answers([200, state(1)], [422, { error: { kind: "ScenarioError", message: "the node is taken" } }]);
   const store = createEditorStore("s");
   await store.getState().load();

@@ -35,7 +35,7 @@ const shown = (time: number): Record<string, [number, number]> => {
   return found;
 };
 
-test("between two moments everybody is on the way, far from zero too", () => {
+test("between two moments every road user is under way, far from zero too", () => {
   expect(shown(0.5)).toEqual({ "car-1": [1_000_005, 5] });
   expect(shown(-3)).toEqual({ "car-1": [1_000_000, 5] });
 });
@@ -59,7 +59,7 @@ test("headings turn the short way, and a bend is driven as a bend", () => {
   expect(Math.hypot(middle.x, middle.y - 10)).toBeCloseTo(10, 0);
 });
 
-test("a run in which nobody was ever on the road can be replayed", () => {
+test("a run in which no road user was ever on the road can be replayed", () => {
   const empty = { ...columns(), times: [], first: [0], actor: [], x: [], y: [], hdg: [], speed: [] };
   expect(new Replay(empty).at(3).count).toBe(0);
 });
@@ -70,7 +70,7 @@ test("the moment is the last one that is not later", () => {
 
 const crash: Incident = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
 
-test("incidents are told in words and marked from when they happen", () => {
+test("incidents are reported in words and marked from when they happen", () => {
   const categories = new Map([["car-1", "car"], ["x7", "bicycle"]] as const);
   expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
   expect(marksAt([crash], 2.9)).toEqual([]);

@@ -19,7 +19,7 @@ const row = (place: string, geh: number, at: number | null = 1): FitRow => ({
 
 afterEach(() => vi.unstubAllGlobals());
 
-test("traffic is told in a line, and zones or profiles alone bring nobody", () => {
+test("traffic is summed up in a line, and zones or profiles alone bring no road user", () => {
   expect(bringsTraffic({ ...empty, zones: [{ id: "z", segments: ["r1"] }] })).toBe(false);
   expect(trafficNote(empty)).toBe("Who else is on the road?");
   const matrix = { id: "m", begin: 0, end: null, profile: null, mix: { car: 1 }, trips: [["a", "b", 900.4], ["b", "a", 99.6]] as Demand["matrices"][0]["trips"] };
@@ -68,7 +68,7 @@ test("a place is met only if all of its counts are; the worst counts come first"
   expect(worstFirst(rows).map(({ geh }) => geh)).toEqual([9, 7, 2, 1]);
 });
 
-test("files of a run are told in plain words, each once", () => {
+test("files of a run are described in plain words, each once", () => {
   const files = ["actors.json", "figures/network.csv", "figures/new.csv", "report.html", "sumo.log", "trajectories/part-0001.parquet"].map((name) => ({ name, size: 1 }));
   const groups = fileGroups(files);
   expect(groups.map(({ title }) => title)).toEqual(["To read", "Tables", "Figures and lists", "Recordings", "The rest"]);
@@ -84,7 +84,7 @@ const answers = (...given: [status: number, body: unknown][]): void => {
 };
 const state = (version: number): object => ({ name: "s", version, document: { name: "s", actors: [], flows: [] }, problems: [] });
 
-test("a change that is refused is told to whoever asked for it, and what follows is still asked", async () => {
+test("a change that is refused is reported where it was asked for, and what follows is still asked", async () => {
   answers([200, state(1)]);
   const store = createEditorStore("s");
   await store.getState().load();

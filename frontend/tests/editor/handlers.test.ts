@@ -84,7 +84,7 @@ test("with no region yet the map says how to begin it", () => {
   expect(handler.hint(null)).toBe("Click a road or junction to begin the region");
 });
 
-test("in the step of the traffic the map tells ids for tables and a click changes nothing", () => {
+test("in the step of the traffic the map shows ids for tables and a click changes nothing", () => {
   const { log, handler } = using(null, scenario([]), {}, "traffic");
   expect(handler.hint(handler.under(at(2, 0)))).toBe("Id for tables: b");
   expect(handler.hint(null)).toBeNull();

@@ -178,7 +178,7 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
   return { ...shown, onEdit, onRun };
 }
 
-test("a run begins in real time with its trajectories, unless told otherwise", async () => {
+test("a run begins in real time with its trajectories, unless another choice is made", async () => {
   const { user, onRun } = toRun(scenario([actor("a")]));
   await user.click(screen.getByRole("button", { name: "Run" }));
   expect(onRun).toHaveBeenLastCalledWith({ scenario: "s", speed: 1, carla: false, trajectories: true, every: null });
@@ -221,7 +221,7 @@ test("an empty scenario, or one with errors, cannot be run and says why", () => 
   expect(screen.getByText("Solve the problems listed below first.")).toBeTruthy();
 });
 
-test("a table that is refused tells every reason, and one that is imported says so", async () => {
+test("a table that is refused lists every reason, and one that is imported says so", async () => {
   const document = scenario([]);
   const store = createEditorStore("s");
   server({ "/scenarios/s": { name: "s", version: 1, document, problems: [] } });

@@ -96,7 +96,7 @@ test("a failed run shows the messages of the simulator", () => {
   expect(screen.queryByRole("link", { name: "Full report" })).toBeNull();
 });
 
-test("incidents are told newest first in the terms of the field, and lead to their place", async () => {
+test("incidents are reported newest first in the terms of the field, and lead to their place", async () => {
   const crash: Incident = { time: 3, kind: "collision", actor: "a", partner: "b", x: 1, y: 2 };
   const teleported: Incident = { time: 310, kind: "teleport_start", actor: "c" };
   const onShow = vi.fn();
