@@ -29,9 +29,17 @@ function crowd(columns: GraphColumns, time: number): Moving {
   return { count: vehicles, pose, category, flags: new Uint8Array(vehicles).fill(3), ego: 0, followed: -1 };
 }
 
-interface Figures { fps: number; busy: number; worst: number }
+interface Figures {
+  fps: number;
+  busy: number;
+  worst: number;
+}
 
-async function during(renderer: CanvasRenderer, columns: GraphColumns, move: (k: number) => void): Promise<Figures> {
+async function during(
+  renderer: CanvasRenderer,
+  columns: GraphColumns,
+  move: (k: number) => void,
+): Promise<Figures> {
   const began = performance.now();
   const start = { ...renderer.stats };
   let last = began;
@@ -51,7 +59,11 @@ async function during(renderer: CanvasRenderer, columns: GraphColumns, move: (k:
       if (now - began < 1000 * seconds) requestAnimationFrame(tick);
       else {
         const drawn = renderer.stats.frames - start.frames;
-        done({ fps: (1000 * frames) / (now - began), busy: (renderer.stats.busy - start.busy) / drawn, worst });
+        done({
+          fps: (1000 * frames) / (now - began),
+          busy: (renderer.stats.busy - start.busy) / drawn,
+          worst,
+        });
       }
     };
     requestAnimationFrame(tick);
@@ -77,13 +89,17 @@ async function main(): Promise<void> {
 
   const at = (scale: number): View => ({ x: nth(columns.x, 4000), y: nth(columns.y, 4000), scale });
   const results: Record<string, Figures> = {};
-  const sway = (view: View) => (k: number): void => renderer.setView(panBy(view, 160 * Math.sin(k / 25), 110 * Math.sin(k / 40)));
+  const sway =
+    (view: View) =>
+    (k: number): void =>
+      renderer.setView(panBy(view, 160 * Math.sin(k / 25), 110 * Math.sin(k / 40)));
   results["still, whole map"] = await during(renderer, columns, () => undefined);
   results["panning, whole map"] = await during(renderer, columns, sway(whole));
   results["panning, 3 px/m"] = await during(renderer, columns, sway(at(3)));
   results["panning, 12 px/m"] = await during(renderer, columns, sway(at(12)));
   results["zooming"] = await during(renderer, columns, (k) =>
-    renderer.setView(zoomAt(at(3), size, Math.exp(1.8 * Math.sin(k / 30)), 300, 300, whole.scale)));
+    renderer.setView(zoomAt(at(3), size, Math.exp(1.8 * Math.sin(k / 30)), 300, 300, whole.scale)),
+  );
 
   const picks: number[] = [];
   for (let i = 0; i < 500; i++) {
@@ -96,7 +112,12 @@ async function main(): Promise<void> {
   picks.sort((a, b) => a - b);
   Object.assign(window, {
     odscenBench: {
-      map, vehicles, nodes: columns.x.length, fetched: fetched - began, ready: ready - fetched, results,
+      map,
+      vehicles,
+      nodes: columns.x.length,
+      fetched: fetched - began,
+      ready: ready - fetched,
+      results,
       pick: { median: nth(picks, 250), worst: nth(picks, 499) },
     },
   });

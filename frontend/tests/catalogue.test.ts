@@ -19,15 +19,28 @@ test("maps are found by all words and sorted by name as people count", () => {
 
 test("an address leads back to the same view, whatever the name", () => {
   for (const name of ["plain", "a/b #1 ü %", "100%"]) {
-    expect(parseAddress(hashOf({ view: "editor", scenario: name }))).toEqual({ view: "editor", scenario: name });
-    expect(parseAddress(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({ view: "run", scenario: name, run: "r1" });
+    expect(parseAddress(hashOf({ view: "editor", scenario: name }))).toEqual({
+      view: "editor",
+      scenario: name,
+    });
+    expect(parseAddress(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({
+      view: "run",
+      scenario: name,
+      run: "r1",
+    });
   }
   expect(parseAddress("#/nonsense")).toEqual({ view: "catalogue" });
 });
 
 test("figures are said as people say them", () => {
-  expect(mapFacts(mapInfo("x", 1).statistics)).toEqual(
-    ["1.2 km × 800 m", "33 km of lanes", "1 junction", "1 crosswalk", "0 traffic lights", "limit 50 km/h"]);
+  expect(mapFacts(mapInfo("x", 1).statistics)).toEqual([
+    "1.2 km × 800 m",
+    "33 km of lanes",
+    "1 junction",
+    "1 crosswalk",
+    "0 traffic lights",
+    "limit 50 km/h",
+  ]);
   expect(clock(75.04)).toBe("1:15.0");
   expect(length(950)).toBe("950 m");
   expect(modelWord("vehicle.tesla.model3")).toBe("Tesla Model3");
@@ -37,7 +50,8 @@ test("only maps that have all that is wished for are shown", () => {
   const [left, lit] = [mapInfo("left", 2), mapInfo("lit", 0)];
   left.statistics.rule = "LHT";
   lit.statistics.traffic_lights = 4;
-  const names = (...wishes: Wish[]): string[] => arranged([left, lit], "", "name", wishes).map((one) => one.name);
+  const names = (...wishes: Wish[]): string[] =>
+    arranged([left, lit], "", "name", wishes).map((one) => one.name);
   expect(names()).toEqual(["left", "lit"]);
   expect(names("left")).toEqual(["left"]);
   expect(names("lights", "crosswalks")).toEqual(["lit"]);
@@ -48,7 +62,13 @@ test("only maps that have all that is wished for are shown", () => {
 test("a conversion report says the same of many places once, what was lost first", () => {
   const entry = (fate: Entry["fate"], element: string, reason: string): Entry => ({ fate, element, reason });
   const report = {
-    counts: {}, figures: { driving_road_length: 300, driving_road_covered: 299.9, driving_junction_length: 100, driving_junction_covered: 100 },
+    counts: {},
+    figures: {
+      driving_road_length: 300,
+      driving_road_covered: 299.9,
+      driving_junction_length: 100,
+      driving_junction_covered: 100,
+    },
     entries: [
       entry("kept", "road 1 > object 3", "crosswalk, as a crossing of its place and width"),
       entry("lost", "road 1", "lanes of type shoulder are open to nobody and left out"),
@@ -57,10 +77,22 @@ test("a conversion report says the same of many places once, what was lost first
     ],
   };
   expect(grouped(report)).toEqual([
-    { outcome: "lost", title: "Could not be used", findings: [
-      { text: "Lanes of the kind “shoulder” are not driven on and are left out", places: ["road 1", "road 2"] },
-      { text: "The simulation knows no such thing", places: ["road 9"] }] },
-    { outcome: "kept", title: "Imported unchanged", findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }] },
+    {
+      outcome: "lost",
+      title: "Could not be used",
+      findings: [
+        {
+          text: "Lanes of the kind “shoulder” are not driven on and are left out",
+          places: ["road 1", "road 2"],
+        },
+        { text: "The simulation knows no such thing", places: ["road 9"] },
+      ],
+    },
+    {
+      outcome: "kept",
+      title: "Imported unchanged",
+      findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }],
+    },
   ]);
   expect(coverage(report)).toEqual({ driving: 99, walking: null });
 });

@@ -1,7 +1,16 @@
 import { afterEach, expect, test, vi } from "vitest";
 
 import type { Edit, ScenarioDocument, ScenarioState } from "../src/api/types";
-import { boundsOfProblem, inFrame, nearestOne, ofProblem, sceneActors, sceneFlows, segmentStyles, wrongOnes } from "../src/editor/scene";
+import {
+  boundsOfProblem,
+  inFrame,
+  nearestOne,
+  ofProblem,
+  sceneActors,
+  sceneFlows,
+  segmentStyles,
+  wrongOnes,
+} from "../src/editor/scene";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
 import { Starts } from "../src/editor/placing";
@@ -11,7 +20,11 @@ import { actor, flow, graph, place, problem, scenario } from "./example";
 
 test("the first segment is dark blue, the rest of the region blue, what can be added light blue", () => {
   const styles = segmentStyles(graph, ["b", "a"], ["c"], true);
-  expect([...styles].sort()).toEqual([[0, "member"], [1, "base"], [2, "eligible"]]);
+  expect([...styles].sort()).toEqual([
+    [0, "member"],
+    [1, "base"],
+    [2, "eligible"],
+  ]);
 });
 
 test("before the first segment nothing is highlighted, though all may be chosen", () => {
@@ -35,7 +48,9 @@ test("a road user is drawn to the left of its lane by its offset, and red when i
 test("a flow is drawn at its start, with its volume per hour", () => {
   const document = scenario([], ["a"], [flow("f", "1.0.-1.1")]);
   const wrong = wrongOnes([problem("flows[0].spawn")], document);
-  expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([{ id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true }]);
+  expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([
+    { id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true },
+  ]);
 });
 
 test("a problem leads to its road user or flow and to its place on the map", () => {
@@ -48,7 +63,13 @@ test("a problem leads to its road user or flow and to its place on the map", () 
 });
 
 test("a road user is picked within reach or on its body, several in a rectangle", () => {
-  const actors = sceneActors(graph, scenario([actor("a"), actor("b", "1.0.-1.2")]), null, new Set(), new Set());
+  const actors = sceneActors(
+    graph,
+    scenario([actor("a"), actor("b", "1.0.-1.2")]),
+    null,
+    new Set(),
+    new Set(),
+  );
   expect(nearestOne(actors, 1.9, 0.5, 0.1)?.id).toBe("a");
   expect(nearestOne(actors, 0, 3, 0.1)).toBeNull();
   expect(inFrame(actors, [3, -1, 5, 1])).toEqual(["b"]);
@@ -66,7 +87,9 @@ test("only free and usable places of the region are offered, of the right kind",
 });
 
 test("a road user that cannot start somewhere comes with the reason", () => {
-  expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain("No bicycle may start here");
+  expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain(
+    "No bicycle may start here",
+  );
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
   expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");
   expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("yellow");
@@ -82,7 +105,10 @@ test("a start moves along its lane past those who stand there, and not out of th
 test("copies keep their distances, no two on one place", () => {
   const ones = [actor("a"), { ...actor("p", "ped.1.0.3.0"), category: "pedestrian" as const }];
   const to = place("1.0.-1.1");
-  expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([["a", "1.0.-1.1"], ["p", "ped.1.0.3.1"]]);
+  expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([
+    ["a", "1.0.-1.1"],
+    ["p", "ped.1.0.3.1"],
+  ]);
 });
 
 test("a place is described in words", () => {
@@ -98,7 +124,13 @@ test("of a long table only what is in sight is drawn", () => {
 });
 
 const state = (version: number, ...ids: string[]): ScenarioState => ({
-  name: "s", version, document: scenario(ids.map((id) => actor(id))), problems: [], label: "", undo: null, redo: null,
+  name: "s",
+  version,
+  document: scenario(ids.map((id) => actor(id))),
+  problems: [],
+  label: "",
+  undo: null,
+  redo: null,
 });
 
 function answers(...list: [number, unknown][]): { url: string; body: unknown }[] {
@@ -129,14 +161,20 @@ test("a refusal is reported and changes nothing", async () => {
   const store = createEditorStore("s");
   await store.getState().load();
   expect(await store.getState().edit(add)).toBeNull();
-  expect(store.getState()).toMatchObject({ refusal: { message: "the node is taken", again: null }, saving: "saved" });
+  expect(store.getState()).toMatchObject({
+    refusal: { message: "the node is taken", again: null },
+    saving: "saved",
+  });
   expect(store.getState().scenario?.version).toBe(1);
 });
 
 test("what another tab has done is loaded; one's own change can be made again on top", async () => {
   const asked = answers(
-    [200, state(1)], [409, { error: { kind: "Conflict", message: "newer", current: 5 } }], [200, state(5, "x")],
-    [200, state(6, "x", "y")]);
+    [200, state(1)],
+    [409, { error: { kind: "Conflict", message: "newer", current: 5 } }],
+    [200, state(5, "x")],
+    [200, state(6, "x", "y")],
+  );
   const store = createEditorStore("s");
   await store.getState().load();
   await store.getState().edit(add);
@@ -150,8 +188,19 @@ test("several edits go out as one", async () => {
   const asked = answers([200, state(1)], [200, state(2)]);
   const store = createEditorStore("s");
   await store.getState().load();
-  await store.getState().edit([{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }], "Add 2 segments");
+  await store.getState().edit(
+    [
+      { kind: "grow_roi", segment: "b" },
+      { kind: "grow_roi", segment: "c" },
+    ],
+    "Add 2 segments",
+  );
   expect(asked[1]?.body).toEqual({
-    version: 1, label: "Add 2 segments", edits: [{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }],
+    version: 1,
+    label: "Add 2 segments",
+    edits: [
+      { kind: "grow_roi", segment: "b" },
+      { kind: "grow_roi", segment: "c" },
+    ],
   });
 });

@@ -13,7 +13,11 @@ afterEach(() => {
 
 /** Shows a part of the page to a user; the answer shows another state of it in its place. */
 export function show(part: ReactNode): { user: UserEvent; again: (part: ReactNode) => void } {
-  const whole = (inner: ReactNode) => <MantineProvider theme={theme} env="test">{inner}</MantineProvider>;
+  const whole = (inner: ReactNode) => (
+    <MantineProvider theme={theme} env="test">
+      {inner}
+    </MantineProvider>
+  );
   const { rerender } = render(whole(part));
   return { user: userEvent.setup(), again: (next) => rerender(whole(next)) };
 }
@@ -39,14 +43,20 @@ export function server(answers: Record<string, unknown>): { path: string; body: 
     asked.push({ path, body: typeof init?.body === "string" ? JSON.parse(init.body) : init?.body });
     const found = Object.keys(answers).find((key) => path.includes(key));
     const answer = found === undefined ? undefined : answers[found];
-    return Promise.resolve(answer === undefined
-      ? new Response(JSON.stringify({ error: { kind: "NotFound", message: `nothing at ${path}` } }), { status: 404 })
-      : new Response(JSON.stringify(answer)));
+    return Promise.resolve(
+      answer === undefined
+        ? new Response(JSON.stringify({ error: { kind: "NotFound", message: `nothing at ${path}` } }), {
+            status: 404,
+          })
+        : new Response(JSON.stringify(answer)),
+    );
   });
   return asked;
 }
 
 /** The texts of the cells of each row of a table, below its head. */
 export const rowsOf = (table: HTMLElement): string[][] =>
-  within(table).getAllByRole("row").slice(1)
+  within(table)
+    .getAllByRole("row")
+    .slice(1)
     .map((row) => [...row.children].map((cell) => cell.textContent ?? ""));

@@ -71,7 +71,10 @@ test("the moment is the last one that is not later", () => {
 const crash: Incident = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
 
 test("incidents are reported in words and marked from when they happen", () => {
-  const categories = new Map([["car-1", "car"], ["x7", "bicycle"]] as const);
+  const categories = new Map([
+    ["car-1", "car"],
+    ["x7", "bicycle"],
+  ] as const);
   expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
   expect(marksAt([crash], 2.9)).toEqual([]);
   expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
@@ -80,12 +83,23 @@ test("incidents are reported in words and marked from when they happen", () => {
 });
 
 test("two runs are compared figure by figure", () => {
-  const before = summary({ sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } }, { arrived: 5, collided: 0 });
-  const now = summary({ sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } }, { arrived: 3, collided: 1 });
-  const found = Object.fromEntries(compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]));
+  const before = summary(
+    { sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } },
+    { arrived: 5, collided: 0 },
+  );
+  const now = summary(
+    { sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } },
+    { arrived: 3, collided: 1 },
+  );
+  const found = Object.fromEntries(
+    compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]),
+  );
   expect(found).toEqual({
-    "Simulated time": ["same", null], "Arrived": ["−2", false], "In collisions": ["+1", false],
-    "Mean speed": ["+1.8 km/h", true], "Mean delay": ["–", null],
+    "Simulated time": ["same", null],
+    Arrived: ["−2", false],
+    "In collisions": ["+1", false],
+    "Mean speed": ["+1.8 km/h", true],
+    "Mean delay": ["–", null],
   });
 });
 
@@ -101,5 +115,8 @@ test("a long table is thinned evenly with its end kept", () => {
 });
 
 test("the list of a scenario's runs has an address", () => {
-  expect(parseAddress(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
+  expect(parseAddress(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({
+    view: "runs",
+    scenario: "a/b ü",
+  });
 });

@@ -19,8 +19,13 @@ export function CameraPanel({ run, over }: { run: string; over: boolean }) {
   if (over && state === "waiting") return null;
   return (
     <figure className="camera">
-      <img src={carla.cameraUrl(run)} alt="The run in CARLA, seen from above" data-state={shown}
-        onLoad={() => setState("moving")} onError={() => setState("ended")} />
+      <img
+        src={carla.cameraUrl(run)}
+        alt="The run in CARLA, seen from above"
+        data-state={shown}
+        onLoad={() => setState("moving")}
+        onError={() => setState("ended")}
+      />
       <figcaption>{WORD[shown]}</figcaption>
     </figure>
   );

@@ -11,11 +11,25 @@ export function useCarla(): CarlaInfo | null {
     let timer = 0;
     let current = true;
     const look = (): void => {
-      carla.info().then((found) => { if (current) setInfo(found); }, () => { if (current) setInfo(null); })
-        .finally(() => { if (current) timer = window.setTimeout(look, PAUSE); });
+      carla
+        .info()
+        .then(
+          (found) => {
+            if (current) setInfo(found);
+          },
+          () => {
+            if (current) setInfo(null);
+          },
+        )
+        .finally(() => {
+          if (current) timer = window.setTimeout(look, PAUSE);
+        });
     };
     look();
-    return () => { current = false; window.clearTimeout(timer); };
+    return () => {
+      current = false;
+      window.clearTimeout(timer);
+    };
   }, []);
   return info;
 }

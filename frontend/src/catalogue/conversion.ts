@@ -21,13 +21,25 @@ const TITLES: [outcome: ElementOutcome, title: string][] = [
 
 /** The commonest findings in plain sentences. */
 const PLAIN: [RegExp, string][] = [
-  [/of a connecting road have no SUMO lane: nothing leads there/, "Short pieces of lanes inside junctions are left out, as no lane leads there"],
+  [
+    /of a connecting road have no SUMO lane: nothing leads there/,
+    "Short pieces of lanes inside junctions are left out, as no lane leads there",
+  ],
   [/have no SUMO lane: nothing leads there/, "Short pieces of lanes are left out, as no lane leads there"],
-  [/lanes of type (\w+) are open to no(?:body| road user) and left out/, "Lanes of the kind “$1” are not driven on and are left out"],
-  [/every crossing of a junction with lights has a light/, "Every crosswalk of a junction with traffic lights got a light for pedestrians"],
+  [
+    /lanes of type (\w+) are open to no(?:body| road user) and left out/,
+    "Lanes of the kind “$1” are not driven on and are left out",
+  ],
+  [
+    /every crossing of a junction with lights has a light/,
+    "Every crosswalk of a junction with traffic lights got a light for pedestrians",
+  ],
   [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
-  [/traffic lights? have programs of odscen's own/, "The map does not say when its lights turn green: they got a timing of their own, "
-    + "in which no two conflicting connections have green at the same time"],
+  [
+    /traffic lights? have programs of odscen's own/,
+    "The map does not say when its lights turn green: they got a timing of their own, " +
+      "in which no two conflicting connections have green at the same time",
+  ],
   [/^crosswalk, as a crossing/, "Crosswalks, with place and width"],
   [/^yield, as right of way/, "Signs to give way"],
   [/^traffic light, as right of way/, "Traffic lights"],

@@ -10,6 +10,8 @@ const STEPS: [said: string, words: string][] = [
 export function stepWords(step: string): string {
   const [, name, said = step] = /^(?:([^:]+): )?(.*)$/.exec(step) ?? [];
   const known = STEPS.find(([key]) => key === said);
-  const words = known ? `step ${STEPS.indexOf(known) + 1} of ${STEPS.length}: ${known[1]}` : said.replaceAll("SUMO", "simulation");
+  const words = known
+    ? `step ${STEPS.indexOf(known) + 1} of ${STEPS.length}: ${known[1]}`
+    : said.replaceAll("SUMO", "simulation");
   return name ? `${name}, ${words}` : words.charAt(0).toUpperCase() + words.slice(1);
 }

@@ -50,60 +50,138 @@ export function ActorStep(props: Props) {
       <div className="palette" role="group" aria-label="Kind of road user to place">
         {CATEGORIES.map((category) => (
           <ToolButton key={category} of={placeTool(category)} tool={tool} onTool={onTool}>
-            <CategoryGlyph category={category} size={32} />{CATEGORY_WORD[category]}
+            <CategoryGlyph category={category} size={32} />
+            {CATEGORY_WORD[category]}
           </ToolButton>
         ))}
       </div>
       <div className="palette flows" role="group" aria-label="Flow to place">
         {[false, true].map((walks) => (
           <ToolButton key={String(walks)} of={flowTool(walks)} tool={tool} onTool={onTool}>
-            <IconFlow size={22} />{flowWord(walks)}
+            <IconFlow size={22} />
+            {flowWord(walks)}
           </ToolButton>
         ))}
       </div>
       <ToolHint tool={tool} onPlaceSomewhere={props.onPlaceSomewhere} />
       {selected.length > 0 && (
-        <Stack gap="sm" component="section" aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}>
+        <Stack
+          gap="sm"
+          component="section"
+          aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}
+        >
           <Group gap={8} wrap="nowrap">
-            {one && (isFlow(one) ? <IconFlow size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
+            {one &&
+              (isFlow(one) ? <IconFlow size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
             <Text fw={700}>{one ? one.id : `${selected.length} selected`}</Text>
           </Group>
           <Group gap={6}>
-            {actors.length > 0 && <Button size="compact-sm" variant="default" onClick={() => onTool(copyTool(actors.map((each) => each.id)))}>Copy</Button>}
-            <Button size="compact-sm" variant="default" onClick={() => onTool(moveTool(selected.map((each) => each.id)))}>Move</Button>
-            <Button size="compact-sm" color="red" variant="light" leftSection={<IconTrash size={15} />} onClick={props.onRemove}>Remove</Button>
-            <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>Clear selection</Button>
+            {actors.length > 0 && (
+              <Button
+                size="compact-sm"
+                variant="default"
+                onClick={() => onTool(copyTool(actors.map((each) => each.id)))}
+              >
+                Copy
+              </Button>
+            )}
+            <Button
+              size="compact-sm"
+              variant="default"
+              onClick={() => onTool(moveTool(selected.map((each) => each.id)))}
+            >
+              Move
+            </Button>
+            <Button
+              size="compact-sm"
+              color="red"
+              variant="light"
+              leftSection={<IconTrash size={15} />}
+              onClick={props.onRemove}
+            >
+              Remove
+            </Button>
+            <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>
+              Clear selection
+            </Button>
           </Group>
-          {one && <StartAndGoal one={one} graph={graph} starts={starts} goals={goals} onShowGoals={props.onShowGoals}
-            onStart={(spawn) => props.onStart(one, spawn)} onGoal={(goal) => props.onGoal(one, goal)} />}
-          {one && (isFlow(one)
-            ? <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
-            : <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />)}
-          {!one && actors.length > 0 && <ManyForm actors={actors} onChange={(fields, what) => onEdit(
-            actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })), `${what} of ${actors.length} road users`)} />}
+          {one && (
+            <StartAndGoal
+              one={one}
+              graph={graph}
+              starts={starts}
+              goals={goals}
+              onShowGoals={props.onShowGoals}
+              onStart={(spawn) => props.onStart(one, spawn)}
+              onGoal={(goal) => props.onGoal(one, goal)}
+            />
+          )}
+          {one &&
+            (isFlow(one) ? (
+              <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
+            ) : (
+              <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />
+            ))}
+          {!one && actors.length > 0 && (
+            <ManyForm
+              actors={actors}
+              onChange={(fields, what) =>
+                onEdit(
+                  actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })),
+                  `${what} of ${actors.length} road users`,
+                )
+              }
+            />
+          )}
         </Stack>
       )}
-      <Button variant="subtle" size="compact-sm" justify="flex-start" aria-expanded={filling} onClick={() => setFilling(!filling)}>
+      <Button
+        variant="subtle"
+        size="compact-sm"
+        justify="flex-start"
+        aria-expanded={filling}
+        onClick={() => setFilling(!filling)}
+      >
         {filling ? "Hide random fill" : "Fill the region at random"}
       </Button>
-      <Collapse in={filling}>{filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}</Collapse>
+      <Collapse in={filling}>
+        {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}
+      </Collapse>
     </>
   );
 }
 
 /** Takes a tool into the hand, or puts it back. */
-function ToolButton({ of, tool, onTool, children }: {
-  of: Tool; tool: Tool | null; onTool: (tool: Tool | null) => void; children: ReactNode;
+function ToolButton({
+  of,
+  tool,
+  onTool,
+  children,
+}: {
+  of: Tool;
+  tool: Tool | null;
+  onTool: (tool: Tool | null) => void;
+  children: ReactNode;
 }) {
   const on = tool?.key === of.key;
-  return <button type="button" aria-pressed={on} onClick={() => onTool(on ? null : of)}>{children}</button>;
+  return (
+    <button type="button" aria-pressed={on} onClick={() => onTool(on ? null : of)}>
+      {children}
+    </button>
+  );
 }
 
 function ToolHint({ tool, onPlaceSomewhere }: { tool: Tool | null; onPlaceSomewhere: () => void }) {
   return (
     <>
-      <Text size="sm" c="dimmed" aria-live="polite">{tool ? tool.help : "Choose a kind, then click on the map to place it."}</Text>
-      {tool && <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>Use the next free point</Button>}
+      <Text size="sm" c="dimmed" aria-live="polite">
+        {tool ? tool.help : "Choose a kind, then click on the map to place it."}
+      </Text>
+      {tool && (
+        <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>
+          Use the next free point
+        </Button>
+      )}
     </>
   );
 }

@@ -20,8 +20,16 @@ import { firstVisit, Tour, tourSeen } from "./Tour";
 import { useEditing } from "./useEditing";
 
 /** The editor of one scenario: its steps, its map and its table, and the keys that hold in all of them. */
-export function Editor({ store, drawing, loaded, assets }: {
-  store: EditorStore; drawing: PackedDrawing; loaded: LoadedGraph; assets: Assets | null;
+export function Editor({
+  store,
+  drawing,
+  loaded,
+  assets,
+}: {
+  store: EditorStore;
+  drawing: PackedDrawing;
+  loaded: LoadedGraph;
+  assets: Assets | null;
 }) {
   const now = useEditing(store, loaded, assets);
   const { undo, redo } = store();
@@ -46,7 +54,9 @@ export function Editor({ store, drawing, loaded, assets }: {
       const ids = ones.filter((one) => !isFlow(one) && selection.includes(one.id)).map(({ id }) => id);
       if (ids.length > 0) arm(copyTool(ids));
     },
-    move: () => { if (selection.length > 0) arm(moveTool(selection)); },
+    move: () => {
+      if (selection.length > 0) arm(moveTool(selection));
+    },
     selectAll: () => {
       now.openActors();
       select(ones.map(({ id }) => id));
@@ -63,7 +73,9 @@ export function Editor({ store, drawing, loaded, assets }: {
         <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
         <Problems problems={now.problems} onShow={now.showProblem} />
       </div>
-      <Stage now={now} drawing={drawing}>{tour && <Tour onClose={closeTour} />}</Stage>
+      <Stage now={now} drawing={drawing}>
+        {tour && <Tour onClose={closeTour} />}
+      </Stage>
       <RefusalAlert store={store} />
       <HelpSheet open={help} onClose={() => setHelp(false)} />
     </div>

@@ -20,7 +20,10 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   const assets = useLoaded(api.assets);
 
   useEffect(() => {
-    store.getState().load().catch((error: unknown) => setFailure(reasonOf(error)));
+    store
+      .getState()
+      .load()
+      .catch((error: unknown) => setFailure(reasonOf(error)));
   }, [store]);
   useEffect(() => {
     if (!map) return;
@@ -32,14 +35,23 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   if (failure) {
     return (
       <div className="catalogue">
-        <Title order={1} size="h3" mb="md">“{name}” cannot be opened</Title>
+        <Title order={1} size="h3" mb="md">
+          “{name}” cannot be opened
+        </Title>
         <Alert color="red">{failure}</Alert>
-        <Button mt="md" onClick={() => go({ view: "catalogue" })}>Back to the maps</Button>
+        <Button mt="md" onClick={() => go({ view: "catalogue" })}>
+          Back to the maps
+        </Button>
       </div>
     );
   }
   if (!drawing || !loaded || !map) {
-    return <div className="empty"><Loader aria-label="Opening the scenario" /><Text mt="sm">Opening {name} …</Text></div>;
+    return (
+      <div className="empty">
+        <Loader aria-label="Opening the scenario" />
+        <Text mt="sm">Opening {name} …</Text>
+      </div>
+    );
   }
   return <Editor store={store} drawing={drawing} loaded={loaded} assets={assets.value} />;
 }

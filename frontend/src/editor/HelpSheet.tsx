@@ -15,13 +15,25 @@ export function HelpSheet({ open, onClose }: { open: boolean; onClose: () => voi
         <Tabs.Panel value="keys">
           <Table aria-label="Keyboard shortcuts">
             <Table.Tbody>
-              {SHORTCUTS.map(([key, what]) => <Table.Tr key={key}><Table.Td><kbd>{key}</kbd></Table.Td><Table.Td>{what}</Table.Td></Table.Tr>)}
+              {SHORTCUTS.map(([key, what]) => (
+                <Table.Tr key={key}>
+                  <Table.Td>
+                    <kbd>{key}</kbd>
+                  </Table.Td>
+                  <Table.Td>{what}</Table.Td>
+                </Table.Tr>
+              ))}
             </Table.Tbody>
           </Table>
         </Tabs.Panel>
         <Tabs.Panel value="terms">
           <dl className="terms" aria-label="Glossary">
-            {TERMS.map(([term, meaning]) => <div key={term}><dt>{term}</dt><dd>{meaning}</dd></div>)}
+            {TERMS.map(([term, meaning]) => (
+              <div key={term}>
+                <dt>{term}</dt>
+                <dd>{meaning}</dd>
+              </div>
+            ))}
           </dl>
         </Tabs.Panel>
       </Tabs>

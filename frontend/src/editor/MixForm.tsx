@@ -9,7 +9,11 @@ import { mixWords } from "./demand";
 const VEHICLES = CATEGORIES.filter((category) => category !== "pedestrian");
 
 /** Shares of the kinds of road users; at least one stays. */
-export function MixForm({ mix, pedestrians = false, onChange }: {
+export function MixForm({
+  mix,
+  pedestrians = false,
+  onChange,
+}: {
   mix: Mix;
   /** Whether pedestrians can be among them. */
   pedestrians?: boolean;
@@ -24,10 +28,20 @@ export function MixForm({ mix, pedestrians = false, onChange }: {
     <fieldset className="mix">
       <legend>Mix of road users</legend>
       {(pedestrians ? CATEGORIES : VEHICLES).map((category) => (
-        <Committed key={category} label={CATEGORY_WORD[category]} suffix="" min={0} max={1000} digits={2} value={mix[category] ?? 0}
-          onCommit={(share) => setShare(category, share ?? 0)} />
+        <Committed
+          key={category}
+          label={CATEGORY_WORD[category]}
+          suffix=""
+          min={0}
+          max={1000}
+          digits={2}
+          value={mix[category] ?? 0}
+          onCommit={(share) => setShare(category, share ?? 0)}
+        />
       ))}
-      <Text size="xs" c="dimmed">{mixWords(mix)}</Text>
+      <Text size="xs" c="dimmed">
+        {mixWords(mix)}
+      </Text>
     </fieldset>
   );
 }

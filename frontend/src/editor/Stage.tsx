@@ -10,7 +10,15 @@ import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
 
 /** The map, and below it the table of all road users; choosing in one is choosing in the other. */
-export function Stage({ now, drawing, children }: { now: EditorNow; drawing: PackedDrawing; children: ReactNode }) {
+export function Stage({
+  now,
+  drawing,
+  children,
+}: {
+  now: EditorNow;
+  drawing: PackedDrawing;
+  children: ReactNode;
+}) {
   const { graph, picker, document, step, handler, hover, setHover, ones, selection, changes, sights } = now;
   const carried = useRef<Carrier | null>(null);
   const scene = useScene(now);
@@ -19,8 +27,13 @@ export function Stage({ now, drawing, children }: { now: EditorNow; drawing: Pac
     <div className="stage">
       <div className="stage-map">
         <MapCanvas
-          drawing={drawing} graph={graph} picker={picker} scene={scene} handle={now.handle}
-          label={`Map ${document.map.name}`} aim={handler.aim}
+          drawing={drawing}
+          graph={graph}
+          picker={picker}
+          scene={scene}
+          handle={now.handle}
+          label={`Map ${document.map.name}`}
+          aim={handler.aim}
           onPick={handler.pick}
           onPoint={(at) => setHover(at && (carried.current ?? handler).under(at))}
           onGrab={(at) => {
@@ -34,20 +47,32 @@ export function Stage({ now, drawing, children }: { now: EditorNow; drawing: Pac
           }}
           onFrame={handler.frame}
         >
-          {hint && <div className="map-hint" role="status">{hint}</div>}
+          {hint && (
+            <div className="map-hint" role="status">
+              {hint}
+            </div>
+          )}
           <Legend step={step} />
         </MapCanvas>
         {children}
       </div>
       {ones.length > 0 && (step === "actors" || step === "run") && (
-        <RoadUserTable ones={ones} graph={graph} selection={selection} onRemove={changes.remove}
-          onSelectAll={(ids) => { now.openActors(); now.select(ids); }}
+        <RoadUserTable
+          ones={ones}
+          graph={graph}
+          selection={selection}
+          onRemove={changes.remove}
+          onSelectAll={(ids) => {
+            now.openActors();
+            now.select(ids);
+          }}
           onSelect={(id, more) => {
             now.openActors();
             choose(now, id, more);
             const one = ones.find((each) => each.id === id);
             if (one) sights.start(one);
-          }} />
+          }}
+        />
       )}
     </div>
   );

@@ -24,21 +24,49 @@ export function WholeDay({ store, onDone }: { store: EditorStore; onDone: () => 
       const made = await demand.day(name, version, day, trips);
       const load = Math.round((100 * made.volume) / made.capacity);
       const peak = Math.round(made.peak_trips).toLocaleString("en");
-      tell(`${count(Math.round(made.trips), "trip")}, ${peak} in the peak hour. ` +
-        `The busiest approach of a junction then reaches ${load} % of its capacity.` +
-        (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : ""));
+      tell(
+        `${count(Math.round(made.trips), "trip")}, ${peak} in the peak hour. ` +
+          `The busiest approach of a junction then reaches ${load} % of its capacity.` +
+          (made.trips < trips ? " More trips would have exceeded the capacity of the junctions." : ""),
+      );
       return made.scenario;
-    }).then(onDone, (error: unknown) => setFailure(reasonOf(error))).finally(() => setBusy(false));
+    })
+      .then(onDone, (error: unknown) => setFailure(reasonOf(error)))
+      .finally(() => setBusy(false));
   };
   return (
     <div className="fold">
-      <Text size="sm">24 hours from midnight: trips with random starts and goals, fewer through busy junctions. The region becomes the whole map. Undo restores the scenario.</Text>
-      <SegmentedControl fullWidth data={Object.entries(DAYS).map(([value, label]) => ({ value, label }))} value={day} aria-label="Kind of day"
-        onChange={(value) => { if (isKey(DAYS, value)) setDay(value); }} />
-      <NumberInput label="Trips per day, at most" min={1} max={1e6} step={1000} thousandSeparator="," allowDecimal={false} value={trips}
-        onChange={(value) => setTrips(Number(value) || 1)} />
-      {failure && <Alert color="red" title="The day could not be generated">{failure}</Alert>}
-      <Button variant="light" loading={busy} onClick={make}>Generate the day</Button>
+      <Text size="sm">
+        24 hours from midnight: trips with random starts and goals, fewer through busy junctions. The region
+        becomes the whole map. Undo restores the scenario.
+      </Text>
+      <SegmentedControl
+        fullWidth
+        data={Object.entries(DAYS).map(([value, label]) => ({ value, label }))}
+        value={day}
+        aria-label="Kind of day"
+        onChange={(value) => {
+          if (isKey(DAYS, value)) setDay(value);
+        }}
+      />
+      <NumberInput
+        label="Trips per day, at most"
+        min={1}
+        max={1e6}
+        step={1000}
+        thousandSeparator=","
+        allowDecimal={false}
+        value={trips}
+        onChange={(value) => setTrips(Number(value) || 1)}
+      />
+      {failure && (
+        <Alert color="red" title="The day could not be generated">
+          {failure}
+        </Alert>
+      )}
+      <Button variant="light" loading={busy} onClick={make}>
+        Generate the day
+      </Button>
     </div>
   );
 }

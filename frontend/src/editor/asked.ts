@@ -19,8 +19,12 @@ export function useRegion(name: string, roiKey: string): Region {
   const [{ roi, key }, setAnswer] = useState<{ roi: Roi; key: string | null }>({ roi: NO_ROI, key: null });
   useEffect(() => {
     let current = true;
-    api.roi(name).then((found) => { if (current) setAnswer({ roi: found, key: roiKey }); }, tellError);
-    return () => { current = false; };
+    api.roi(name).then((found) => {
+      if (current) setAnswer({ roi: found, key: roiKey });
+    }, tellError);
+    return () => {
+      current = false;
+    };
   }, [name, roiKey]);
   return useMemo(() => ({ ...roi, current: key === roiKey }), [roi, key, roiKey]);
 }
@@ -43,17 +47,30 @@ export function useGoals(name: string, one: Actor | Flow | null, roiKey: string,
     if (spawn === null) return;
     let current = true;
     api.goals(name, spawn).then(
-      (found) => { if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? [])); },
-      () => { if (current) setGoals([]); },
+      (found) => {
+        if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? []));
+      },
+      () => {
+        if (current) setGoals([]);
+      },
     );
-    return () => { current = false; };
+    return () => {
+      current = false;
+    };
   }, [name, spawn, roiKey, graph]);
   useEffect(() => {
     setRoute([]);
     if (spawn === null || goal === null) return;
     let current = true;
-    api.path(name, spawn, goal).then((found) => { if (current) setRoute(found.points); }, () => undefined);
-    return () => { current = false; };
+    api.path(name, spawn, goal).then(
+      (found) => {
+        if (current) setRoute(found.points);
+      },
+      () => undefined,
+    );
+    return () => {
+      current = false;
+    };
   }, [name, spawn, goal, roiKey]);
   return { goals, route };
 }
@@ -67,7 +84,10 @@ export function useStarter(name: string): { busy: boolean; start: (wish: RunWish
       setBusy(true);
       runs.start(wish).then(
         ({ run }) => go({ view: "run", scenario: name, run }),
-        (error: unknown) => { setBusy(false); tellError(error); },
+        (error: unknown) => {
+          setBusy(false);
+          tellError(error);
+        },
       );
     },
   };

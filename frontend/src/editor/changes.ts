@@ -21,12 +21,20 @@ export interface Changes {
 }
 
 /** What can be done to road users and flows, as edits that the server is asked for. */
-export function changesOf({ ones, starts, edit, say }: {
-  ones: readonly (Actor | Flow)[]; starts: Starts;
+export function changesOf({
+  ones,
+  starts,
+  edit,
+  say,
+}: {
+  ones: readonly (Actor | Flow)[];
+  starts: Starts;
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
   say: (text: string) => void;
 }): Changes {
-  const change = (asked: Edit | readonly Edit[], label?: string): void => { void edit(asked, label); };
+  const change = (asked: Edit | readonly Edit[], label?: string): void => {
+    void edit(asked, label);
+  };
   const among = (ids: readonly string[]): (Actor | Flow)[] => {
     const known = new Map(ones.map((one) => [one.id, one]));
     // In the order of the ids: the first leads.
@@ -35,14 +43,22 @@ export function changesOf({ ones, starts, edit, say }: {
   const shifted = (moved: readonly (Actor | Flow)[], to: Place): Moves => {
     const moves = starts.shifted(moved, to);
     const left = moved.length - moves.length;
-    if (left > 0) say(`${count(left, "road user")} found no free point there and ${left === 1 ? "was" : "were"} left out.`);
+    if (left > 0)
+      say(
+        `${count(left, "road user")} found no free point there and ${left === 1 ? "was" : "were"} left out.`,
+      );
     return moves;
   };
   return {
     change,
     place: (category, to) => change({ kind: "add_actor", category, spawn: to.id }),
     placeFlow: (walks, to) =>
-      change({ kind: "add_flow", spawn: to.id, per_hour: PER_HOUR, mix: walks ? { pedestrian: 1 } : { car: 1 } }),
+      change({
+        kind: "add_flow",
+        spawn: to.id,
+        per_hour: PER_HOUR,
+        mix: walks ? { pedestrian: 1 } : { car: 1 },
+      }),
     copy: (ids, to) => {
       const copied = among(ids);
       const moves = shifted(copied, to);
@@ -69,18 +85,21 @@ export function changesOf({ ones, starts, edit, say }: {
       if (edits.length > 0) change(edits, labelOf("Remove", gone, gone.length));
     },
     setStart: (one, spawn) => change(startOf(one, spawn)),
-    setGoal: (one, goal) => change(isFlow(one)
-      ? { kind: "change_flow", flow: one.id, goal } : { kind: "set_goal", actor: one.id, goal }),
+    setGoal: (one, goal) =>
+      change(
+        isFlow(one) ? { kind: "change_flow", flow: one.id, goal } : { kind: "set_goal", actor: one.id, goal },
+      ),
     fill: async (share, seed) => {
       const done = await edit({ kind: "fill_roi", share, seed });
-      if (done) say(`${count(done.document.actors.length, "road user")} placed. Undo restores the previous ones.`);
+      if (done)
+        say(`${count(done.document.actors.length, "road user")} placed. Undo restores the previous ones.`);
       return done !== null;
     },
   };
 }
 
-const startOf = (one: Actor | Flow, spawn: string): Edit => isFlow(one)
-  ? { kind: "change_flow", flow: one.id, spawn } : { kind: "move_actor", actor: one.id, spawn };
+const startOf = (one: Actor | Flow, spawn: string): Edit =>
+  isFlow(one) ? { kind: "change_flow", flow: one.id, spawn } : { kind: "move_actor", actor: one.id, spawn };
 
 /** What undo says of it: one by its name, several by their number. */
 const labelOf = (verb: string, ones: readonly (Actor | Flow)[], number: number): string =>

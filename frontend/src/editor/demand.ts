@@ -4,9 +4,39 @@ import { CATEGORY_WORD, count } from "../ui/words";
 
 /** Ways to give the amount of background traffic, with what to begin with. */
 export const AMOUNTS = [
-  { key: "fill", word: "Percent of the maximum density", unit: "Density", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
-  { key: "per_km", word: "Vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
-  { key: "trips", word: "Number of trips", unit: "Trips", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
+  {
+    key: "fill",
+    word: "Percent of the maximum density",
+    unit: "Density",
+    suffix: " %",
+    scale: 100,
+    min: 0.1,
+    max: 100,
+    digits: 1,
+    begin: 0.1,
+  },
+  {
+    key: "per_km",
+    word: "Vehicles per kilometre of lane",
+    unit: "Vehicles per kilometre",
+    suffix: "",
+    scale: 1,
+    min: 0.1,
+    max: 200,
+    digits: 1,
+    begin: 5,
+  },
+  {
+    key: "trips",
+    word: "Number of trips",
+    unit: "Trips",
+    suffix: "",
+    scale: 1,
+    min: 1,
+    max: 1e7,
+    digits: 0,
+    begin: 500,
+  },
 ] as const;
 export type Amount = (typeof AMOUNTS)[number];
 
@@ -17,7 +47,8 @@ export const amountOf = (one: Background): Amount =>
 export const bringsTraffic = ({ matrices, counts, background }: Demand): boolean =>
   matrices.length + counts.length + background.length > 0;
 
-export const tripsOf = (matrix: Matrix): number => matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
+export const tripsOf = (matrix: Matrix): number =>
+  matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
 
 /** What a scenario's traffic is, in a line. */
 export function trafficNote(demand: Demand): string {
@@ -43,7 +74,11 @@ export function mixWords(mix: Mix): string {
 
 /** A name that no part of the demand has yet. */
 export function freeName(demand: Demand, stem: string): string {
-  const taken = new Set([demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background].flat().map(({ id }) => id));
+  const taken = new Set(
+    [demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background]
+      .flat()
+      .map(({ id }) => id),
+  );
   for (let n = 1; ; n++) {
     const name = n === 1 ? stem : `${stem}-${n}`;
     if (!taken.has(name)) return name;

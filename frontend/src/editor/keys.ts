@@ -16,10 +16,16 @@ export interface KeyActions {
 /** Shortcuts that hold everywhere but in fields and dialogs. */
 export function useKeys(actions: KeyActions): void {
   const latest = useRef(actions);
-  useEffect(() => { latest.current = actions; });
+  useEffect(() => {
+    latest.current = actions;
+  });
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
-      if (event.target instanceof Element && event.target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
+      if (
+        event.target instanceof Element &&
+        event.target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")
+      )
+        return;
       const act = actionOf(event, latest.current);
       if (!act) return;
       act();
@@ -36,14 +42,20 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
     // With text marked on the page, Ctrl+C copies that text.
     const marked = !getSelection()?.isCollapsed;
     const named: Record<string, () => void> = {
-      z: event.shiftKey ? actions.redo : actions.undo, y: actions.redo, a: actions.selectAll,
+      z: event.shiftKey ? actions.redo : actions.undo,
+      y: actions.redo,
+      a: actions.selectAll,
       ...(marked ? {} : { c: actions.copy }),
     };
     return named[key] ?? null;
   }
   if (event.altKey) return null;
   const plain: Record<string, () => void> = {
-    delete: actions.remove, backspace: actions.remove, escape: actions.escape, "?": actions.sheet, m: actions.move,
+    delete: actions.remove,
+    backspace: actions.remove,
+    escape: actions.escape,
+    "?": actions.sheet,
+    m: actions.move,
   };
   if (/^[1-9]$/.test(key)) return () => actions.tool(Number(key) - 1);
   return plain[key] ?? null;

@@ -42,6 +42,14 @@ export function laneFacts(graph: Graph, id: string): string {
 }
 
 const KIND: Record<string, string> = {
-  driving: "Driving lane", biking: "Bicycle lane", bidirectional: "Lane for both directions",
-  entry: "Entry lane", exit: "Exit lane", onRamp: "On-ramp", offRamp: "Off-ramp", bus: "Bus lane", taxi: "Taxi lane", HOV: "Carpool lane",
+  driving: "Driving lane",
+  biking: "Bicycle lane",
+  bidirectional: "Lane for both directions",
+  entry: "Entry lane",
+  exit: "Exit lane",
+  onRamp: "On-ramp",
+  offRamp: "Off-ramp",
+  bus: "Bus lane",
+  taxi: "Taxi lane",
+  HOV: "Carpool lane",
 };

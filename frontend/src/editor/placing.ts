@@ -7,7 +7,10 @@ import type { Picker } from "../map/picking";
 export type Moves = readonly (readonly [id: string, spawn: string])[];
 
 export const isFlow = (one: Actor | Flow): one is Flow => "per_hour" in one;
-export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [...document.actors, ...document.flows];
+export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [
+  ...document.actors,
+  ...document.flows,
+];
 
 /** How far from a click a start may be found, metres, when the map is zoomed in. */
 const SNAP = 12;
@@ -17,8 +20,10 @@ export class Starts {
   private readonly taken: ReadonlySet<string>;
 
   constructor(
-    private readonly graph: Graph, private readonly picker: Picker,
-    private readonly inside: ReadonlySet<number>, document: ScenarioDocument,
+    private readonly graph: Graph,
+    private readonly picker: Picker,
+    private readonly inside: ReadonlySet<number>,
+    document: ScenarioDocument,
   ) {
     this.taken = new Set(everyone(document).map((one) => one.spawn));
   }
@@ -32,7 +37,10 @@ export class Starts {
   /** The free start nearest to a point; `reach` in metres is that of the pointer. */
   near(x: number, y: number, reach: number, walk: boolean, besides?: ReadonlySet<string>): Place | null {
     return this.picker.place(x, y, Math.max(3 * reach, SNAP), {
-      vehicles: !walk, walks: walk, inside: this.inside, allowed: (i, onFoot) => this.free(i, onFoot, besides),
+      vehicles: !walk,
+      walks: walk,
+      inside: this.inside,
+      allowed: (i, onFoot) => this.free(i, onFoot, besides),
     });
   }
 
@@ -41,10 +49,15 @@ export class Starts {
     const wide = Math.max(3 * reach, SNAP);
     const options = { vehicles: !walk, walks: walk };
     const allowed = (i: number, onFoot: boolean): boolean => this.graph.usable(i, onFoot);
-    if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed })) return `Every point here is occupied. Start the ${who} a little further away.`;
-    if (this.picker.place(x, y, wide, { ...options, inside: this.inside })) return `No ${who} may start here: the grey points cannot be used.`;
-    if (this.picker.place(x, y, wide, options)) return `That is outside the region. Start the ${who} inside it, or extend the region.`;
-    const where = walk ? "Pedestrians start on the yellow points beside the road." : "Vehicles start on the blue points of the lanes.";
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed }))
+      return `Every point here is occupied. Start the ${who} a little further away.`;
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside }))
+      return `No ${who} may start here: the grey points cannot be used.`;
+    if (this.picker.place(x, y, wide, options))
+      return `That is outside the region. Start the ${who} inside it, or extend the region.`;
+    const where = walk
+      ? "Pedestrians start on the yellow points beside the road."
+      : "Vehicles start on the blue points of the lanes.";
     return `No ${who} may start here. ${where}`;
   }
 
@@ -93,8 +106,10 @@ export class Starts {
     return ones.flatMap((one, n) => {
       const old = this.graph.place(one.spawn);
       if (!old) return [];
-      const place = n === 0 && old.walk === to.walk
-        ? to : this.near(old.x + to.x - lead.x, old.y + to.y - lead.y, 0, old.walk, used);
+      const place =
+        n === 0 && old.walk === to.walk
+          ? to
+          : this.near(old.x + to.x - lead.x, old.y + to.y - lead.y, 0, old.walk, used);
       if (!place || used.has(place.id)) return [];
       used.add(place.id);
       return [[one.id, place.id] as const];

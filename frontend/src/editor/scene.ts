@@ -8,7 +8,10 @@ export const STEPS: readonly Step[] = ["map", "region", "environment", "actors",
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(
-  graph: Graph, roi: readonly string[], candidates: readonly string[], growing: boolean,
+  graph: Graph,
+  roi: readonly string[],
+  candidates: readonly string[],
+  growing: boolean,
 ): Map<number, SegmentStyle> {
   const styles = new Map<number, SegmentStyle>();
   const put = (id: string, style: SegmentStyle): void => {
@@ -27,8 +30,9 @@ export function insideRows(graph: Graph, roi: readonly string[]): Set<number> {
 
 /** Length and width in metres: of the model, or what is usual for the kind. */
 export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets | null): [number, number] {
-  const found = assets?.blueprints.find((one) => one.id === actor.model)
-    ?? assets?.categories.find((one) => one.category === actor.category);
+  const found =
+    assets?.blueprints.find((one) => one.id === actor.model) ??
+    assets?.categories.find((one) => one.category === actor.category);
   return found ? [found.length, found.width] : [4, 1.8];
 }
 
@@ -41,47 +45,79 @@ export function ofProblem(problem: Problem, document: ScenarioDocument): Actor |
 
 /** Ids of those that cannot be run as they are. */
 export const wrongOnes = (problems: readonly Problem[], document: ScenarioDocument): Set<string> =>
-  new Set(problems.filter((one) => one.severity === "error")
-    .flatMap((one) => ofProblem(one, document)?.id ?? []));
+  new Set(
+    problems.filter((one) => one.severity === "error").flatMap((one) => ofProblem(one, document)?.id ?? []),
+  );
 
 export function sceneActors(
-  graph: Graph, document: ScenarioDocument, assets: Assets | null, selection: ReadonlySet<string>,
+  graph: Graph,
+  document: ScenarioDocument,
+  assets: Assets | null,
+  selection: ReadonlySet<string>,
   wrong: ReadonlySet<string>,
 ): SceneActor[] {
   return document.actors.flatMap((actor) => {
     const place = graph.place(actor.spawn);
     if (!place) return [];
     const [length, width] = bodyOf(actor, assets);
-    return [{
-      id: actor.id, category: actor.category, hdg: place.hdg, length, width, ego: actor.ego,
-      // The offset is to the left of the driving direction.
-      x: place.x - actor.lateral_offset * Math.sin(place.hdg),
-      y: place.y + actor.lateral_offset * Math.cos(place.hdg),
-      offset: actor.lateral_offset, selected: selection.has(actor.id), problem: wrong.has(actor.id),
-    }];
+    return [
+      {
+        id: actor.id,
+        category: actor.category,
+        hdg: place.hdg,
+        length,
+        width,
+        ego: actor.ego,
+        // The offset is to the left of the driving direction.
+        x: place.x - actor.lateral_offset * Math.sin(place.hdg),
+        y: place.y + actor.lateral_offset * Math.cos(place.hdg),
+        offset: actor.lateral_offset,
+        selected: selection.has(actor.id),
+        problem: wrong.has(actor.id),
+      },
+    ];
   });
 }
 
 export function sceneFlows(
-  graph: Graph, document: ScenarioDocument, selection: ReadonlySet<string>, wrong: ReadonlySet<string>,
+  graph: Graph,
+  document: ScenarioDocument,
+  selection: ReadonlySet<string>,
+  wrong: ReadonlySet<string>,
 ): SceneFlow[] {
   return document.flows.flatMap((flow) => {
     const place = graph.place(flow.spawn);
-    return place ? [{
-      id: flow.id, walk: place.walk, x: place.x, y: place.y, hdg: place.hdg, perHour: flow.per_hour,
-      selected: selection.has(flow.id), problem: wrong.has(flow.id),
-    }] : [];
+    return place
+      ? [
+          {
+            id: flow.id,
+            walk: place.walk,
+            x: place.x,
+            y: place.y,
+            hdg: place.hdg,
+            perHour: flow.per_hour,
+            selected: selection.has(flow.id),
+            problem: wrong.has(flow.id),
+          },
+        ]
+      : [];
   });
 }
 
 /** Ids of all whose start lies in a rectangle. */
-export function inFrame(ones: readonly { id: string; x: number; y: number }[], [x0, y0, x1, y1]: Bounds): string[] {
+export function inFrame(
+  ones: readonly { id: string; x: number; y: number }[],
+  [x0, y0, x1, y1]: Bounds,
+): string[] {
   return ones.filter(({ x, y }) => x >= x0 && x <= x1 && y >= y0 && y <= y1).map((one) => one.id);
 }
 
 /** Who is under the pointer: on the body, or within reach of the middle. */
 export function nearestOne<T extends { x: number; y: number; length?: number }>(
-  ones: readonly T[], x: number, y: number, reach: number,
+  ones: readonly T[],
+  x: number,
+  y: number,
+  reach: number,
 ): T | null {
   let best: T | null = null;
   let least = Infinity;
@@ -93,9 +129,7 @@ export function nearestOne<T extends { x: number; y: number; length?: number }>(
 }
 
 /** What to show of the map so that a problem is seen; null if it has no place. */
-export function boundsOfProblem(
-  problem: Problem, graph: Graph, document: ScenarioDocument,
-): Bounds | null {
+export function boundsOfProblem(problem: Problem, graph: Graph, document: ScenarioDocument): Bounds | null {
   const one = ofProblem(problem, document);
   const nodes = [...problem.nodes, ...(one ? [one.spawn] : [])];
   const boxes = nodes.flatMap((id): Bounds[] => {
@@ -117,7 +151,10 @@ export function segmentsBounds(graph: Graph, ids: readonly string[]): Bounds | n
 }
 
 const join = (a: Bounds, b: Bounds): Bounds => [
-  Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3]),
+  Math.min(a[0], b[0]),
+  Math.min(a[1], b[1]),
+  Math.max(a[2], b[2]),
+  Math.max(a[3], b[3]),
 ];
 
 /** The step to begin with when a scenario is opened. */

@@ -18,7 +18,9 @@ export interface Sights {
 }
 
 export function sightsOf(handle: RefObject<MapHandle | null>, graph: Graph): Sights {
-  const show = (bounds: Bounds | null): void => { if (bounds) handle.current?.show(bounds); };
+  const show = (bounds: Bounds | null): void => {
+    if (bounds) handle.current?.show(bounds);
+  };
   return {
     bounds: show,
     segments: (segments) => show(segmentsBounds(graph, segments)),

@@ -40,7 +40,9 @@ export type EditorStore = UseBoundStore<StoreApi<EditorState>>;
 
 /** Who is selected after a change: the new ones, else those that are still there. */
 export function selectionAfter(
-  selection: readonly string[], before: ScenarioDocument, after: ScenarioDocument,
+  selection: readonly string[],
+  before: ScenarioDocument,
+  after: ScenarioDocument,
 ): readonly string[] {
   const old = new Set(everyone(before).map((one) => one.id));
   const now = everyone(after).map((one) => one.id);
@@ -92,7 +94,9 @@ export function createEditorStore(name: string): EditorStore {
           set({ saving: "saved" });
           if (!(error instanceof ApiError) || error.status !== 409) throw error;
           await get().load();
-          throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+          throw new Error(
+            "The scenario was changed in another tab. You now see its newest state; try again.",
+          );
         }
       });
       queue = turn.catch(() => undefined);
@@ -105,17 +109,30 @@ export function createEditorStore(name: string): EditorStore {
         try {
           await get().load();
         } catch (failure) {
-          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again } });
+          set({
+            saving: "failed",
+            refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again },
+          });
           return;
         }
         const title = "Changed in another tab";
-        set({ refusal: { title, message: "You now see the newest state without your last change, which you can apply again.", again } });
+        set({
+          refusal: {
+            title,
+            message: "You now see the newest state without your last change, which you can apply again.",
+            again,
+          },
+        });
         return;
       }
       const failed = status <= 0 || status >= 500;
       set({
         saving: failed ? "failed" : "saved",
-        refusal: { title: failed ? "Your last change is not saved" : "That is not possible", message, again: failed ? again : null },
+        refusal: {
+          title: failed ? "Your last change is not saved" : "That is not possible",
+          message,
+          again: failed ? again : null,
+        },
       });
     };
     return {
@@ -126,7 +143,7 @@ export function createEditorStore(name: string): EditorStore {
       selection: [],
       load: async () => accept(await api.scenario(name)),
       edit: (edit, label) => {
-        const edits = Array.isArray(edit) ? edit as readonly Edit[] : [edit as Edit];
+        const edits = Array.isArray(edit) ? (edit as readonly Edit[]) : [edit as Edit];
         return ask((version) => api.edit(name, version, edits, label));
       },
       take,

@@ -49,7 +49,10 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
   const roiKey = document.roi.join("\n");
   const region = useRegion(name, roiKey);
   const ones = useMemo(() => everyone(document), [document]);
-  const one = useMemo(() => selection.length === 1 ? ones.find(({ id }) => id === selection[0]) ?? null : null, [ones, selection]);
+  const one = useMemo(
+    () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
+    [ones, selection],
+  );
   const { goals, route } = useGoals(name, one, roiKey, graph);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
   const sights = useMemo(() => sightsOf(handle, graph), [graph]);
@@ -66,7 +69,19 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
     if (next?.makes) select([]);
   };
   const editing: Editing = {
-    graph, picker, roi: document.roi, region, ones, actors, flows, starts, selection, one, goals, changes, select,
+    graph,
+    picker,
+    roi: document.roi,
+    region,
+    ones,
+    actors,
+    flows,
+    starts,
+    selection,
+    one,
+    goals,
+    changes,
+    select,
     openStep: (next) => {
       goTo(next);
       arm(null);
@@ -77,13 +92,25 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
     say: tell,
   };
   return {
-    ...editing, scenario, document, problems, step, tool, arm, hover, setHover, inside, route, sights, handle,
+    ...editing,
+    scenario,
+    document,
+    problems,
+    step,
+    tool,
+    arm,
+    hover,
+    setHover,
+    inside,
+    route,
+    sights,
+    handle,
     handler: handlerFor(step, tool, editing),
     placeSomewhere: () => tool?.handler(editing).somewhere(),
     showProblem: (problem) => {
       const about = ofProblem(problem, document);
       if (about) select([about.id]);
-      goTo(about ? "actors" : stepOf(problem) ?? step);
+      goTo(about ? "actors" : (stepOf(problem) ?? step));
       sights.problem(problem, document);
     },
   };

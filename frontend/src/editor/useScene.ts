@@ -7,7 +7,20 @@ import type { EditorNow } from "./useEditing";
 
 /** What the map shows of the editor as it is now. */
 export function useScene(now: EditorNow): Scene {
-  const { graph, document: { roi }, region: { candidates }, step, handler: { walks, badge }, hover, inside, actors, flows, goals, one, route } = now;
+  const {
+    graph,
+    document: { roi },
+    region: { candidates },
+    step,
+    handler: { walks, badge },
+    hover,
+    inside,
+    actors,
+    flows,
+    goals,
+    one,
+    route,
+  } = now;
   return useMemo<Scene>(() => {
     const placing = step === "actors";
     const place = hover?.is === "place" ? hover.place : null;
@@ -19,8 +32,9 @@ export function useScene(now: EditorNow): Scene {
         walks: step !== "region" && (!placing || walks !== false),
         inside: placing ? inside : null,
       },
-      actors, flows,
-      goals: placing ? goals ?? [] : [],
+      actors,
+      flows,
+      goals: placing ? (goals ?? []) : [],
       chosenGoal: placing && one?.goal ? (graph.place(one.goal) ?? null) : null,
       route: placing ? route : [],
       hover: placing ? place : null,

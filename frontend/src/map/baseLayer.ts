@@ -40,7 +40,11 @@ export class BaseLayer {
   }
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     symbols: boolean,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -59,9 +63,7 @@ export class BaseLayer {
     if (symbols) this.drawSymbols(context, view, size, ratio);
   }
 
-  private drawSymbols(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number,
-  ): void {
+  private drawSymbols(context: CanvasRenderingContext2D, view: View, size: Size, ratio: number): void {
     const [x0, y0, x1, y1] = visible(view, size);
     const pixels = Math.min(Math.max(view.scale * 2.2, 7), 24);
     for (const [kind, x, y, , text] of this.drawing.symbols) {
@@ -106,9 +108,7 @@ function pathOf(lines: Lines, rows: number[], closed: boolean): Path2D {
 }
 
 /** Sets colours and widths; false if the thing is too small to be seen at this scale. */
-function style(
-  context: CanvasRenderingContext2D, look: Look, scale: number, palette: Palette,
-): boolean {
+function style(context: CanvasRenderingContext2D, look: Look, scale: number, palette: Palette): boolean {
   context.setLineDash([]);
   context.lineCap = "butt";
   switch (look.what) {

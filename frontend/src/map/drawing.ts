@@ -61,5 +61,8 @@ export function boundsOf(lines: Lines, k: number): Bounds {
 }
 
 export const joined = (a: Bounds, b: Bounds): Bounds => [
-  Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3]),
+  Math.min(a[0], b[0]),
+  Math.min(a[1], b[1]),
+  Math.max(a[2], b[2]),
+  Math.max(a[3], b[3]),
 ];

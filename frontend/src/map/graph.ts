@@ -47,16 +47,26 @@ export class Graph {
   vehiclePlace(index: number): Place {
     const c = this.columns;
     return {
-      walk: false, index, id: nodeId(c, index, ""), x: nth(c.x, index), y: nth(c.y, index),
-      hdg: nth(c.hdg, index), segment: nth(c.segment, index),
+      walk: false,
+      index,
+      id: nodeId(c, index, ""),
+      x: nth(c.x, index),
+      y: nth(c.y, index),
+      hdg: nth(c.hdg, index),
+      segment: nth(c.segment, index),
     };
   }
 
   walkPlace(index: number): Place {
     const w: WalkColumns = this.columns.walks;
     return {
-      walk: true, index, id: nodeId(w, index, WALK_PREFIX), x: nth(w.x, index), y: nth(w.y, index),
-      hdg: nth(w.hdg, index), segment: nth(w.segment, index),
+      walk: true,
+      index,
+      id: nodeId(w, index, WALK_PREFIX),
+      x: nth(w.x, index),
+      y: nth(w.y, index),
+      hdg: nth(w.hdg, index),
+      segment: nth(w.segment, index),
     };
   }
 

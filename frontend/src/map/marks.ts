@@ -6,7 +6,10 @@ import type { View } from "./view";
 import type { Category } from "../api/types";
 
 export function dots(
-  context: CanvasRenderingContext2D, view: View, at: { x: number[]; y: number[] }, rows: number[],
+  context: CanvasRenderingContext2D,
+  view: View,
+  at: { x: number[]; y: number[] },
+  rows: number[],
   color: string,
 ): void {
   const r = Math.min(Math.max(1.5, view.scale * 0.3), 6) / view.scale;
@@ -23,7 +26,10 @@ export function dots(
 }
 
 export function drawWalkEdges(
-  context: CanvasRenderingContext2D, view: View, graph: Graph, rows: Set<number>,
+  context: CanvasRenderingContext2D,
+  view: View,
+  graph: Graph,
+  rows: Set<number>,
 ): void {
   const { walks } = graph.columns;
   context.beginPath();
@@ -65,7 +71,12 @@ export function drawLane(context: CanvasRenderingContext2D, graph: Graph, place:
 
 /** How far beside the middle of its lane a road user starts. */
 export function drawOffset(
-  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, palette: Palette,
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  view: View,
+  actor: SceneActor,
+  palette: Palette,
 ): void {
   const cx = x + actor.offset * Math.sin(actor.hdg) * view.scale;
   const cy = y + actor.offset * Math.cos(actor.hdg) * view.scale;
@@ -90,14 +101,20 @@ export function spot(context: CanvasRenderingContext2D, [x, y]: [number, number]
 
 /** Chevrons in the direction of travel, and the volume per hour. */
 export function drawFlow(
-  context: CanvasRenderingContext2D, [x, y]: [number, number], flow: SceneFlow, palette: Palette,
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  flow: SceneFlow,
+  palette: Palette,
 ): void {
   context.save();
   context.translate(x, y);
   context.rotate(-flow.hdg);
   context.lineCap = context.lineJoin = "round";
   const rim = flow.problem ? PROBLEM : flow.selected ? palette.ink : "#ffffff";
-  for (const [color, width] of [[rim, flow.selected || flow.problem ? 9 : 7], [flow.walk ? PEDESTRIAN_NODE : FLOW, 4]] as const) {
+  for (const [color, width] of [
+    [rim, flow.selected || flow.problem ? 9 : 7],
+    [flow.walk ? PEDESTRIAN_NODE : FLOW, 4],
+  ] as const) {
     context.strokeStyle = color;
     context.lineWidth = width;
     context.beginPath();
@@ -112,9 +129,7 @@ export function drawFlow(
   tag(context, `${Math.round(flow.perHour)} per hour`, x, y - 22);
 }
 
-export function drawGoal(
-  context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean,
-): void {
+export function drawGoal(context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean): void {
   context.beginPath();
   context.arc(x, y, chosen ? 13 : 7, 0, 2 * Math.PI);
   context.fillStyle = chosen ? ROI_BASE : GOAL;
@@ -124,18 +139,23 @@ export function drawGoal(
   context.stroke();
   if (!chosen) return;
   context.beginPath();
-  context.moveTo(x - 2.500, y + 5);
-  context.lineTo(x - 2.500, y - 6);
+  context.moveTo(x - 2.5, y + 5);
+  context.lineTo(x - 2.5, y - 6);
   context.lineTo(x + 5, y - 3);
-  context.lineTo(x - 2.500, y);
+  context.lineTo(x - 2.5, y);
   context.fillStyle = context.strokeStyle = "#ffffff";
   context.fill();
-  context.lineWidth = 1.500;
+  context.lineWidth = 1.5;
   context.stroke();
 }
 
 export function body(
-  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, color: string,
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  view: View,
+  actor: SceneActor,
+  color: string,
 ): void {
   context.save();
   context.translate(x, y);
@@ -159,8 +179,13 @@ export function body(
 }
 
 export function badge(
-  context: CanvasRenderingContext2D, glyph: Path2D, x: number, y: number, radius: number,
-  color: string, category: Category,
+  context: CanvasRenderingContext2D,
+  glyph: Path2D,
+  x: number,
+  y: number,
+  radius: number,
+  color: string,
+  category: Category,
 ): void {
   context.save();
   context.translate(x, y);

@@ -20,7 +20,11 @@ export class MovingLayer {
   marks: readonly Mark[] = [];
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     moving: Moving | null,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -32,7 +36,11 @@ export class MovingLayer {
   }
 
   private drawMoving(
-    context: CanvasRenderingContext2D, view: View, size: Size, palette: Palette, moving: Moving,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    palette: Palette,
+    moving: Moving,
   ): void {
     const rows = byCategory(moving, view, size);
     for (const [n, category] of CATEGORIES.entries()) {
@@ -60,8 +68,11 @@ export class MovingLayer {
     for (const { x, y, color } of this.lamps) {
       context.beginPath();
       context.arc(
-        (x - view.x) * view.scale + size.width / 2, (view.y - y) * view.scale + size.height / 2,
-        radius, 0, 2 * Math.PI,
+        (x - view.x) * view.scale + size.width / 2,
+        (view.y - y) * view.scale + size.height / 2,
+        radius,
+        0,
+        2 * Math.PI,
       );
       context.fillStyle = color;
       context.fill();
@@ -88,7 +99,11 @@ function byCategory(moving: Moving, view: View, size: Size): number[][] {
 
 /** A body seen from above, its front cut to a blunt wedge so that the heading shows. */
 function outline(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
 ): void {
   const { pose } = moving;
   const p = 5 * row;
@@ -112,7 +127,11 @@ function outline(
 
 /** Windscreen, brake lights and indicators. */
 function details(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
 ): void {
   const { pose } = moving;
   const p = 5 * row;
@@ -148,7 +167,11 @@ function corners(context: CanvasRenderingContext2D, half: number, y: number, lam
 }
 
 function mark(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
   color: string,
 ): void {
   const p = 5 * row;
@@ -162,11 +185,28 @@ function mark(
 }
 
 const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
-  collision: (context) => { line(context, -4, -4, 4, 4); line(context, -4, 4, 4, -4); },
-  braking: (context) => { line(context, 0, -5, 0, 1); line(context, 0, 4, 0, 4.5); },
-  teleported: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
-  met: (context) => { line(context, -4, 0.5, -1, 3.5); line(context, -1, 3.5, 4, -3.5); },
-  unmet: (context) => { line(context, -4, -2, 4, -2); line(context, -4, 2, 4, 2); line(context, 2.5, -5, -2.5, 5); },
+  collision: (context) => {
+    line(context, -4, -4, 4, 4);
+    line(context, -4, 4, 4, -4);
+  },
+  braking: (context) => {
+    line(context, 0, -5, 0, 1);
+    line(context, 0, 4, 0, 4.5);
+  },
+  teleported: (context) => {
+    line(context, 0, 5, 0, -4);
+    line(context, -3.5, -1, 0, -5);
+    line(context, 3.5, -1, 0, -5);
+  },
+  met: (context) => {
+    line(context, -4, 0.5, -1, 3.5);
+    line(context, -1, 3.5, 4, -3.5);
+  },
+  unmet: (context) => {
+    line(context, -4, -2, 4, -2);
+    line(context, -4, 2, 4, 2);
+    line(context, 2.5, -5, -2.5, 5);
+  },
 };
 
 function line(context: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
@@ -177,7 +217,10 @@ function line(context: CanvasRenderingContext2D, x0: number, y0: number, x1: num
 /** A sign of constant size; what is past is paler, what is new has a ring around it. */
 function drawMark(context: CanvasRenderingContext2D, mark: Mark, view: View, size: Size): void {
   context.save();
-  context.translate((mark.x - view.x) * view.scale + size.width / 2, (view.y - mark.y) * view.scale + size.height / 2);
+  context.translate(
+    (mark.x - view.x) * view.scale + size.width / 2,
+    (view.y - mark.y) * view.scale + size.height / 2,
+  );
   context.globalAlpha = mark.fresh ? 1 : 0.6;
   context.beginPath();
   context.arc(0, 0, mark.fresh ? 11 : 8.5, 0, 2 * Math.PI);

@@ -60,10 +60,16 @@ function indexed(columns: Pick<GraphColumns, "x" | "y">): Flatbush | null {
 }
 
 function nearest(
-  index: Flatbush | null, x: number, y: number, reach: number, segment: number[], walk: boolean,
+  index: Flatbush | null,
+  x: number,
+  y: number,
+  reach: number,
+  segment: number[],
+  walk: boolean,
   { inside, allowed }: Pick<PickOptions, "inside" | "allowed"> = {},
 ): number | undefined {
-  const filter = (inside || allowed) && ((i: number): boolean =>
-    (!inside || inside.has(nth(segment, i))) && (!allowed || allowed(i, walk)));
+  const filter =
+    (inside || allowed) &&
+    ((i: number): boolean => (!inside || inside.has(nth(segment, i))) && (!allowed || allowed(i, walk)));
   return index?.neighbors(x, y, 1, reach, filter)[0];
 }

@@ -1,12 +1,30 @@
 import {
-  CATEGORY_COLOR, EGO, ELIGIBLE, type Palette, PEDESTRIAN_NODE, PROBLEM, RELATION, ROI_BASE,
-  ROI_MEMBER, VEHICLE_NODE,
+  CATEGORY_COLOR,
+  EGO,
+  ELIGIBLE,
+  type Palette,
+  PEDESTRIAN_NODE,
+  PROBLEM,
+  RELATION,
+  ROI_BASE,
+  ROI_MEMBER,
+  VEHICLE_NODE,
 } from "./colors";
 import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
 import {
-  badge, body, dots, drawFlow, drawGoal, drawLane, drawOffset, drawRoute, drawWalkEdges, spot, tag,
+  badge,
+  body,
+  dots,
+  drawFlow,
+  drawGoal,
+  drawLane,
+  drawOffset,
+  drawRoute,
+  drawWalkEdges,
+  spot,
+  tag,
 } from "./marks";
 import type { Picker } from "./picking";
 import type { Scene, SceneActor, SegmentStyle } from "./scene";
@@ -38,7 +56,10 @@ export class SceneLayer {
   private readonly bounds: Bounds[] = [];
   private readonly glyphs: Record<Category, Path2D>;
 
-  constructor(private readonly graph: Graph | null, private readonly picker: Picker | null) {
+  constructor(
+    private readonly graph: Graph | null,
+    private readonly picker: Picker | null,
+  ) {
     this.glyphs = Object.fromEntries(
       Object.entries(GLYPHS).map(([name, path]) => [name, new Path2D(path)]),
     ) as Record<Category, Path2D>;
@@ -49,7 +70,11 @@ export class SceneLayer {
   }
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     scene: Scene,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -88,9 +113,7 @@ export class SceneLayer {
     }
   }
 
-  private drawSegments(
-    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene,
-  ): void {
+  private drawSegments(context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene): void {
     const seen = visible(view, size);
     for (const [row, style] of scene.segments) {
       const [path, bounds] = [this.segments[row], this.bounds[row]];
@@ -111,21 +134,27 @@ export class SceneLayer {
   }
 
   private drawGraph(
-    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    scene: Scene,
+    palette: Palette,
   ): void {
     if (!this.graph || !this.picker) return;
     const { columns } = this.graph;
     const { inside } = scene.nodes;
     const seen = visible(view, size);
     if (scene.nodes.vehicles) {
-      const rows = this.picker.within(...seen, false)
+      const rows = this.picker
+        .within(...seen, false)
         .filter((i) => !inside || inside.has(nth(columns.segment, i)));
       if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette);
       this.drawPlaces(context, view, rows, false);
     }
     if (scene.nodes.walks) {
       const { walks } = columns;
-      const rows = this.picker.within(...seen, true)
+      const rows = this.picker
+        .within(...seen, true)
         .filter((i) => !inside || inside.has(nth(walks.segment, i)));
       if (view.scale >= EDGES_FROM) drawWalkEdges(context, view, this.graph, new Set(rows));
       this.drawPlaces(context, view, rows, true);
@@ -133,23 +162,39 @@ export class SceneLayer {
   }
 
   /** Places in their colour; grey where no start is possible. */
-  private drawPlaces(
-    context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean,
-  ): void {
+  private drawPlaces(context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean): void {
     if (!this.graph) return;
     const graph = this.graph;
     const at = walk ? graph.columns.walks : graph.columns;
-    dots(context, view, at, rows.filter((i) => !graph.usable(i, walk)), UNUSABLE);
-    dots(context, view, at, rows.filter((i) => graph.usable(i, walk)), walk ? PEDESTRIAN_NODE : VEHICLE_NODE);
+    dots(
+      context,
+      view,
+      at,
+      rows.filter((i) => !graph.usable(i, walk)),
+      UNUSABLE,
+    );
+    dots(
+      context,
+      view,
+      at,
+      rows.filter((i) => graph.usable(i, walk)),
+      walk ? PEDESTRIAN_NODE : VEHICLE_NODE,
+    );
   }
 
   private drawEdges(
-    context: CanvasRenderingContext2D, view: View, rows: Set<number>, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    rows: Set<number>,
+    palette: Palette,
   ): void {
     if (!this.graph) return;
     const { columns } = this.graph;
     const { source, target, relation } = columns.edges;
-    const paths = RELATION.map((color, n) => ({ path: new Path2D(), color: n === 0 ? palette.successor : color }));
+    const paths = RELATION.map((color, n) => ({
+      path: new Path2D(),
+      color: n === 0 ? palette.successor : color,
+    }));
     for (let e = 0; e < source.length; e++) {
       if (!rows.has(nth(source, e))) continue;
       const { path } = nth(paths, nth(relation, e));
@@ -167,8 +212,11 @@ export class SceneLayer {
   }
 
   private drawHover(
-    context: CanvasRenderingContext2D, at: (x: number, y: number) => [number, number], view: View,
-    place: Place, category: Category | null,
+    context: CanvasRenderingContext2D,
+    at: (x: number, y: number) => [number, number],
+    view: View,
+    place: Place,
+    category: Category | null,
   ): void {
     const [x, y] = at(place.x, place.y);
     const color = place.walk ? PEDESTRIAN_NODE : VEHICLE_NODE;
@@ -201,8 +249,12 @@ export class SceneLayer {
   }
 
   private drawActor(
-    context: CanvasRenderingContext2D, [x, y]: [number, number], view: View, actor: SceneActor,
-    palette: Palette, named: boolean,
+    context: CanvasRenderingContext2D,
+    [x, y]: [number, number],
+    view: View,
+    actor: SceneActor,
+    palette: Palette,
+    named: boolean,
   ): void {
     const color = CATEGORY_COLOR[actor.category];
     const near = actor.length * view.scale > 10;

@@ -38,7 +38,8 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
   const [xMost, yMost] = [x.at(-1) || 1, yTicks.at(-1) ?? 1];
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / xMost;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / yMost;
-  const point = (v: number | null | undefined, k: number): string | null => v == null ? null : `${px(nth(x, k)).toFixed(1)} ${py(v).toFixed(1)}`;
+  const point = (v: number | null | undefined, k: number): string | null =>
+    v == null ? null : `${px(nth(x, k)).toFixed(1)} ${py(v).toFixed(1)}`;
   return (
     <figure className="chart" aria-labelledby={id}>
       <figcaption id={id}>{title}</figcaption>
@@ -46,23 +47,61 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
         {yTicks.map((v) => (
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
-            <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">{v.toLocaleString("en")}</text>
+            <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
+              {v.toLocaleString("en")}
+            </text>
           </g>
         ))}
-        {xTicks.map((v) => <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">{v.toLocaleString("en")}</text>)}
-        <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">{xLabel}</text>
-        <text x={2} y={12}>{yLabel}</text>
+        {xTicks.map((v) => (
+          <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
+            {v.toLocaleString("en")}
+          </text>
+        ))}
+        <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">
+          {xLabel}
+        </text>
+        <text x={2} y={12}>
+          {yLabel}
+        </text>
         {band && <path d={area(band.low.map(point), band.high.map(point))} fill={color} opacity={0.22} />}
         {bars
-          ? series[0]?.values.map((v, k) => v === null || k + 1 >= x.length ? null : (
-            <rect key={k} x={px(nth(x, k)) + 0.7} width={Math.max(0.5, px(nth(x, k + 1)) - px(nth(x, k)) - 1.4)} y={py(v)} height={BOX.bottom - py(v)} fill={color} />
-          ))
-          : series.map((one) => <path key={one.name} d={path(one.values.map(point))} fill="none" stroke={one.color} strokeWidth={2} strokeLinejoin="round" />)}
+          ? series[0]?.values.map((v, k) =>
+              v === null || k + 1 >= x.length ? null : (
+                <rect
+                  key={k}
+                  x={px(nth(x, k)) + 0.7}
+                  width={Math.max(0.5, px(nth(x, k + 1)) - px(nth(x, k)) - 1.4)}
+                  y={py(v)}
+                  height={BOX.bottom - py(v)}
+                  fill={color}
+                />
+              ),
+            )
+          : series.map((one) => (
+              <path
+                key={one.name}
+                d={path(one.values.map(point))}
+                fill="none"
+                stroke={one.color}
+                strokeWidth={2}
+                strokeLinejoin="round"
+              />
+            ))}
       </svg>
       {(series.length > 1 || band) && (
         <div className="chart-key" aria-hidden="true">
-          {series.map((one) => <span key={one.name}><i style={{ background: one.color }} />{one.name}</span>)}
-          {band && <span><i style={{ background: color, opacity: 0.35, height: 9 }} />{band.name}</span>}
+          {series.map((one) => (
+            <span key={one.name}>
+              <i style={{ background: one.color }} />
+              {one.name}
+            </span>
+          ))}
+          {band && (
+            <span>
+              <i style={{ background: color, opacity: 0.35, height: 9 }} />
+              {band.name}
+            </span>
+          )}
         </div>
       )}
       <p>{children}</p>
@@ -74,18 +113,43 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
   );
 }
 
-function Numbers({ title, xLabel, yLabel, x, series, bars }: {
-  title: string; xLabel: string; yLabel: string; x: readonly number[]; series: readonly Series[]; bars: boolean;
+function Numbers({
+  title,
+  xLabel,
+  yLabel,
+  x,
+  series,
+  bars,
+}: {
+  title: string;
+  xLabel: string;
+  yLabel: string;
+  x: readonly number[];
+  series: readonly Series[];
+  bars: boolean;
 }) {
   const rows = x.slice(0, series[0]?.values.length).map((_, k) => k);
   return (
     <table aria-label={`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
-      <thead><tr><th scope="col">{xLabel}</th>{series.map((one) => <th scope="col" key={one.name}>{series.length > 1 ? one.name : yLabel}</th>)}</tr></thead>
+      <thead>
+        <tr>
+          <th scope="col">{xLabel}</th>
+          {series.map((one) => (
+            <th scope="col" key={one.name}>
+              {series.length > 1 ? one.name : yLabel}
+            </th>
+          ))}
+        </tr>
+      </thead>
       <tbody>
         {(bars ? rows : thinned(rows, ROWS)).map((k) => (
           <tr key={k}>
-            <th scope="row" style={{ fontWeight: 400 }}>{bars ? `${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}</th>
-            {series.map((one) => <td key={one.name}>{said(one.values[k])}</td>)}
+            <th scope="row" style={{ fontWeight: 400 }}>
+              {bars ? `${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
+            </th>
+            {series.map((one) => (
+              <td key={one.name}>{said(one.values[k])}</td>
+            ))}
           </tr>
         ))}
       </tbody>
@@ -94,11 +158,13 @@ function Numbers({ title, xLabel, yLabel, x, series, bars }: {
 }
 
 const round = (v: number): string => v.toLocaleString("en", { maximumFractionDigits: 1 });
-const said = (v: number | null | undefined): string => v == null ? "–" : round(v);
+const said = (v: number | null | undefined): string => (v == null ? "–" : round(v));
 
 /** Lines through what is known; a gap where nothing is. */
 function path(points: readonly (string | null)[]): string {
-  return points.map((at, k) => at === null ? "" : `${k > 0 && points[k - 1] !== null ? "L" : "M"}${at}`).join("");
+  return points
+    .map((at, k) => (at === null ? "" : `${k > 0 && points[k - 1] !== null ? "L" : "M"}${at}`))
+    .join("");
 }
 
 function area(low: readonly (string | null)[], high: readonly (string | null)[]): string {

@@ -9,16 +9,33 @@ import { markKind, sentence } from "./incidents";
 const LISTED = 200;
 
 /** Incidents, the newest first; a click shows where. */
-export function IncidentLog({ incidents, categories, over, onShow }: {
-  incidents: readonly Incident[]; categories: ReadonlyMap<string, Category>; over: boolean; onShow: (incident: Incident) => void;
+export function IncidentLog({
+  incidents,
+  categories,
+  over,
+  onShow,
+}: {
+  incidents: readonly Incident[];
+  categories: ReadonlyMap<string, Category>;
+  over: boolean;
+  onShow: (incident: Incident) => void;
 }) {
   if (incidents.length === 0) {
-    return <Text size="sm" c="dimmed">{over ? "There were no incidents." : "No incidents so far. Collisions, emergency braking and teleported vehicles (removed after waiting too long) appear here."}</Text>;
+    return (
+      <Text size="sm" c="dimmed">
+        {over
+          ? "There were no incidents."
+          : "No incidents so far. Collisions, emergency braking and teleported vehicles " +
+            "(removed after waiting too long) appear here."}
+      </Text>
+    );
   }
   const listed = incidents.slice(-LISTED).reverse();
   return (
     <>
-      <Text size="sm" c="dimmed">Choose one to see where it happened.</Text>
+      <Text size="sm" c="dimmed">
+        Choose one to see where it happened.
+      </Text>
       <ul className="rows" aria-label="Incidents">
         {listed.map((one, n) => (
           <li key={incidents.length - n}>
@@ -30,7 +47,11 @@ export function IncidentLog({ incidents, categories, over, onShow }: {
           </li>
         ))}
       </ul>
-      {incidents.length > LISTED && <Text size="sm" c="dimmed" mt="xs">{(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.</Text>}
+      {incidents.length > LISTED && (
+        <Text size="sm" c="dimmed" mt="xs">
+          {(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.
+        </Text>
+      )}
     </>
   );
 }

@@ -17,8 +17,16 @@ const LONG = 3600;
 const TITLE: Record<string, string> = { failed: "The run failed", stopped: "The run was stopped" };
 
 /** The result of a run, in figures. */
-export function Result({ info, scenario, onBack, onResume }: {
-  info: RunInfo; scenario: string; onBack: () => void; onResume: () => void;
+export function Result({
+  info,
+  scenario,
+  onBack,
+  onResume,
+}: {
+  info: RunInfo;
+  scenario: string;
+  onBack: () => void;
+  onResume: () => void;
 }) {
   const [busy, setBusy] = useState(false);
   const known = useLoaded(allFigures);
@@ -26,24 +34,57 @@ export function Result({ info, scenario, onBack, onResume }: {
     setBusy(true);
     runs.start({ scenario, speed: Number(info.summary?.until) > LONG ? null : 1 }).then(
       ({ run }) => go({ view: "run", scenario, run }),
-      (error: unknown) => { setBusy(false); tellError(error); });
+      (error: unknown) => {
+        setBusy(false);
+        tellError(error);
+      },
+    );
   };
   if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onResume={onResume} />;
   const failed = info.state === "failed";
   return (
     <section aria-label="Result of the run">
-      <Title order={2} size="h3">{TITLE[info.state] ?? "The run is finished"}</Title>
+      <Title order={2} size="h3">
+        {TITLE[info.state] ?? "The run is finished"}
+      </Title>
       {failed && <Failure info={info} />}
       {info.summary && !failed && (
         <dl className="run-figures">
-          {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => <div key={name} title={definition}><dt>{label}</dt><dd>{value}</dd></div>)}
+          {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => (
+            <div key={name} title={definition}>
+              <dt>{label}</dt>
+              <dd>{value}</dd>
+            </div>
+          ))}
         </dl>
       )}
       <Group mt="md" mb="lg" gap="xs">
         <Button onClick={onBack}>Back to the editor</Button>
-        {info.summary && !failed && <Button variant="default" component="a" href={runs.reportUrl(info.run)} target="_blank" rel="noreferrer">Full report</Button>}
-        {compared(info.summary) && <Button variant="default" component="a" href={carla.comparisonUrl(info.run)} target="_blank" rel="noreferrer">Compared with CARLA</Button>}
-        <Button variant="default" loading={busy} onClick={again}>Run again</Button>
+        {info.summary && !failed && (
+          <Button
+            variant="default"
+            component="a"
+            href={runs.reportUrl(info.run)}
+            target="_blank"
+            rel="noreferrer"
+          >
+            Full report
+          </Button>
+        )}
+        {compared(info.summary) && (
+          <Button
+            variant="default"
+            component="a"
+            href={carla.comparisonUrl(info.run)}
+            target="_blank"
+            rel="noreferrer"
+          >
+            Compared with CARLA
+          </Button>
+        )}
+        <Button variant="default" loading={busy} onClick={again}>
+          Run again
+        </Button>
       </Group>
       {info.summary && !failed && <SliceTable summary={info.summary} />}
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
@@ -59,7 +100,8 @@ function Failure({ info }: { info: RunInfo }) {
   return (
     <>
       <Alert color="red" mt="sm" title="The simulation could not continue">
-        Your scenario is unchanged, and other runs continue. {info.carla
+        Your scenario is unchanged, and other runs continue.{" "}
+        {info.carla
           ? "See below what is wrong with CARLA, or run without it."
           : "Try to run it again; if it fails at the same time, remove the road users that were inserted last."}
       </Alert>

@@ -32,29 +32,65 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
     return () => clearInterval(timer);
   }, [latest, wanted]);
   const word = search.trim().toLowerCase();
-  const found = rows.filter(({ id, category }) => !word || `${id} ${CATEGORY_WORD[category]}`.toLowerCase().includes(word));
+  const found = rows.filter(
+    ({ id, category }) => !word || `${id} ${CATEGORY_WORD[category]}`.toLowerCase().includes(word),
+  );
   const ego = rows.find((row) => row.ego);
   return (
     <>
       <Group gap="xs">
-        <Button size="xs" disabled={!ego} onClick={() => { if (ego) follow(ego.id); }}>Follow my vehicle</Button>
-        <Button size="xs" variant="default" disabled={followed === null} onClick={() => follow(null)}>Stop following</Button>
+        <Button
+          size="xs"
+          disabled={!ego}
+          onClick={() => {
+            if (ego) follow(ego.id);
+          }}
+        >
+          Follow my vehicle
+        </Button>
+        <Button size="xs" variant="default" disabled={followed === null} onClick={() => follow(null)}>
+          Stop following
+        </Button>
       </Group>
-      <TextInput mt="sm" label="Find a road user" placeholder="Part of the name, or a kind" leftSection={<IconSearch />} value={search}
-        onChange={(event) => setSearch(event.currentTarget.value)} />
-      {rows.length === 0 && <Text size="sm" c="dimmed" mt="sm">No road user is on the road now.</Text>}
-      {rows.length > 0 && found.length === 0 && <Text size="sm" mt="sm">No road user on the road matches “{search}”.</Text>}
+      <TextInput
+        mt="sm"
+        label="Find a road user"
+        placeholder="Part of the name, or a kind"
+        leftSection={<IconSearch />}
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+      />
+      {rows.length === 0 && (
+        <Text size="sm" c="dimmed" mt="sm">
+          No road user is on the road now.
+        </Text>
+      )}
+      {rows.length > 0 && found.length === 0 && (
+        <Text size="sm" mt="sm">
+          No road user on the road matches “{search}”.
+        </Text>
+      )}
       <ul className="rows" aria-label="Follow a road user">
         {found.slice(0, LISTED).map((row) => (
           <li key={row.id}>
-            <button type="button" aria-pressed={row.id === followed}
-              onClick={() => follow(row.id === followed ? null : row.id)}>
-              <CategoryGlyph category={row.category} size={20} />{row.id}{row.ego && " (yours)"}<span className="far">{kmh(row.speed)}</span>
+            <button
+              type="button"
+              aria-pressed={row.id === followed}
+              onClick={() => follow(row.id === followed ? null : row.id)}
+            >
+              <CategoryGlyph category={row.category} size={20} />
+              {row.id}
+              {row.ego && " (yours)"}
+              <span className="far">{kmh(row.speed)}</span>
             </button>
           </li>
         ))}
       </ul>
-      {found.length > LISTED && <Text size="sm" c="dimmed" mt="xs">{count(found.length - LISTED, "more road user")}: type a part of the name.</Text>}
+      {found.length > LISTED && (
+        <Text size="sm" c="dimmed" mt="xs">
+          {count(found.length - LISTED, "more road user")}: type a part of the name.
+        </Text>
+      )}
     </>
   );
 }
@@ -65,7 +101,13 @@ function onTheRoad(latest: ReturnType<Picture["latest"]>): Row[] {
   const rows: Row[] = [];
   for (let i = 0; i < frame.count; i++) {
     const who = crowd.named(nth(frame.rows, 6 * i));
-    if (who) rows.push({ id: who.id, category: who.category, ego: who.ego ?? false, speed: nth(frame.rows, 6 * i + 4) });
+    if (who)
+      rows.push({
+        id: who.id,
+        category: who.category,
+        ego: who.ego ?? false,
+        speed: nth(frame.rows, 6 * i + 4),
+      });
   }
   return rows.sort((a, b) => Number(b.ego) - Number(a.ego) || natural.compare(a.id, b.id));
 }

@@ -7,9 +7,13 @@ import { EarlierRuns } from "./EarlierRuns";
 export function RunsView({ scenario }: { scenario: string }) {
   return (
     <div className="runs-view">
-      <Title order={1} size="h2" mb="md">Runs of {scenario}</Title>
+      <Title order={1} size="h2" mb="md">
+        Runs of {scenario}
+      </Title>
       <EarlierRuns scenario={scenario} />
-      <Anchor display="inline-block" mt="lg" href={hashOf({ view: "editor", scenario })}>Back to the editor</Anchor>
+      <Anchor display="inline-block" mt="lg" href={hashOf({ view: "editor", scenario })}>
+        Back to the editor
+      </Anchor>
     </div>
   );
 }

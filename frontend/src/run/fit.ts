@@ -23,7 +23,8 @@ export function countStations(rows: readonly FitRow[]): CountStation[] {
 
 export const countMarks = (rows: readonly FitRow[]): Mark[] =>
   // Those that are not met last, so that they are drawn on top.
-  countStations(rows).sort((a, b) => Number(b.met) - Number(a.met))
+  countStations(rows)
+    .sort((a, b) => Number(b.met) - Number(a.met))
     .map(({ x, y, met }) => ({ x, y, kind: met ? "met" : "unmet", fresh: false }));
 
 /** The worst first. */

@@ -30,7 +30,14 @@ export function decodeFrame(data: ArrayBuffer): Frame {
   if (all.length !== HEADER + ROW * count) {
     throw new Error(`a frame for ${count} road users has ${all.length} numbers`);
   }
-  return { step: nth(all, 0), time: nth(all, 1), count, pace: nth(all, 3), arrived: nth(all, 4), rows: all.subarray(HEADER) };
+  return {
+    step: nth(all, 0),
+    time: nth(all, 1),
+    count,
+    pace: nth(all, 3),
+    arrived: nth(all, 4),
+    rows: all.subarray(HEADER),
+  };
 }
 
 const LITTLE = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1;
@@ -58,7 +65,9 @@ export class Crowd {
 
   /** Ids of the road users that are marked as ego. */
   egos(): string[] {
-    return this.all().filter((one) => one.ego).map((one) => one.id);
+    return this.all()
+      .filter((one) => one.ego)
+      .map((one) => one.id);
   }
 
   named(index: number): Introduced | undefined {

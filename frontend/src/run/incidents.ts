@@ -9,12 +9,18 @@ const FRESH = 4;
 const DRAWN = 300;
 
 const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
-  collision: "collision", emergency_stop: "braking", teleport_start: "teleported", teleport_end: "teleported",
+  collision: "collision",
+  emergency_stop: "braking",
+  teleport_start: "teleported",
+  teleport_end: "teleported",
 };
 
 export const MARK_WORD: Record<MarkKind, string> = {
-  collision: "Collision", braking: "Emergency braking", teleported: "Teleported",
-  met: "Count met", unmet: "Count not met",
+  collision: "Collision",
+  braking: "Emergency braking",
+  teleported: "Teleported",
+  met: "Count met",
+  unmet: "Count not met",
 };
 
 export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "teleported";
@@ -24,11 +30,17 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
   const who = named(incident.actor, categories);
   switch (incident.kind) {
     case "collision":
-      return incident.partner ? `${who} collided with ${named(incident.partner, categories)}` : `${who} collided`;
-    case "emergency_stop": return `${who} braked in an emergency`;
-    case "teleport_start": return `${who} was gridlocked and teleported`;
-    case "teleport_end": return `${who} was put back on the road after its teleport`;
-    default: return `${who}: ${incident.kind.replaceAll("_", " ")}`;
+      return incident.partner
+        ? `${who} collided with ${named(incident.partner, categories)}`
+        : `${who} collided`;
+    case "emergency_stop":
+      return `${who} braked in an emergency`;
+    case "teleport_start":
+      return `${who} was gridlocked and teleported`;
+    case "teleport_end":
+      return `${who} was put back on the road after its teleport`;
+    default:
+      return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
 }
 
@@ -42,7 +54,16 @@ export function marksAt(incidents: readonly Incident[], time: number): Mark[] {
   return incidents
     .filter((one) => one.time <= time + 1e-6)
     .slice(-DRAWN)
-    .flatMap((one) => one.x === undefined || one.y === undefined ? [] : [{
-      x: one.x, y: one.y, kind: markKind(one), fresh: time - one.time < FRESH,
-    }]);
+    .flatMap((one) =>
+      one.x === undefined || one.y === undefined
+        ? []
+        : [
+            {
+              x: one.x,
+              y: one.y,
+              kind: markKind(one),
+              fresh: time - one.time < FRESH,
+            },
+          ],
+    );
 }

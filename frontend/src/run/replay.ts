@@ -27,7 +27,8 @@ export class Replay {
   /** All on the road at a time, as a live frame has them; `arrived` is not known. */
   at(time: number): Frame {
     const { times, first, actor, x, y, hdg, speed } = this.columns;
-    if (times.length === 0) return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
+    if (times.length === 0)
+      return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
     const i = momentAt(times, time);
     const count = nth(first, i + 1) - nth(first, i);
     const rows = new Float32Array(ROW * count);
@@ -37,8 +38,24 @@ export class Replay {
       const a = nth(first, i) + k;
       const b = nth(this.next, a);
       let pose: Pose = { x: nth(x, a), y: nth(y, a), hdg: nth(hdg, a), speed: nth(speed, a) };
-      if (b >= 0 && share > 0) pose = between(pose, { x: nth(x, b), y: nth(y, b), hdg: nth(hdg, b), speed: nth(speed, b) }, span, share);
-      rows.set([nth(actor, a), pose.x - this.crowd.origin[0], pose.y - this.crowd.origin[1], pose.hdg, pose.speed, 0], ROW * k);
+      if (b >= 0 && share > 0)
+        pose = between(
+          pose,
+          { x: nth(x, b), y: nth(y, b), hdg: nth(hdg, b), speed: nth(speed, b) },
+          span,
+          share,
+        );
+      rows.set(
+        [
+          nth(actor, a),
+          pose.x - this.crowd.origin[0],
+          pose.y - this.crowd.origin[1],
+          pose.hdg,
+          pose.speed,
+          0,
+        ],
+        ROW * k,
+      );
     }
     return { step: i, time, count, pace: 0, arrived: 0, rows };
   }

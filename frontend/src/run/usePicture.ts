@@ -39,19 +39,25 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
   const watched = useRef<string | null>(null);
   const pending = useRef(0);
 
-  const show = useCallback((frame: Frame, crowd: Crowd) => {
-    const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
-    last.current = { frame, crowd, moving };
-    handle.current?.setMoving(moving);
-    const row = moving.followed;
-    if (row >= 0) handle.current?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
-    pending.current ||= window.setTimeout(() => {
-      pending.current = 0;
-      if (!last.current) return;
-      const { frame: { time, pace, count, arrived }, moving: { followed: row } } = last.current;
-      setNow({ time, pace, running: count, arrived, there: row >= 0 });
-    }, READABLE);
-  }, [handle]);
+  const show = useCallback(
+    (frame: Frame, crowd: Crowd) => {
+      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
+      last.current = { frame, crowd, moving };
+      handle.current?.setMoving(moving);
+      const row = moving.followed;
+      if (row >= 0) handle.current?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
+      pending.current ||= window.setTimeout(() => {
+        pending.current = 0;
+        if (!last.current) return;
+        const {
+          frame: { time, pace, count, arrived },
+          moving: { followed: row },
+        } = last.current;
+        setNow({ time, pace, running: count, arrived, there: row >= 0 });
+      }, READABLE);
+    },
+    [handle],
+  );
   const redraw = useCallback(() => {
     if (last.current) show(last.current.frame, last.current.crowd);
   }, [show]);
@@ -60,11 +66,14 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     handle.current?.setMoving(null);
     setNow((old) => ({ ...old, running: 0, there: false }));
   }, [handle]);
-  const follow = useCallback((id: string | null) => {
-    watched.current = id;
-    setFollowed(id);
-    redraw();
-  }, [redraw]);
+  const follow = useCallback(
+    (id: string | null) => {
+      watched.current = id;
+      setFollowed(id);
+      redraw();
+    },
+    [redraw],
+  );
   const near = useCallback((at: Pointed): string | null => {
     if (!last.current) return null;
     const { crowd, moving } = last.current;
@@ -79,5 +88,8 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     return best;
   }, []);
   const latest = useCallback(() => last.current, []);
-  return useMemo(() => ({ now, followed, show, redraw, clear, follow, near, latest }), [now, followed, show, redraw, clear, follow, near, latest]);
+  return useMemo(
+    () => ({ now, followed, show, redraw, clear, follow, near, latest }),
+    [now, followed, show, redraw, clear, follow, near, latest],
+  );
 }

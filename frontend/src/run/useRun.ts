@@ -35,15 +35,26 @@ export function useRun(run: string): Run {
     const ask = (): void => {
       if (ended && left-- <= 0) return;
       runs.info(run).then(
-        (found) => { if (current) setInfo(found); },
-        (error: unknown) => { if (current) setFailure(reasonOf(error)); });
+        (found) => {
+          if (current) setInfo(found);
+        },
+        (error: unknown) => {
+          if (current) setFailure(reasonOf(error));
+        },
+      );
     };
     ask();
     const timer = setInterval(ask, POLL);
-    return () => { current = false; clearInterval(timer); };
+    return () => {
+      current = false;
+      clearInterval(timer);
+    };
   }, [run, ended, complete]);
-  const learn = useCallback((state: RunState, speed?: number | null) => setInfo((old) =>
-    old && { ...old, state, speed: speed === undefined ? old.speed : speed }), []);
+  const learn = useCallback(
+    (state: RunState, speed?: number | null) =>
+      setInfo((old) => old && { ...old, state, speed: speed === undefined ? old.speed : speed }),
+    [],
+  );
   return { info, failure, learn };
 }
 
@@ -73,10 +84,19 @@ export function useGround(name: string | null, scenario: string): Ground {
     loadGraph(name).then(setLoaded, fail);
   }, [name]);
   useEffect(() => {
-    api.scenario(scenario).then(({ document }) => setRoi(document.roi), () => setRoi([]));
+    api.scenario(scenario).then(
+      ({ document }) => setRoi(document.roi),
+      () => setRoi([]),
+    );
   }, [scenario]);
-  const inside = useMemo(() => loaded && roi && roi.length > 0 ? insideRows(loaded.graph, roi) : null, [loaded, roi]);
-  const bounds = useMemo(() => loaded && roi ? segmentsBounds(loaded.graph, roi) : null, [loaded, roi]);
-  const scene = useMemo<Scene>(() => ({ ...EMPTY_SCENE, nodes: { vehicles: false, walks: false, inside } }), [inside]);
+  const inside = useMemo(
+    () => (loaded && roi && roi.length > 0 ? insideRows(loaded.graph, roi) : null),
+    [loaded, roi],
+  );
+  const bounds = useMemo(() => (loaded && roi ? segmentsBounds(loaded.graph, roi) : null), [loaded, roi]);
+  const scene = useMemo<Scene>(
+    () => ({ ...EMPTY_SCENE, nodes: { vehicles: false, walks: false, inside } }),
+    [inside],
+  );
   return { map, drawing, loaded, scene, bounds, failure };
 }

@@ -24,7 +24,9 @@ export function hashOf(address: Address): string {
   return "#/";
 }
 
-export const go = (address: Address): void => { location.hash = hashOf(address); };
+export const go = (address: Address): void => {
+  location.hash = hashOf(address);
+};
 
 export function useAddress(): Address {
   const hash = useSyncExternalStore(

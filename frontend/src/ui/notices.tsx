@@ -42,7 +42,13 @@ export function NoticeList() {
         <Alert key={one.key} color={one.kind === "error" ? "red" : "blue"} variant="filled" py="xs" pr="xs">
           <div className="notice">
             <span>{one.text}</span>
-            <CloseButton size="sm" variant="transparent" c="white" aria-label="Close this message" onClick={() => close(one.key)} />
+            <CloseButton
+              size="sm"
+              variant="transparent"
+              c="white"
+              aria-label="Close this message"
+              onClick={() => close(one.key)}
+            />
           </div>
         </Alert>
       ))}

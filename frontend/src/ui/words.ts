@@ -2,20 +2,33 @@ import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types
 
 /** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
-  car: "Car", van: "Van", truck: "Truck", bus: "Bus", motorcycle: "Motorcycle",
-  bicycle: "Bicycle", pedestrian: "Pedestrian",
+  car: "Car",
+  van: "Van",
+  truck: "Truck",
+  bus: "Bus",
+  motorcycle: "Motorcycle",
+  bicycle: "Bicycle",
+  pedestrian: "Pedestrian",
 };
 
 export const STYLE_WORD: Record<Style, string> = {
-  cautious: "Cautious", normal: "Normal", sporty: "Sporty",
+  cautious: "Cautious",
+  normal: "Normal",
+  sporty: "Sporty",
 };
 
 /** A flow in words, by whether its road users are on foot. */
-export const flowWord = (walks: boolean): string => walks ? "Pedestrian flow" : "Vehicle flow";
+export const flowWord = (walks: boolean): string => (walks ? "Pedestrian flow" : "Vehicle flow");
 
 const KIND_WORD: Record<string, string> = {
-  clear: "Clear", cloudy: "Cloudy", wet: "Wet roads", rain_light: "Light rain",
-  rain_medium: "Rain", rain_heavy: "Heavy rain", fog: "Fog", dust: "Dust",
+  clear: "Clear",
+  cloudy: "Cloudy",
+  wet: "Wet roads",
+  rain_light: "Light rain",
+  rain_medium: "Rain",
+  rain_heavy: "Heavy rain",
+  fog: "Fog",
+  dust: "Dust",
 };
 const TIME_WORD = { day: "day", sunset: "sunset", night: "night" } as const;
 
@@ -24,17 +37,26 @@ export const weatherWord = (preset: WeatherPreset): string =>
 export const kindWord = (kind: string): string => KIND_WORD[kind] ?? kind.replaceAll("_", " ");
 
 const PARAMETER_WORD: Record<string, string> = {
-  cloudiness: "Clouds", precipitation: "Rain", precipitation_deposits: "Puddles",
-  wind_intensity: "Wind", sun_azimuth_angle: "Direction of the sun",
-  sun_altitude_angle: "Height of the sun", fog_density: "Fog", fog_distance: "Fog begins after",
-  wetness: "Wetness of the road", dust_storm: "Dust",
+  cloudiness: "Clouds",
+  precipitation: "Rain",
+  precipitation_deposits: "Puddles",
+  wind_intensity: "Wind",
+  sun_azimuth_angle: "Direction of the sun",
+  sun_altitude_angle: "Height of the sun",
+  fog_density: "Fog",
+  fog_distance: "Fog begins after",
+  wetness: "Wetness of the road",
+  dust_storm: "Dust",
 };
 /** Parameters that a person can imagine, in this order; the others only matter to a picture. */
 export const PARAMETERS = Object.entries(PARAMETER_WORD).map(([name, word]) => ({ name, word }));
 
 export const modelWord = (id: string): string =>
-  id.replace(/^(vehicle|walker)\.(pedestrian\.)?/, "").replaceAll(/[._]/g, " ")
-    .replace(/^0/, "Person 0").replace(/\b\w/g, (c) => c.toUpperCase());
+  id
+    .replace(/^(vehicle|walker)\.(pedestrian\.)?/, "")
+    .replaceAll(/[._]/g, " ")
+    .replace(/^0/, "Person 0")
+    .replace(/\b\w/g, (c) => c.toUpperCase());
 
 export function length(metres: number): string {
   if (metres >= 10_000) return `${(metres / 1000).toFixed(0)} km`;

@@ -7,7 +7,10 @@ import { Conversion } from "../../src/catalogue/Conversion";
 import { mapInfo } from "../example";
 import { choose, server, show } from "../page";
 
-const names = (): (string | null)[] => within(screen.getByRole("list", { name: "Maps" })).getAllByRole("heading").map((one) => one.textContent);
+const names = (): (string | null)[] =>
+  within(screen.getByRole("list", { name: "Maps" }))
+    .getAllByRole("heading")
+    .map((one) => one.textContent);
 
 test("maps are searched, sorted and filtered; what matches none can be taken back", async () => {
   server({ "/scenarios": [], "/maps": [mapInfo("Town", 9), mapInfo("Village", 0)] });
@@ -42,12 +45,17 @@ test("a map is only removed after a question", async () => {
 });
 
 test("the import report of a map says how much of it can be driven on", async () => {
-  server({ "/maps/Town/report": {
-    counts: {}, figures: { driving_road_length: 100, driving_road_covered: 90 },
-    entries: [{ fate: "kept", element: "road 1", reason: "stop, as right of way" }],
-  } });
+  server({
+    "/maps/Town/report": {
+      counts: {},
+      figures: { driving_road_length: 100, driving_road_covered: 90 },
+      entries: [{ fate: "kept", element: "road 1", reason: "stop, as right of way" }],
+    },
+  });
   show(<Conversion map="Town" onClose={vi.fn()} />);
   expect(screen.getByRole("dialog", { name: "Import report of Town" })).toBeTruthy();
   expect(await screen.findByText("90 %")).toBeTruthy();
-  expect(within(screen.getByRole("region", { name: "Imported unchanged" })).getByRole("listitem").textContent).toBe("Stop signs (road 1)");
+  expect(
+    within(screen.getByRole("region", { name: "Imported unchanged" })).getByRole("listitem").textContent,
+  ).toBe("Stop signs (road 1)");
 });

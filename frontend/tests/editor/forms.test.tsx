@@ -72,8 +72,19 @@ test("a pedestrian has neither driving style nor ego, but may ignore red lights"
 
 test("several road users show what they share and what differs, and change together", async () => {
   const onChange = vi.fn();
-  const { user } = show(<ManyForm actors={[{ ...car, speed: 10 }, { ...actor("b"), speed: 5 }]} onChange={onChange} />);
-  expect(screen.getByRole("textbox", { name: "Desired speed of all" })).toHaveProperty("placeholder", "different");
+  const { user } = show(
+    <ManyForm
+      actors={[
+        { ...car, speed: 10 },
+        { ...actor("b"), speed: 5 },
+      ]}
+      onChange={onChange}
+    />,
+  );
+  expect(screen.getByRole("textbox", { name: "Desired speed of all" })).toHaveProperty(
+    "placeholder",
+    "different",
+  );
   expect(screen.getByRole("textbox", { name: "Driving style of all" })).toHaveProperty("value", "Normal");
   await fill(user, "All depart after", "30");
   expect(onChange).toHaveBeenCalledWith({ depart: 30 }, "Departure");
@@ -81,7 +92,9 @@ test("several road users show what they share and what differs, and change toget
 
 test("a flow has vehicles per hour, a mix and a day profile", async () => {
   const onEdit = vi.fn();
-  const { user } = show(<FlowForm flow={flow("f", "x")} profiles={{ weekday: [1, 4, 2, 3] }} onEdit={onEdit} />);
+  const { user } = show(
+    <FlowForm flow={flow("f", "x")} profiles={{ weekday: [1, 4, 2, 3] }} onEdit={onEdit} />,
+  );
   await fill(user, "Vehicles per hour", "450");
   await choose(user, "Day profile", "Weekday");
   await fill(user, "Bus", "1");
@@ -107,14 +120,32 @@ test("the last kind of a mix stays", async () => {
 });
 
 test("background traffic has one amount, in the unit that is chosen", async () => {
-  const background: Background = { id: "b", begin: 0, end: null, profile: null, mix: { car: 1 }, fill: null, per_km: 5, trips: null };
+  const background: Background = {
+    id: "b",
+    begin: 0,
+    end: null,
+    profile: null,
+    mix: { car: 1 },
+    fill: null,
+    per_km: 5,
+    trips: null,
+  };
   const onEdit = vi.fn();
-  const { user, again } = show(<BackgroundForm background={background} profiles={{}} onEdit={onEdit} onRemove={vi.fn()} />);
+  const { user, again } = show(
+    <BackgroundForm background={background} profiles={{}} onEdit={onEdit} onRemove={vi.fn()} />,
+  );
   await fill(user, "Vehicles per kilometre", "8");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_background", background: "b", per_km: 8 });
   await choose(user, "Amount given as", "Number of trips");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_background", background: "b", trips: 500 });
-  again(<BackgroundForm background={{ ...background, per_km: null, fill: 0.25 }} profiles={{}} onEdit={onEdit} onRemove={vi.fn()} />);
+  again(
+    <BackgroundForm
+      background={{ ...background, per_km: null, fill: 0.25 }}
+      profiles={{}}
+      onEdit={onEdit}
+      onRemove={vi.fn()}
+    />,
+  );
   expect(screen.getByRole("textbox", { name: "Density" })).toHaveProperty("value", "25 %");
   await fill(user, "Until", "10");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_background", background: "b", end: 600 });
@@ -152,8 +183,15 @@ test("start and goal can be set without the map", async () => {
   const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
   const [onStart, onGoal, onShowGoals] = [vi.fn(), vi.fn(), vi.fn()];
   const part = (goal: string | null) => (
-    <StartAndGoal one={{ ...car, goal }} graph={graph} starts={starts} goals={[place("1.0.-1.1")]}
-      onStart={onStart} onGoal={onGoal} onShowGoals={onShowGoals} />
+    <StartAndGoal
+      one={{ ...car, goal }}
+      graph={graph}
+      starts={starts}
+      goals={[place("1.0.-1.1")]}
+      onStart={onStart}
+      onGoal={onGoal}
+      onShowGoals={onShowGoals}
+    />
   );
   const { user, again } = show(part(null));
   await user.click(screen.getByRole("button", { name: "Further on" }));
@@ -173,8 +211,22 @@ test("start and goal can be set without the map", async () => {
 test("a start from which no goal can be reached says so", () => {
   const document = scenario([car], ["a"]);
   const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
-  show(<StartAndGoal one={car} graph={graph} starts={starts} goals={[]} onStart={vi.fn()} onGoal={vi.fn()} onShowGoals={vi.fn()} />);
+  show(
+    <StartAndGoal
+      one={car}
+      graph={graph}
+      starts={starts}
+      goals={[]}
+      onStart={vi.fn()}
+      onGoal={vi.fn()}
+      onShowGoals={vi.fn()}
+    />,
+  );
   expect(screen.getByText(/No goal can be reached from here/)).toBeTruthy();
   const moves = within(screen.getByRole("group", { name: "Move the start" }));
-  expect(moves.getAllByRole("button").map((one) => one.textContent)).toEqual(["Further back", "Further on", "Another lane"]);
+  expect(moves.getAllByRole("button").map((one) => one.textContent)).toEqual([
+    "Further back",
+    "Further on",
+    "Another lane",
+  ]);
 });

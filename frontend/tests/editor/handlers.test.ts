@@ -31,12 +31,21 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
   const starts = new Starts(graph, picker, insideRows(graph, document.roi), document);
   const none = new Set<string>();
   return {
-    graph, picker, roi: document.roi, ones, starts,
+    graph,
+    picker,
+    roi: document.roi,
+    ones,
+    starts,
     region: { inside: document.roi, candidates: [], removable: document.roi, current: true },
-    actors: sceneActors(graph, document, null, none, none), flows: sceneFlows(graph, document, none, none),
-    selection: [], one: null, goals: null,
+    actors: sceneActors(graph, document, null, none, none),
+    flows: sceneFlows(graph, document, none, none),
+    selection: [],
+    one: null,
+    goals: null,
     changes: changesOf({
-      ones, starts, say: (text) => log.said.push(text),
+      ones,
+      starts,
+      say: (text) => log.said.push(text),
       edit: (edit, label) => {
         log.edits.push(edit);
         log.labels.push(label);
@@ -46,7 +55,9 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     select: (ids) => log.selected.push(ids),
     openStep: (step) => log.steps.push(step),
     openActors: () => log.steps.push("actors"),
-    done: () => { log.done += 1; },
+    done: () => {
+      log.done += 1;
+    },
     say: (text) => log.said.push(text),
     ...more,
   };
@@ -57,7 +68,12 @@ const at = (x: number, y: number, shift = false): Pointed => ({ x, y, reach: 0.5
 const car = (id: string, spawn: string): Actor => ({ ...actor(id, spawn), lateral_offset: 0 });
 const [FIRST, SECOND] = ["1.0.-1.0", "1.0.-1.1"];
 
-function using(tool: Tool | null, document: ScenarioDocument, more: Partial<Editing> = {}, step: Step = "actors") {
+function using(
+  tool: Tool | null,
+  document: ScenarioDocument,
+  more: Partial<Editing> = {},
+  step: Step = "actors",
+) {
   const log = new Log();
   return { log, handler: handlerFor(step, tool, editing(document, log, more)) };
 }
@@ -67,14 +83,22 @@ test("in the step of the region a click adds a segment, or takes out one of the 
   handler.pick(at(2, 0));
   handler.pick(at(0, 0));
   handler.pick(at(900, 900));
-  expect(log.edits).toEqual([{ kind: "grow_roi", segment: "b" }, { kind: "shrink_roi", segment: "a" }]);
+  expect(log.edits).toEqual([
+    { kind: "grow_roi", segment: "b" },
+    { kind: "shrink_roi", segment: "a" },
+  ]);
   expect(handler.aim).toBe(true);
 });
 
 test("a segment that holds the region together says so before it is clicked", () => {
-  const { handler } = using(null, scenario([], ["a", "b", "c"]), {
-    region: { inside: ["a", "b", "c"], candidates: [], removable: ["a", "c"], current: true },
-  }, "region");
+  const { handler } = using(
+    null,
+    scenario([], ["a", "b", "c"]),
+    {
+      region: { inside: ["a", "b", "c"], candidates: [], removable: ["a", "c"], current: true },
+    },
+    "region",
+  );
   expect(handler.hint(handler.under(at(2, 0)))).toContain("holds the region together");
   expect(handler.hint(handler.under(at(4, 0)))).toBeNull();
 });
@@ -134,10 +158,14 @@ test("with a tool in the hand road users can still be selected and goals be set"
 
 test("a tool is used on the next free start by those who do not point", () => {
   const log = new Log();
-  placeTool("car").handler(editing(scenario([car("a", FIRST)], ["a", "b"]), log)).somewhere();
+  placeTool("car")
+    .handler(editing(scenario([car("a", FIRST)], ["a", "b"]), log))
+    .somewhere();
   expect(log.edits).toEqual([{ kind: "add_actor", category: "car", spawn: SECOND }]);
   const full = new Log();
-  placeTool("car").handler(editing(scenario([car("a", FIRST)], ["a"]), full)).somewhere();
+  placeTool("car")
+    .handler(editing(scenario([car("a", FIRST)], ["a"]), full))
+    .somewhere();
   expect(full.said).toEqual(["No free point is left inside the region."]);
 });
 
@@ -155,7 +183,10 @@ test("a flow has vehicles or pedestrians by where it starts", () => {
 
 test("a copy is made once and does not take goals for places", () => {
   const one = car("a", FIRST);
-  const { log, handler } = using(copyTool(["a"]), scenario([one], ["a", "b"]), { one, goals: [place(SECOND)] });
+  const { log, handler } = using(copyTool(["a"]), scenario([one], ["a", "b"]), {
+    one,
+    goals: [place(SECOND)],
+  });
   handler.pick(at(2.1, 0));
   expect(log.edits).toEqual([{ kind: "copy_actors", copies: { [SECOND]: "a" } }]);
   expect(log).toMatchObject({ labels: ["Copy a"], done: 1 });
@@ -165,11 +196,20 @@ test("of several that are moved those that find no free start are left out, and 
   const flows = [flow("f", "ped.1.0.3.0")];
   const free = using(moveTool(["a", "f"]), scenario([car("a", FIRST)], ["a", "b"], flows));
   free.handler.pick(at(2.1, 0));
-  const [a, f] = [{ kind: "move_actor", actor: "a", spawn: SECOND }, { kind: "change_flow", flow: "f", spawn: "ped.1.0.3.1" }];
+  const [a, f] = [
+    { kind: "move_actor", actor: "a", spawn: SECOND },
+    { kind: "change_flow", flow: "f", spawn: "ped.1.0.3.1" },
+  ];
   expect(free.log).toMatchObject({ edits: [[a, f]], labels: ["Move 2 road users"], done: 1 });
-  const full = using(moveTool(["a", "f"]), scenario([car("a", FIRST), car("q", "ped.1.0.3.1")], ["a", "b"], flows));
+  const full = using(
+    moveTool(["a", "f"]),
+    scenario([car("a", FIRST), car("q", "ped.1.0.3.1")], ["a", "b"], flows),
+  );
   full.handler.pick(at(2.1, 0));
-  expect(full.log).toMatchObject({ edits: [[a]], said: ["1 road user found no free point there and was left out."] });
+  expect(full.log).toMatchObject({
+    edits: [[a]],
+    said: ["1 road user found no free point there and was left out."],
+  });
 });
 
 test("without a tool a click selects, with Shift it adds and takes out, and on the empty map it clears", () => {
@@ -193,7 +233,10 @@ test("a click opens the step of the road users, whatever was open", () => {
 
 test("a goal of the selected one is set by a click on it", () => {
   const source: Flow = flow("f", FIRST);
-  const { log, handler } = using(null, scenario([], ["a"], [source]), { one: source, goals: [place(SECOND)] });
+  const { log, handler } = using(null, scenario([], ["a"], [source]), {
+    one: source,
+    goals: [place(SECOND)],
+  });
   handler.pick(at(2.2, 0));
   expect(log.edits).toEqual([{ kind: "change_flow", flow: "f", goal: SECOND }]);
 });
@@ -213,9 +256,12 @@ test("a drag takes a road user to a free start, and those that are selected with
   expect(carried?.under(at(2, 9))).toEqual({ is: "place", place: place("ped.1.0.3.1") });
   carried?.drop(at(2, 9));
   // The one that was dragged leads: the other keeps its distance to it.
-  expect(log.edits).toEqual([[
-    { kind: "move_actor", actor: "p", spawn: "ped.1.0.3.1" }, { kind: "move_actor", actor: "a", spawn: SECOND },
-  ]]);
+  expect(log.edits).toEqual([
+    [
+      { kind: "move_actor", actor: "p", spawn: "ped.1.0.3.1" },
+      { kind: "move_actor", actor: "a", spawn: SECOND },
+    ],
+  ]);
 });
 
 test("a road user that is dropped where none can start stays, and the reason is said", () => {
@@ -234,7 +280,14 @@ test("with a tool in the hand, and where segments are pointed at, a drag moves t
 
 test("the same tool is known again, and only one that makes something new clears the selection", () => {
   expect(placeTool("car").key).toBe(placeTool("car").key);
-  const tools = [placeTool("car"), placeTool("bus"), flowTool(false), flowTool(true), copyTool(["a"]), moveTool(["a"])];
+  const tools = [
+    placeTool("car"),
+    placeTool("bus"),
+    flowTool(false),
+    flowTool(true),
+    copyTool(["a"]),
+    moveTool(["a"]),
+  ];
   expect(new Set(tools.map(({ key }) => key)).size).toBe(tools.length);
   expect(tools.map(({ makes }) => makes)).toEqual([true, true, true, true, false, false]);
 });

@@ -5,11 +5,21 @@ import { afterEach, expect, test, vi } from "vitest";
 
 import { type KeyActions, useKeys } from "../../src/editor/keys";
 
-afterEach(() => { document.body.replaceChildren(); });
+afterEach(() => {
+  document.body.replaceChildren();
+});
 
 function listening() {
   const actions = {
-    undo: vi.fn(), redo: vi.fn(), remove: vi.fn(), escape: vi.fn(), sheet: vi.fn(), copy: vi.fn(), move: vi.fn(), selectAll: vi.fn(), tool: vi.fn(),
+    undo: vi.fn(),
+    redo: vi.fn(),
+    remove: vi.fn(),
+    escape: vi.fn(),
+    sheet: vi.fn(),
+    copy: vi.fn(),
+    move: vi.fn(),
+    selectAll: vi.fn(),
+    tool: vi.fn(),
   } satisfies KeyActions;
   const { unmount } = renderHook(() => useKeys(actions));
   return { actions, unmount, user: userEvent.setup() };

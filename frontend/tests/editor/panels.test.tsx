@@ -29,12 +29,47 @@ function listed(ones: Parameters<typeof RoadUserTable>[0]["ones"], selection: st
 
 test("the table has a row for each road user and flow, in the words of the page", () => {
   const walker: Actor = { ...actor("p", "ped.1.0.3.0"), category: "pedestrian", depart: 12 };
-  listed([{ ...actor("a"), ego: true, speed: 10, goal: "1.0.-1.2" }, walker, flow("f", "1.0.-1.1"), { ...flow("g", "ped.1.0.3.1"), mix: { pedestrian: 1 } }]);
+  listed([
+    { ...actor("a"), ego: true, speed: 10, goal: "1.0.-1.2" },
+    walker,
+    flow("f", "1.0.-1.1"),
+    { ...flow("g", "ped.1.0.3.1"), mix: { pedestrian: 1 } },
+  ]);
   expect(rowsOf(table()).map((row) => row.slice(0, 9))).toEqual([
-    ["a", "Car", "any", "Road 1, right lane 1, 0 m", "Road 1, right lane 1, 4 m", "36 km/h", "after 0 s", "Normal", "yes"],
+    [
+      "a",
+      "Car",
+      "any",
+      "Road 1, right lane 1, 0 m",
+      "Road 1, right lane 1, 4 m",
+      "36 km/h",
+      "after 0 s",
+      "Normal",
+      "yes",
+    ],
     ["p", "Pedestrian", "any", "Road 1, left walkway, 0 m", "random", "default", "after 12 s", "–", ""],
-    ["f", "Flow: car", "–", "Road 1, right lane 1, 2 m", "random", "speed limit", "0 to 3600 s", "300 per hour", ""],
-    ["g", "Pedestrian flow", "–", "Road 1, left walkway, 2 m", "random", "default", "0 to 3600 s", "300 per hour", ""],
+    [
+      "f",
+      "Flow: car",
+      "–",
+      "Road 1, right lane 1, 2 m",
+      "random",
+      "speed limit",
+      "0 to 3600 s",
+      "300 per hour",
+      "",
+    ],
+    [
+      "g",
+      "Pedestrian flow",
+      "–",
+      "Road 1, left walkway, 2 m",
+      "random",
+      "default",
+      "0 to 3600 s",
+      "300 per hour",
+      "",
+    ],
   ]);
 });
 
@@ -73,12 +108,27 @@ test("a long table can be searched, and only what is found is selected with all"
 });
 
 test("only the open step shows its form; every step can be opened at any time", async () => {
-  const text = (title: string, done: boolean): StepText => ({ title, done, note: "", body: <p>form of {title}</p> });
+  const text = (title: string, done: boolean): StepText => ({
+    title,
+    done,
+    note: "",
+    body: <p>form of {title}</p>,
+  });
   const onOpen = vi.fn();
-  const { user } = show(<Steps open="region" onOpen={onOpen} steps={{
-    map: text("Map", true), region: text("Region", false), environment: text("Weather and time", false),
-    actors: text("Road users", false), traffic: text("Traffic", false), run: text("Run", false),
-  }} />);
+  const { user } = show(
+    <Steps
+      open="region"
+      onOpen={onOpen}
+      steps={{
+        map: text("Map", true),
+        region: text("Region", false),
+        environment: text("Weather and time", false),
+        actors: text("Road users", false),
+        traffic: text("Traffic", false),
+        run: text("Run", false),
+      }}
+    />,
+  );
   expect(screen.getAllByText(/^form of/).map((one) => one.textContent)).toEqual(["form of Region"]);
   expect(screen.getAllByRole("button", { expanded: false })).toHaveLength(STEPS.length - 1);
   await user.click(within(screen.getByRole("region", { name: "Run" })).getByRole("button"));
@@ -109,7 +159,14 @@ test("of very many problems the first are listed; without any there is no list",
 test("neighbours of the region are offered once they are known, and only if there are some", async () => {
   const onAll = vi.fn();
   const part = (candidates: string[], current: boolean) => (
-    <RegionStep segments={1} region={{ inside: ["a"], removable: ["a"], candidates, current }} onNext={vi.fn()} onAll={onAll} onBegin={vi.fn()} onShow={vi.fn()} />
+    <RegionStep
+      segments={1}
+      region={{ inside: ["a"], removable: ["a"], candidates, current }}
+      onNext={vi.fn()}
+      onAll={onAll}
+      onBegin={vi.fn()}
+      onShow={vi.fn()}
+    />
   );
   const { user, again } = show(part([], false));
   expect(screen.getByRole("button", { name: /^Add all/ })).toHaveProperty("disabled", true);
@@ -122,19 +179,50 @@ test("neighbours of the region are offered once they are known, and only if ther
 
 test("a region is begun by a click on the map, or with what is in its middle", async () => {
   const onBegin = vi.fn();
-  const { user } = show(<RegionStep segments={0} region={{ inside: [], removable: [], candidates: [], current: true }} onNext={vi.fn()} onAll={vi.fn()} onBegin={onBegin} onShow={vi.fn()} />);
+  const { user } = show(
+    <RegionStep
+      segments={0}
+      region={{ inside: [], removable: [], candidates: [], current: true }}
+      onNext={vi.fn()}
+      onAll={vi.fn()}
+      onBegin={onBegin}
+      onShow={vi.fn()}
+    />,
+  );
   await user.click(screen.getByRole("button", { name: "Begin in the middle of what I see" }));
   expect(onBegin).toHaveBeenCalledOnce();
 });
 
-function placing(tool: Tool | null, selected: Parameters<typeof ActorStep>[0]["selected"], document: ScenarioDocument) {
+function placing(
+  tool: Tool | null,
+  selected: Parameters<typeof ActorStep>[0]["selected"],
+  document: ScenarioDocument,
+) {
   const calls = {
-    onTool: vi.fn(), onPlaceSomewhere: vi.fn(), onEdit: vi.fn<(edit: Edit | readonly Edit[], label?: string) => void>(), onStart: vi.fn(),
-    onGoal: vi.fn(), onRemove: vi.fn(), onSelect: vi.fn(), onShowGoals: vi.fn(), onFill: vi.fn(),
+    onTool: vi.fn(),
+    onPlaceSomewhere: vi.fn(),
+    onEdit: vi.fn<(edit: Edit | readonly Edit[], label?: string) => void>(),
+    onStart: vi.fn(),
+    onGoal: vi.fn(),
+    onRemove: vi.fn(),
+    onSelect: vi.fn(),
+    onShowGoals: vi.fn(),
+    onFill: vi.fn(),
   };
   const starts = new Starts(graph, new Picker(graph), insideRows(graph, document.roi), document);
   const part = (hand: Tool | null) => (
-    <ActorStep assets={assets} graph={graph} starts={starts} selected={selected} tool={hand} goals={null} actors={1} profiles={{}} filling={false} {...calls} />
+    <ActorStep
+      assets={assets}
+      graph={graph}
+      starts={starts}
+      selected={selected}
+      tool={hand}
+      goals={null}
+      actors={1}
+      profiles={{}}
+      filling={false}
+      {...calls}
+    />
   );
   const { again, ...rest } = show(part(tool));
   return { ...rest, ...calls, hold: (hand: Tool | null) => again(part(hand)) };
@@ -147,7 +235,11 @@ test("a kind is taken into the hand and put back with the same button", async ()
   const tool = onTool.mock.lastCall?.[0] as Tool;
   hold(tool);
   expect(screen.getByRole("button", { name: "Pedestrian", pressed: true })).toBeTruthy();
-  expect(screen.getByText("Now click where the pedestrian starts: a yellow point on the map. Escape stops placing.")).toBeTruthy();
+  expect(
+    screen.getByText(
+      "Now click where the pedestrian starts: a yellow point on the map. Escape stops placing.",
+    ),
+  ).toBeTruthy();
   await user.click(screen.getByRole("button", { name: "Use the next free point" }));
   expect(onPlaceSomewhere).toHaveBeenCalledOnce();
   await user.click(screen.getByRole("button", { name: "Pedestrian" }));
@@ -157,7 +249,10 @@ test("a kind is taken into the hand and put back with the same button", async ()
 test("flows of vehicles and of pedestrians are offered", () => {
   placing(null, [], scenario([]));
   const group = within(screen.getByRole("group", { name: "Flow to place" }));
-  expect(group.getAllByRole("button").map((one) => one.textContent)).toEqual(["Vehicle flow", "Pedestrian flow"]);
+  expect(group.getAllByRole("button").map((one) => one.textContent)).toEqual([
+    "Vehicle flow",
+    "Pedestrian flow",
+  ]);
 });
 
 test("a change of several road users is one change; flows among them are left as they are", async () => {
@@ -166,7 +261,12 @@ test("a change of several road users is one change; flows among them are left as
   expect(screen.getByRole("region", { name: "Settings of 3 road users" })).toBeTruthy();
   await fill(user, "All depart after", "5");
   expect(onEdit).toHaveBeenCalledExactlyOnceWith(
-    [{ kind: "change_actor", actor: "a", depart: 5 }, { kind: "change_actor", actor: "b", depart: 5 }], "Departure of 2 road users");
+    [
+      { kind: "change_actor", actor: "a", depart: 5 },
+      { kind: "change_actor", actor: "b", depart: 5 },
+    ],
+    "Departure of 2 road users",
+  );
 });
 
 const CARLA = { state: "absent", address: "", message: "No CARLA server is there." };
@@ -174,18 +274,43 @@ const CARLA = { state: "absent", address: "", message: "No CARLA server is there
 function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunStep>[0]> = {}) {
   server({ "/carla": CARLA });
   const [onEdit, onRun] = [vi.fn(), vi.fn()];
-  const shown = show(<RunStep name="s" version={1} document={document} lights blocked={false} empty={false} busy={false} onEdit={onEdit} onRun={onRun} {...more} />);
+  const shown = show(
+    <RunStep
+      name="s"
+      version={1}
+      document={document}
+      lights
+      blocked={false}
+      empty={false}
+      busy={false}
+      onEdit={onEdit}
+      onRun={onRun}
+      {...more}
+    />,
+  );
   return { ...shown, onEdit, onRun };
 }
 
 test("a run begins in real time with its trajectories, unless another choice is made", async () => {
   const { user, onRun } = toRun(scenario([actor("a")]));
   await user.click(screen.getByRole("button", { name: "Run" }));
-  expect(onRun).toHaveBeenLastCalledWith({ scenario: "s", speed: 1, carla: false, trajectories: true, every: null });
+  expect(onRun).toHaveBeenLastCalledWith({
+    scenario: "s",
+    speed: 1,
+    carla: false,
+    trajectories: true,
+    every: null,
+  });
   await user.click(screen.getByRole("radio", { name: "As fast as possible" }));
   await choose(user, "Record trajectories", "Every 10 seconds");
   await user.click(screen.getByRole("button", { name: "Run" }));
-  expect(onRun).toHaveBeenLastCalledWith({ scenario: "s", speed: null, carla: false, trajectories: true, every: 10 });
+  expect(onRun).toHaveBeenLastCalledWith({
+    scenario: "s",
+    speed: null,
+    carla: false,
+    trajectories: true,
+    every: 10,
+  });
   expect(await screen.findByText("CARLA not connected")).toBeTruthy();
 });
 
@@ -194,7 +319,19 @@ test("signals are fixed-time or actuated; a map without them asks nothing", asyn
   expect(screen.getByText("Every signal keeps its times.")).toBeTruthy();
   await user.click(screen.getByRole("radio", { name: "Actuated" }));
   expect(onEdit).toHaveBeenCalledWith({ kind: "set_signal_control", control: "actuated" });
-  again(<RunStep name="s" version={1} document={scenario([])} lights={false} blocked={false} empty busy={false} onEdit={onEdit} onRun={vi.fn()} />);
+  again(
+    <RunStep
+      name="s"
+      version={1}
+      document={scenario([])}
+      lights={false}
+      blocked={false}
+      empty
+      busy={false}
+      onEdit={onEdit}
+      onRun={vi.fn()}
+    />,
+  );
   expect(screen.queryByRole("radiogroup", { name: "Signal control" })).toBeNull();
 });
 
@@ -216,7 +353,19 @@ test("an empty scenario, or one with errors, cannot be run and says why", () => 
   const { again } = toRun(scenario([]), { empty: true });
   expect(screen.getByRole("button", { name: "Run" })).toHaveProperty("disabled", true);
   expect(screen.getByText(/There are no road users yet/)).toBeTruthy();
-  again(<RunStep name="s" version={1} document={scenario([])} lights blocked empty={false} busy={false} onEdit={vi.fn()} onRun={vi.fn()} />);
+  again(
+    <RunStep
+      name="s"
+      version={1}
+      document={scenario([])}
+      lights
+      blocked
+      empty={false}
+      busy={false}
+      onEdit={vi.fn()}
+      onRun={vi.fn()}
+    />,
+  );
   expect(screen.getByRole("button", { name: "Run" })).toHaveProperty("disabled", true);
   expect(screen.getByText("Solve the problems listed below first.")).toBeTruthy();
 });
@@ -230,13 +379,24 @@ test("a table that is refused lists every reason, and one that is imported says 
   expect(screen.getByLabelText("An example").textContent).toBe("from,to,trips\nr1,r2,120\nr2,r1,90\n");
   await choose(user, "Contents of the table", "Counts");
   expect(screen.getByRole("textbox", { name: "Name" })).toHaveProperty("value", "counts");
-  vi.stubGlobal("fetch", () => Promise.resolve(new Response(
-    JSON.stringify({ error: { kind: "TableError", message: "no", problems: ["line 2: no place", "line 3: no count"] } }), { status: 422 })));
+  vi.stubGlobal("fetch", () =>
+    Promise.resolve(
+      new Response(
+        JSON.stringify({
+          error: { kind: "TableError", message: "no", problems: ["line 2: no place", "line 3: no count"] },
+        }),
+        { status: 422 },
+      ),
+    ),
+  );
   const input = window.document.querySelector<HTMLInputElement>("input[type=file]");
   if (!input) throw new Error("there is no field for a file");
   await user.upload(input, new File(["x"], "mine.csv", { type: "text/csv" }));
   expect(await screen.findByText("mine.csv was not imported")).toBeTruthy();
-  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual(["Line 2: no place", "Line 3: no count"]);
+  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual([
+    "Line 2: no place",
+    "Line 3: no count",
+  ]);
 });
 
 test("the tour has three cards and ends with the last", async () => {
@@ -255,7 +415,15 @@ test("the help has the shortcuts and explains the terms of the page, each once",
   expect(screen.getByText("Ctrl+Z / Ctrl+Y")).toBeTruthy();
   await user.click(screen.getByRole("tab", { name: "Glossary" }));
   const terms = [...document.querySelectorAll("dt")].map((one) => one.textContent);
-  for (const term of ["Region of interest (study area)", "Teleported", "Not inserted", "Control delay", "Intergreen", "Random seed", "Time to collision"]) {
+  for (const term of [
+    "Region of interest (study area)",
+    "Teleported",
+    "Not inserted",
+    "Control delay",
+    "Intergreen",
+    "Random seed",
+    "Time to collision",
+  ]) {
     expect(terms).toContain(term);
   }
   expect(new Set(terms).size).toBe(terms.length);

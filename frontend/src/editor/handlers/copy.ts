@@ -6,11 +6,16 @@ export const copyTool = (ids: readonly string[]): Tool => ({
   key: `copy ${ids.join(" ")}`,
   help: "Click where the copy starts. Escape stops.",
   makes: false,
-  handler: (editing) => startingHandler(editing, {
-    walks: onFoot(editing, ids[0]), badge: null, who: "copy", prompt: "Point at the place to copy to", setsGoals: false,
-    apply: (to) => {
-      editing.changes.copy(ids, to);
-      editing.done();
-    },
-  }),
+  handler: (editing) =>
+    startingHandler(editing, {
+      walks: onFoot(editing, ids[0]),
+      badge: null,
+      who: "copy",
+      prompt: "Point at the place to copy to",
+      setsGoals: false,
+      apply: (to) => {
+        editing.changes.copy(ids, to);
+        editing.done();
+      },
+    }),
 });

@@ -9,9 +9,14 @@ export function flowTool(walks: boolean): Tool {
     key: walks ? "pedestrian flow" : "vehicle flow",
     help: startHelp(who, walks),
     makes: true,
-    handler: (editing) => startingHandler(editing, {
-      walks, badge: null, who, prompt: startPrompt(who, walks), setsGoals: true,
-      apply: (to) => editing.changes.placeFlow(walks, to),
-    }),
+    handler: (editing) =>
+      startingHandler(editing, {
+        walks,
+        badge: null,
+        who,
+        prompt: startPrompt(who, walks),
+        setsGoals: true,
+        apply: (to) => editing.changes.placeFlow(walks, to),
+      }),
   };
 }

@@ -11,9 +11,14 @@ export function placeTool(category: Category): Tool {
     key: `place ${category}`,
     help: startHelp(who, walks),
     makes: true,
-    handler: (editing) => startingHandler(editing, {
-      walks, badge: category, who, prompt: startPrompt(who, walks), setsGoals: true,
-      apply: (to) => editing.changes.place(category, to),
-    }),
+    handler: (editing) =>
+      startingHandler(editing, {
+        walks,
+        badge: category,
+        who,
+        prompt: startPrompt(who, walks),
+        setsGoals: true,
+        apply: (to) => editing.changes.place(category, to),
+      }),
   };
 }

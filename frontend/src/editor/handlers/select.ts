@@ -41,8 +41,13 @@ export function goalAt(editing: Editing, at: Pointed): { place: Place; set: () =
 }
 
 /** Selects one, or adds it to the selection, or takes it out again; null is nothing under the pointer. */
-export function choose({ selection, select }: Pick<Editing, "selection" | "select">, id: string | null, more: boolean): void {
-  if (id === null) { if (!more) select([]); }
-  else if (!more) select([id]);
+export function choose(
+  { selection, select }: Pick<Editing, "selection" | "select">,
+  id: string | null,
+  more: boolean,
+): void {
+  if (id === null) {
+    if (!more) select([]);
+  } else if (!more) select([id]);
   else select(selection.includes(id) ? selection.filter((other) => other !== id) : [...selection, id]);
 }

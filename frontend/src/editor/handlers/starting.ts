@@ -18,7 +18,10 @@ interface Starting {
 }
 
 /** A click on a free start uses it; a click on a road user selects. */
-export function startingHandler(editing: Editing, { walks, badge, who, prompt, setsGoals, apply }: Starting): ToolHandler {
+export function startingHandler(
+  editing: Editing,
+  { walks, badge, who, prompt, setsGoals, apply }: Starting,
+): ToolHandler {
   const { graph, starts, ones, roi, say, openStep } = editing;
   return {
     ...LOOKING,
@@ -26,7 +29,7 @@ export function startingHandler(editing: Editing, { walks, badge, who, prompt, s
     walks,
     badge,
     under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walks)),
-    hint: (hover) => hover?.is === "place" ? whereabouts(editing, hover) : prompt,
+    hint: (hover) => (hover?.is === "place" ? whereabouts(editing, hover) : prompt),
     pick: (at) => {
       const goal = setsGoals ? goalAt(editing, at) : null;
       const there = oneAt(editing, at);
@@ -41,7 +44,10 @@ export function startingHandler(editing: Editing, { walks, badge, who, prompt, s
     },
     frame: (bounds) => selectFrame(editing, bounds),
     somewhere: () => {
-      const to = starts.first(walks, ones.flatMap((one) => graph.place(one.spawn) ?? []));
+      const to = starts.first(
+        walks,
+        ones.flatMap((one) => graph.place(one.spawn) ?? []),
+      );
       if (to) apply(to);
       else say("No free point is left inside the region.");
     },

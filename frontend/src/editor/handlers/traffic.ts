@@ -5,5 +5,5 @@ import { segmentHover } from "./segments";
 export const trafficHandler = ({ graph, picker }: Editing): Handler => ({
   ...LOOKING,
   under: (at) => segmentHover(picker, at),
-  hint: (hover) => hover?.is === "segment" ? `Id for tables: ${graph.segmentId(hover.row)}` : null,
+  hint: (hover) => (hover?.is === "segment" ? `Id for tables: ${graph.segmentId(hover.row)}` : null),
 });
