@@ -121,7 +121,9 @@ def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> Non
         user.open_editor(LONG)
         user.step("Run").click()
         user.run.click()
-        expect(user.page.get_by_text(re.compile(r"^\d of 4 parts completed"))).to_be_visible(timeout=120_000)
+        expect(user.page.get_by_text(re.compile(r"^\d of 4 parts completed"))).to_be_visible(
+            timeout=120_000
+        )
         user.control("Resume later").click()
         expect(user.result).to_contain_text("interrupted")
         camera.take("interrupted")
