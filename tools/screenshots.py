@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -111,7 +112,7 @@ def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> Non
         user.step("Traffic").click()
         camera.take("traffic")
         user.step("Run").click()
-        user.choose_pace("As fast as it can")
+        user.choose_pace("As fast as possible")
         user.run.click()
         expect(user.result).to_contain_text("finished", timeout=120_000)
         user.page.get_by_role("tab", name="Counts").click()
@@ -120,8 +121,10 @@ def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> Non
         user.open_editor(LONG)
         user.step("Run").click()
         user.run.click()
-        expect(user.page.get_by_text("1 of 4 parts done")).to_be_visible(timeout=120_000)
-        user.control("Go on later").click()
+        expect(user.page.get_by_text(re.compile(r"^\d of 4 parts completed"))).to_be_visible(
+            timeout=120_000
+        )
+        user.control("Resume later").click()
         expect(user.result).to_contain_text("interrupted")
         camera.take("interrupted")
 
@@ -135,7 +138,7 @@ def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path)
         expect(user.maps).to_have_count(len(shipped_maps()))
         user.page.wait_for_load_state("networkidle")  # the cards' pictures
         camera.take("catalogue")
-        user.page.get_by_role("button", name=f"How it was taken over: {MAP}").click()
+        user.page.get_by_role("button", name=f"Import report of {MAP}").click()
         expect(user.page.get_by_role("dialog")).to_be_visible()
         user.page.wait_for_load_state("networkidle")
         camera.take("conversion")
@@ -156,9 +159,9 @@ def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path)
         user.wait_until_moving()
         expect(user.figure("Time").first).to_have_text("0:06.0", timeout=30_000)
         user.control("Pause").click()
-        expect(user.control("Go on")).to_be_enabled()
+        expect(user.control("Resume")).to_be_enabled()
         camera.take("run")
-        user.control("Go on").click()
+        user.control("Resume").click()
         user.choose_speed("As fast")
         expect(user.result).to_contain_text("finished", timeout=60_000)
         expect(user.result.get_by_role("link", name="Full report")).to_be_visible()

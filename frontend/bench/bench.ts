@@ -1,4 +1,5 @@
 import type { GraphColumns } from "../src/api/types";
+import { nth } from "../src/lists";
 import type { PackedDrawing } from "../src/map/drawing";
 import { Graph } from "../src/map/graph";
 import { Picker } from "../src/map/picking";
@@ -22,15 +23,23 @@ function crowd(columns: GraphColumns, time: number): Moving {
   const category = new Uint8Array(vehicles);
   for (let i = 0; i < vehicles; i++) {
     const node = Math.floor(i * 7.919 + time * 5) % columns.x.length;
-    pose.set([columns.x[node], columns.y[node], columns.hdg[node], 4.8, 1.9], 5 * i);
+    pose.set([nth(columns.x, node), nth(columns.y, node), nth(columns.hdg, node), 4.8, 1.9], 5 * i);
     category[i] = i % 6;
   }
   return { count: vehicles, pose, category, flags: new Uint8Array(vehicles).fill(3), ego: 0, followed: -1 };
 }
 
-interface Figures { fps: number; busy: number; worst: number }
+interface Figures {
+  fps: number;
+  busy: number;
+  worst: number;
+}
 
-async function during(renderer: CanvasRenderer, columns: GraphColumns, move: (k: number) => void): Promise<Figures> {
+async function during(
+  renderer: CanvasRenderer,
+  columns: GraphColumns,
+  move: (k: number) => void,
+): Promise<Figures> {
   const began = performance.now();
   const start = { ...renderer.stats };
   let last = began;
@@ -50,7 +59,11 @@ async function during(renderer: CanvasRenderer, columns: GraphColumns, move: (k:
       if (now - began < 1000 * seconds) requestAnimationFrame(tick);
       else {
         const drawn = renderer.stats.frames - start.frames;
-        done({ fps: (1000 * frames) / (now - began), busy: (renderer.stats.busy - start.busy) / drawn, worst });
+        done({
+          fps: (1000 * frames) / (now - began),
+          busy: (renderer.stats.busy - start.busy) / drawn,
+          worst,
+        });
       }
     };
     requestAnimationFrame(tick);
@@ -74,29 +87,38 @@ async function main(): Promise<void> {
   renderer.setView(whole);
   const ready = performance.now();
 
-  const at = (scale: number): View => ({ x: columns.x[4000], y: columns.y[4000], scale });
+  const at = (scale: number): View => ({ x: nth(columns.x, 4000), y: nth(columns.y, 4000), scale });
   const results: Record<string, Figures> = {};
-  const sway = (view: View) => (k: number): void => renderer.setView(panBy(view, 160 * Math.sin(k / 25), 110 * Math.sin(k / 40)));
+  const sway =
+    (view: View) =>
+    (k: number): void =>
+      renderer.setView(panBy(view, 160 * Math.sin(k / 25), 110 * Math.sin(k / 40)));
   results["still, whole map"] = await during(renderer, columns, () => undefined);
   results["panning, whole map"] = await during(renderer, columns, sway(whole));
   results["panning, 3 px/m"] = await during(renderer, columns, sway(at(3)));
   results["panning, 12 px/m"] = await during(renderer, columns, sway(at(12)));
   results["zooming"] = await during(renderer, columns, (k) =>
-    renderer.setView(zoomAt(at(3), size, Math.exp(1.8 * Math.sin(k / 30)), 300, 300, whole.scale)));
+    renderer.setView(zoomAt(at(3), size, Math.exp(1.8 * Math.sin(k / 30)), 300, 300, whole.scale)),
+  );
 
   const picks: number[] = [];
   for (let i = 0; i < 500; i++) {
     const node = (i * 37) % columns.x.length;
     const from = performance.now();
-    picker.place(columns.x[node] + 1, columns.y[node] - 1, 20, { vehicles: true, walks: true });
-    picker.segment(columns.x[node] + 3, columns.y[node] - 3, 20);
+    picker.place(nth(columns.x, node) + 1, nth(columns.y, node) - 1, 20, { vehicles: true, walks: true });
+    picker.segment(nth(columns.x, node) + 3, nth(columns.y, node) - 3, 20);
     picks.push(performance.now() - from);
   }
   picks.sort((a, b) => a - b);
   Object.assign(window, {
     odscenBench: {
-      map, vehicles, nodes: columns.x.length, fetched: fetched - began, ready: ready - fetched, results,
-      pick: { median: picks[250], worst: picks[499] },
+      map,
+      vehicles,
+      nodes: columns.x.length,
+      fetched: fetched - began,
+      ready: ready - fetched,
+      results,
+      pick: { median: nth(picks, 250), worst: nth(picks, 499) },
     },
   });
 }

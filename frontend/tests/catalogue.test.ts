@@ -1,55 +1,57 @@
 import { expect, test } from "vitest";
 
-import type { ConversionReport, MapInfo } from "../src/api/types";
+import type { ConversionReport } from "../src/api/types";
 import { coverage, grouped } from "../src/catalogue/conversion";
 import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
-import { hashOf, parseRoute } from "../src/ui/route";
+import { hashOf, parseAddress } from "../src/ui/address";
 import { clock, length, mapFacts, modelWord } from "../src/ui/words";
+import { mapInfo } from "./example";
 
 type Entry = ConversionReport["entries"][number];
-const map = (name: string, junctions: number): MapInfo => ({
-  name, sha256: "", source: "", opendrive: { version: "1.7", rule: "RHT" }, report_counts: {}, preview: "",
-  graph: {
-    spacing: 2, nodes: 1, successor_edges: 0, left_edges: 0, right_edges: 0, segments: 1, pedestrian_nodes: 0,
-    pedestrian_edges: 0,
-  },
-  sumo: { net_file: "", edges: 0, lanes: 0, junctions: 0, tl_logics: 0, crossings: 0, walking_areas: 0 },
-  statistics: {
-    bounds: [0, 0, 1200, 800], road_length: 1, connecting_road_length: 0, driving_lane_length: 33_345, roads: 1, junctions,
-    crosswalks: 1, traffic_lights: 0, pedestrian_lights: 0, stop_signs: 0, yield_signs: 0, stop_lines: 0,
-    speed_limit_min: 13.9, speed_limit_max: 13.9, rule: "RHT",
-  },
-});
 
 test("maps are found by all words and sorted by name as people count", () => {
-  const maps = [map("Town 10", 3), map("Town 2", 9), map("Village", 1)];
+  const maps = [mapInfo("Town 10", 3), mapInfo("Town 2", 9), mapInfo("Village", 1)];
   expect(arranged(maps, "town", "name").map((one) => one.name)).toEqual(["Town 2", "Town 10"]);
-  expect(arranged(maps, "", "junctions")[0].name).toBe("Town 2");
+  expect(arranged(maps, "", "junctions")[0]?.name).toBe("Town 2");
   expect(arranged(maps, "10 town", "name")).toHaveLength(1);
 });
 
 test("an address leads back to the same view, whatever the name", () => {
   for (const name of ["plain", "a/b #1 ü %", "100%"]) {
-    expect(parseRoute(hashOf({ view: "editor", scenario: name }))).toEqual({ view: "editor", scenario: name });
-    expect(parseRoute(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({ view: "run", scenario: name, run: "r1" });
+    expect(parseAddress(hashOf({ view: "editor", scenario: name }))).toEqual({
+      view: "editor",
+      scenario: name,
+    });
+    expect(parseAddress(hashOf({ view: "run", scenario: name, run: "r1" }))).toEqual({
+      view: "run",
+      scenario: name,
+      run: "r1",
+    });
   }
-  expect(parseRoute("#/nonsense")).toEqual({ view: "catalogue" });
+  expect(parseAddress("#/nonsense")).toEqual({ view: "catalogue" });
 });
 
 test("figures are said as people say them", () => {
-  expect(mapFacts(map("x", 1).statistics)).toEqual(
-    ["1.2 km × 800 m", "33 km of lanes", "1 junction", "1 crosswalk", "0 traffic lights", "limit 50 km/h"]);
+  expect(mapFacts(mapInfo("x", 1).statistics)).toEqual([
+    "1.2 km × 800 m",
+    "33 km of lanes",
+    "1 junction",
+    "1 crosswalk",
+    "0 traffic lights",
+    "limit 50 km/h",
+  ]);
   expect(clock(75.04)).toBe("1:15.0");
   expect(length(950)).toBe("950 m");
   expect(modelWord("vehicle.tesla.model3")).toBe("Tesla Model3");
 });
 
 test("only maps that have all that is wished for are shown", () => {
-  const [left, lit] = [map("left", 2), map("lit", 0)];
+  const [left, lit] = [mapInfo("left", 2), mapInfo("lit", 0)];
   left.statistics.rule = "LHT";
   lit.statistics.traffic_lights = 4;
-  const names = (...wishes: Wish[]): string[] => arranged([left, lit], "", "name", wishes).map((one) => one.name);
+  const names = (...wishes: Wish[]): string[] =>
+    arranged([left, lit], "", "name", wishes).map((one) => one.name);
   expect(names()).toEqual(["left", "lit"]);
   expect(names("left")).toEqual(["left"]);
   expect(names("lights", "crosswalks")).toEqual(["lit"]);
@@ -60,24 +62,42 @@ test("only maps that have all that is wished for are shown", () => {
 test("a conversion report says the same of many places once, what was lost first", () => {
   const entry = (fate: Entry["fate"], element: string, reason: string): Entry => ({ fate, element, reason });
   const report = {
-    counts: {}, figures: { driving_road_length: 300, driving_road_covered: 299.9, driving_junction_length: 100, driving_junction_covered: 100 },
+    counts: {},
+    figures: {
+      driving_road_length: 300,
+      driving_road_covered: 299.9,
+      driving_junction_length: 100,
+      driving_junction_covered: 100,
+    },
     entries: [
       entry("kept", "road 1 > object 3", "crosswalk, as a crossing of its place and width"),
       entry("lost", "road 1", "lanes of type shoulder are open to nobody and left out"),
-      entry("lost", "road 2", "lanes of type shoulder are open to nobody and left out"),
+      entry("lost", "road 2", "lanes of type shoulder are open to no road user and left out"),
       entry("lost", "road 9", "SUMO knows no such thing"),
     ],
   };
   expect(grouped(report)).toEqual([
-    { fate: "lost", title: "Could not be used", findings: [
-      { text: "Lanes of the kind “shoulder” are not driven on and are left out", places: ["road 1", "road 2"] },
-      { text: "The simulation knows no such thing", places: ["road 9"] }] },
-    { fate: "kept", title: "Was taken over as it is", findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }] },
+    {
+      outcome: "lost",
+      title: "Could not be used",
+      findings: [
+        {
+          text: "Lanes of the kind “shoulder” are not driven on and are left out",
+          places: ["road 1", "road 2"],
+        },
+        { text: "The simulation knows no such thing", places: ["road 9"] },
+      ],
+    },
+    {
+      outcome: "kept",
+      title: "Imported unchanged",
+      findings: [{ text: "Crosswalks, with place and width", places: ["road 1 > object 3"] }],
+    },
   ]);
   expect(coverage(report)).toEqual({ driving: 99, walking: null });
 });
 
-test("steps of a job are told in plain words, with the map's name if there are several", () => {
+test("steps of a job are reported in plain words, with the map's name if there are several", () => {
   expect(stepWords("making the SUMO network")).toBe("Step 3 of 4: preparing the simulation");
   expect(stepWords("town: drawing the map")).toBe("town, step 4 of 4: drawing the map");
   expect(stepWords("waiting")).toBe("Waiting");

@@ -1,55 +1,37 @@
 import { afterEach, expect, test, vi } from "vitest";
 
-import type { Actor, Edit, Flow, GraphColumns, Problem, ScenarioDocument, ScenarioState } from "../src/api/types";
-import { boundsOfProblem, inFrame, nearestOne, ofProblem, sceneActors, sceneFlows, segmentStyles, wrongOnes } from "../src/editor/scene";
+import type { Edit, ScenarioDocument, ScenarioState } from "../src/api/types";
+import {
+  boundsOfProblem,
+  inFrame,
+  nearestOne,
+  ofProblem,
+  sceneActors,
+  sceneFlows,
+  segmentStyles,
+  wrongOnes,
+} from "../src/editor/scene";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
 import { Starts } from "../src/editor/placing";
 import { rowsInSight } from "../src/editor/windowed";
-import { Graph } from "../src/map/graph";
 import { Picker } from "../src/map/picking";
+import { actor, flow, graph, place, problem, scenario } from "./example";
 
-const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
-  id, category: "car", model: null, spawn, goal: null, speed: null, lateral_offset: 0.5, depart: 0,
-  style: "normal", ego: false, crosses_anywhere: false, ignores_red: false,
-});
-const flow = (id: string, spawn: string): Flow => ({
-  id, spawn, goal: null, per_hour: 300, begin: 0, end: 3600, mix: { car: 1 }, speed: null, profile: null,
-});
-const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): ScenarioDocument => ({
-  format: "odscen-scenario", version: 1, name: "s", description: "", map: { name: "m", sha256: "", spacing: 2 }, seed: 0, roi,
-  environment: { preset: "ClearNoon", parameters: {}, affects_driving: true }, actors, flows,
-  demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
-  signals: { control: "fixed", junctions: [] },
-  simulation: { duration: 60, step_length: 0.5 },
-});
-const problem = (where: string, nodes: string[] = []): Problem => ({
-  severity: "error", code: "x", where, message: "m", nodes, segments: ["b"],
-});
-const walks = {
-  lane_keys: ["1.0.3"], first_node: [0, 2], lane: [0, 0], x: [0, 2], y: [9, 9], hdg: [0, 0], width: [2, 2],
-  walkable: [1, 1], segment: [0, 1], source: [], target: [], kind: [],
-};
-const columns: GraphColumns = {
-  spacing: 2, lane_keys: ["1.0.-1"], lane_types: ["driving"], lane_junctions: [null], first_node: [0, 3], lane: [0, 0, 0],
-  s: [0, 2, 4], x: [0, 2, 4], y: [0, 0, 0], hdg: [0, 0, 0], width: [3, 3, 3], segment: [0, 1, 2],
-  left_lane: [-1, -1, -1], right_lane: [-1, -1, -1],
-  speed_limit: [13.889, null, null], spawnable: [1, 1, 0],
-  segments: ["a", "b", "c"].map((id) => ({ id, kind: "road", neighbours: [] })),
-  edges: { source: [], target: [], relation: [] }, walks,
-};
-const graph = new Graph(columns);
-
-test("the first piece is dark blue, the rest of the region blue, what can be added light blue", () => {
+test("the first segment is dark blue, the rest of the region blue, what can be added light blue", () => {
   const styles = segmentStyles(graph, ["b", "a"], ["c"], true);
-  expect([...styles].sort()).toEqual([[0, "member"], [1, "base"], [2, "eligible"]]);
+  expect([...styles].sort()).toEqual([
+    [0, "member"],
+    [1, "base"],
+    [2, "eligible"],
+  ]);
 });
 
-test("before the first piece nothing stands out, though all may be chosen", () => {
+test("before the first segment nothing is highlighted, though all may be chosen", () => {
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
 });
 
-test("a new road user or stream is selected; after a removal the others stay selected", () => {
+test("a new road user or flow is selected; after a removal the others stay selected", () => {
   const [a, b] = [actor("a"), actor("b")];
   expect(selectionAfter(["a"], scenario([a]), scenario([a, b]))).toEqual(["b"]);
   expect(selectionAfter(["a"], scenario([a]), scenario([a], ["a"], [flow("f", "1.0.-1.1")]))).toEqual(["f"]);
@@ -63,13 +45,15 @@ test("a road user is drawn to the left of its lane by its offset, and red when i
   expect(found[0]).toMatchObject({ x: 0, y: 0.5, offset: 0.5, selected: true, problem: true });
 });
 
-test("a stream is drawn where it begins, with what it brings in an hour", () => {
+test("a flow is drawn at its start, with its volume per hour", () => {
   const document = scenario([], ["a"], [flow("f", "1.0.-1.1")]);
   const wrong = wrongOnes([problem("flows[0].spawn")], document);
-  expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([{ id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true }]);
+  expect(sceneFlows(graph, document, new Set(), wrong)).toMatchObject([
+    { id: "f", x: 2, y: 0, perHour: 300, walk: false, problem: true },
+  ]);
 });
 
-test("a problem leads to its road user or stream and to its place on the map", () => {
+test("a problem leads to its road user or flow and to its place on the map", () => {
   const document = scenario([actor("a"), actor("b", "1.0.-1.2")], ["a"], [flow("f", "1.0.-1.1")]);
   expect(ofProblem(problem("actors[1].spawn"), document)?.id).toBe("b");
   expect(ofProblem(problem("flows[0].spawn"), document)?.id).toBe("f");
@@ -79,7 +63,13 @@ test("a problem leads to its road user or stream and to its place on the map", (
 });
 
 test("a road user is picked within reach or on its body, several in a rectangle", () => {
-  const actors = sceneActors(graph, scenario([actor("a"), actor("b", "1.0.-1.2")]), null, new Set(), new Set());
+  const actors = sceneActors(
+    graph,
+    scenario([actor("a"), actor("b", "1.0.-1.2")]),
+    null,
+    new Set(),
+    new Set(),
+  );
   expect(nearestOne(actors, 1.9, 0.5, 0.1)?.id).toBe("a");
   expect(nearestOne(actors, 0, 3, 0.1)).toBeNull();
   expect(inFrame(actors, [3, -1, 5, 1])).toEqual(["b"]);
@@ -96,16 +86,17 @@ test("only free and usable places of the region are offered, of the right kind",
   expect(startsOf(scenario([]), 2).near(0, 0, 1, false)).toBeNull();
 });
 
-test("who cannot start somewhere is told why", () => {
-  expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain("No bicycle may start here");
+test("a road user that cannot start somewhere comes with the reason", () => {
+  expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain(
+    "No bicycle may start here",
+  );
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
-  expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("taken");
+  expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");
   expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("yellow");
 });
 
 test("a start moves along its lane past those who stand there, and not out of the region", () => {
-  const at = graph.place("1.0.-1.0");
-  if (!at) throw new Error("the test's own place");
+  const at = place("1.0.-1.0");
   expect(startsOf(scenario([actor("a")]), 0, 1).along(at, 1)?.id).toBe("1.0.-1.1");
   expect(startsOf(scenario([actor("a")]), 0).along(at, 1)).toBeNull();
   expect(startsOf(scenario([actor("a"), actor("b", "1.0.-1.1")]), 0, 1).along(at, 1)).toBeNull();
@@ -113,12 +104,14 @@ test("a start moves along its lane past those who stand there, and not out of th
 
 test("copies keep their distances, no two on one place", () => {
   const ones = [actor("a"), { ...actor("p", "ped.1.0.3.0"), category: "pedestrian" as const }];
-  const to = graph.place("1.0.-1.1");
-  if (!to) throw new Error("the test's own place");
-  expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([["a", "1.0.-1.1"], ["p", "ped.1.0.3.1"]]);
+  const to = place("1.0.-1.1");
+  expect(startsOf(scenario(ones), 0, 1).shifted(ones, to)).toEqual([
+    ["a", "1.0.-1.1"],
+    ["p", "ped.1.0.3.1"],
+  ]);
 });
 
-test("a place is told in words", () => {
+test("a place is described in words", () => {
   expect(placeWord(graph, "1.0.-1.2")).toBe("Road 1, right lane 1, 4 m");
   expect(placeWord(graph, "ped.1.0.3.1")).toBe("Road 1, left walkway, 2 m");
   expect(laneFacts(graph, "1.0.-1.0")).toBe("Driving lane, 3.0 m wide, limit 50 km/h");
@@ -131,7 +124,13 @@ test("of a long table only what is in sight is drawn", () => {
 });
 
 const state = (version: number, ...ids: string[]): ScenarioState => ({
-  name: "s", version, document: scenario(ids.map((id) => actor(id))), problems: [], label: "", undo: null, redo: null,
+  name: "s",
+  version,
+  document: scenario(ids.map((id) => actor(id))),
+  problems: [],
+  label: "",
+  undo: null,
+  redo: null,
 });
 
 function answers(...list: [number, unknown][]): { url: string; body: unknown }[] {
@@ -157,25 +156,31 @@ test("changes go out one at a time, each with the version before it", async () =
   expect(store.getState()).toMatchObject({ saving: "saved", selection: ["b"] });
 });
 
-test("a refusal is told and changes nothing", async () => {
+test("a refusal is reported and changes nothing", async () => {
   answers([200, state(1)], [422, { error: { kind: "ScenarioError", message: "the node is taken" } }]);
   const store = createEditorStore("s");
   await store.getState().load();
   expect(await store.getState().edit(add)).toBeNull();
-  expect(store.getState()).toMatchObject({ refusal: { message: "the node is taken", again: null }, saving: "saved" });
+  expect(store.getState()).toMatchObject({
+    refusal: { message: "the node is taken", again: null },
+    saving: "saved",
+  });
   expect(store.getState().scenario?.version).toBe(1);
 });
 
 test("what another tab has done is loaded; one's own change can be made again on top", async () => {
   const asked = answers(
-    [200, state(1)], [409, { error: { kind: "Conflict", message: "newer", current: 5 } }], [200, state(5, "x")],
-    [200, state(6, "x", "y")]);
+    [200, state(1)],
+    [409, { error: { kind: "Conflict", message: "newer", current: 5 } }],
+    [200, state(5, "x")],
+    [200, state(6, "x", "y")],
+  );
   const store = createEditorStore("s");
   await store.getState().load();
   await store.getState().edit(add);
   expect(store.getState().scenario?.version).toBe(5);
   await store.getState().refusal?.again?.();
-  expect(asked[3].body).toEqual({ version: 5, edits: [add] });
+  expect(asked[3]?.body).toEqual({ version: 5, edits: [add] });
   expect(store.getState()).toMatchObject({ refusal: null, selection: ["y"] });
 });
 
@@ -183,8 +188,19 @@ test("several edits go out as one", async () => {
   const asked = answers([200, state(1)], [200, state(2)]);
   const store = createEditorStore("s");
   await store.getState().load();
-  await store.getState().edit([{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }], "Add 2 segments");
-  expect(asked[1].body).toEqual({
-    version: 1, label: "Add 2 segments", edits: [{ kind: "grow_roi", segment: "b" }, { kind: "grow_roi", segment: "c" }],
+  await store.getState().edit(
+    [
+      { kind: "grow_roi", segment: "b" },
+      { kind: "grow_roi", segment: "c" },
+    ],
+    "Add 2 segments",
+  );
+  expect(asked[1]?.body).toEqual({
+    version: 1,
+    label: "Add 2 segments",
+    edits: [
+      { kind: "grow_roi", segment: "b" },
+      { kind: "grow_roi", segment: "c" },
+    ],
   });
 });

@@ -1,10 +1,20 @@
 import type { FigureInfo } from "../src/api/figures";
 
 const figure = (
-  name: string, part: FigureInfo["part"], label: string, better: FigureInfo["better"],
+  name: string,
+  part: FigureInfo["part"],
+  label: string,
+  better: FigureInfo["better"],
   display: Partial<FigureInfo["display"]> = {},
 ): FigureInfo => ({
-  name, part, label, better, unit: "", definition: "", source: "", on_page: true,
+  name,
+  part,
+  label,
+  better,
+  unit: "",
+  definition: "",
+  source: "",
+  on_page: true,
   display: { unit: "", factor: 1, digits: 0, clock: false, ...display },
 });
 

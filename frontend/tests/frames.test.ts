@@ -25,7 +25,9 @@ test("a frame that does not add up is refused", () => {
 
 test("who has not been introduced is not drawn, the others have their true size", () => {
   const crowd = new Crowd();
-  crowd.introduce([{ index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25, ego: false }]);
+  crowd.introduce([
+    { index: 12, id: "walker", category: "pedestrian", length: 0.5, width: 0.25, ego: false },
+  ]);
   const moving = crowd.arrange(decodeFrame(two), null, "walker");
   expect(moving.count).toBe(1);
   expect([...moving.pose.subarray(0, 5)]).toEqual([-5, 6, 0, 0.5, 0.25]);
@@ -44,7 +46,9 @@ test("who has left the road is followed no more", () => {
 test("key figures that a run has not are left out", () => {
   const some = summary({ figures: { mean_speed: 10, mean_delay: null } }, { planned: 3, arrived: 2 });
   expect(keyFigures(some, FIGURES).map(({ label, value }) => [label, value])).toEqual([
-    ["Arrived", "2"], ["Mean speed", "36.0 km/h"]]);
+    ["Arrived", "2"],
+    ["Mean speed", "36.0 km/h"],
+  ]);
   expect(keyFigures(summary(), FIGURES)).toEqual([]);
 });
 

@@ -9,16 +9,40 @@ import { Picker } from "../src/map/picking";
 function example(): GraphColumns {
   const x = [0, 2, 4, 6, 0, 2, 4, 6];
   return {
-    spacing: 2, lane_keys: ["1.0.-1", "1.0.-2"], lane_types: ["driving", "driving"], lane_junctions: [null, null],
-    speed_limit: x.map(() => null), spawnable: x.map(() => 1),
-    first_node: [0, 4, 8], lane: [0, 0, 0, 0, 1, 1, 1, 1], s: x, x, y: [0, 0, 0, 0, -3, -3, -3, -3],
-    hdg: x.map(() => 0), width: x.map(() => 3), segment: [0, 0, 1, 1, 0, 0, 1, 1],
-    left_lane: [-1, -1, -1, -1, 0, 1, 2, 3], right_lane: [4, 5, 6, 7, -1, -1, -1, -1],
-    segments: [{ id: "r1-0", kind: "road", neighbours: [1] }, { id: "r1-1", kind: "road", neighbours: [0] }],
+    spacing: 2,
+    lane_keys: ["1.0.-1", "1.0.-2"],
+    lane_types: ["driving", "driving"],
+    lane_junctions: [null, null],
+    speed_limit: x.map(() => null),
+    spawnable: x.map(() => 1),
+    first_node: [0, 4, 8],
+    lane: [0, 0, 0, 0, 1, 1, 1, 1],
+    s: x,
+    x,
+    y: [0, 0, 0, 0, -3, -3, -3, -3],
+    hdg: x.map(() => 0),
+    width: x.map(() => 3),
+    segment: [0, 0, 1, 1, 0, 0, 1, 1],
+    left_lane: [-1, -1, -1, -1, 0, 1, 2, 3],
+    right_lane: [4, 5, 6, 7, -1, -1, -1, -1],
+    segments: [
+      { id: "r1-0", kind: "road", neighbours: [1] },
+      { id: "r1-1", kind: "road", neighbours: [0] },
+    ],
     edges: { source: [0], target: [1], relation: [0] },
     walks: {
-      lane_keys: ["1.0.-3"], first_node: [0, 2], lane: [0, 0], x: [0, 2], y: [-6, -6], hdg: [0, 0],
-      width: [2, 2], walkable: [1, 1], segment: [0, 0], source: [0], target: [1], kind: [0],
+      lane_keys: ["1.0.-3"],
+      first_node: [0, 2],
+      lane: [0, 0],
+      x: [0, 2],
+      y: [-6, -6],
+      hdg: [0, 0],
+      width: [2, 2],
+      walkable: [1, 1],
+      segment: [0, 0],
+      source: [0],
+      target: [1],
+      kind: [0],
     },
   };
 }
@@ -55,14 +79,18 @@ test("a segment is found by its lanes", () => {
 test("every lane gives a strip per segment, as wide as the lane and without gaps", () => {
   const found = strips(example());
   expect(found.map((one) => one.segment)).toEqual([0, 1, 0, 1]);
-  const xs = [...found[0].ring].filter((_, i) => i % 2 === 0);
-  const ys = [...found[0].ring].filter((_, i) => i % 2 === 1);
+  const ring = [...(found[0]?.ring ?? [])];
+  const xs = ring.filter((_, i) => i % 2 === 0);
+  const ys = ring.filter((_, i) => i % 2 === 1);
   expect([Math.min(...xs), Math.max(...xs)]).toEqual([-1, 3]);
   expect([Math.min(...ys), Math.max(...ys)]).toEqual([-1.5, 1.5]);
 });
 
 test("bounds of segments hold their nodes", () => {
-  expect(segmentBounds(example())).toEqual([[0, -3, 2, 0], [4, -3, 6, 0]]);
+  expect(segmentBounds(example())).toEqual([
+    [0, -3, 2, 0],
+    [4, -3, 6, 0],
+  ]);
 });
 
 test("packed lines are unpacked to metres", () => {

@@ -6,7 +6,7 @@ import { FIGURES } from "./figures";
 import { marksAt, sentence } from "../src/run/incidents";
 import { between, momentAt, Replay } from "../src/run/replay";
 import { thinned, ticks } from "../src/run/scale";
-import { hashOf, parseRoute } from "../src/ui/route";
+import { hashOf, parseAddress } from "../src/ui/address";
 import { summary } from "./messages";
 
 const columns = (): ReplayColumns => ({
@@ -28,14 +28,14 @@ const shown = (time: number): Record<string, [number, number]> => {
   const frame = replay.at(time);
   const { pose } = replay.crowd.arrange(frame, null, null);
   const found: Record<string, [number, number]> = {};
-  for (const who of replay.crowd.everybody()) {
+  for (const who of replay.crowd.all()) {
     const row = replay.crowd.row(who.id);
-    if (row >= 0) found[who.id] = [pose[5 * row], pose[5 * row + 1]];
+    if (row >= 0) found[who.id] = [pose[5 * row] ?? NaN, pose[5 * row + 1] ?? NaN];
   }
   return found;
 };
 
-test("between two moments everybody is on the way, far from zero too", () => {
+test("between two moments every road user is under way, far from zero too", () => {
   expect(shown(0.5)).toEqual({ "car-1": [1_000_005, 5] });
   expect(shown(-3)).toEqual({ "car-1": [1_000_000, 5] });
 });
@@ -59,7 +59,7 @@ test("headings turn the short way, and a bend is driven as a bend", () => {
   expect(Math.hypot(middle.x, middle.y - 10)).toBeCloseTo(10, 0);
 });
 
-test("a run in which nobody was ever on the road can be replayed", () => {
+test("a run in which no road user was ever on the road can be replayed", () => {
   const empty = { ...columns(), times: [], first: [0], actor: [], x: [], y: [], hdg: [], speed: [] };
   expect(new Replay(empty).at(3).count).toBe(0);
 });
@@ -70,22 +70,36 @@ test("the moment is the last one that is not later", () => {
 
 const crash: Incident = { time: 3, kind: "collision", actor: "car-1", partner: "x7", x: 1, y: 2 };
 
-test("incidents are told in words and marked from when they happen", () => {
-  const categories = new Map([["car-1", "car"], ["x7", "bicycle"]] as const);
+test("incidents are reported in words and marked from when they happen", () => {
+  const categories = new Map([
+    ["car-1", "car"],
+    ["x7", "bicycle"],
+  ] as const);
   expect(sentence(crash, categories)).toBe("car-1 collided with Bicycle x7");
   expect(marksAt([crash], 2.9)).toEqual([]);
   expect(marksAt([crash], 3)).toEqual([{ x: 1, y: 2, kind: "collision", fresh: true }]);
-  expect(marksAt([crash], 30)[0].fresh).toBe(false);
+  expect(marksAt([crash], 30)[0]?.fresh).toBe(false);
   expect(marksAt([{ time: 0, kind: "emergency_stop", actor: "a" }], 1)).toEqual([]);
 });
 
 test("two runs are compared figure by figure", () => {
-  const before = summary({ sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } }, { arrived: 5, collided: 0 });
-  const now = summary({ sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } }, { arrived: 3, collided: 1 });
-  const found = Object.fromEntries(compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]));
+  const before = summary(
+    { sim_seconds: 60, figures: { mean_speed: 10, mean_delay: 1.5 } },
+    { arrived: 5, collided: 0 },
+  );
+  const now = summary(
+    { sim_seconds: 60, figures: { mean_speed: 10.5, mean_delay: null } },
+    { arrived: 3, collided: 1 },
+  );
+  const found = Object.fromEntries(
+    compared(now, before, FIGURES).map((one) => [one.label, [one.difference, one.better]]),
+  );
   expect(found).toEqual({
-    "Simulated time": ["same", null], "Arrived": ["−2", false], "In collisions": ["+1", false],
-    "Mean speed": ["+1.8 km/h", true], "Mean delay": ["–", null],
+    "Simulated time": ["same", null],
+    Arrived: ["−2", false],
+    "In collisions": ["+1", false],
+    "Mean speed": ["+1.8 km/h", true],
+    "Mean delay": ["–", null],
   });
 });
 
@@ -101,5 +115,8 @@ test("a long table is thinned evenly with its end kept", () => {
 });
 
 test("the list of a scenario's runs has an address", () => {
-  expect(parseRoute(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({ view: "runs", scenario: "a/b ü" });
+  expect(parseAddress(hashOf({ view: "runs", scenario: "a/b ü" }))).toEqual({
+    view: "runs",
+    scenario: "a/b ü",
+  });
 });

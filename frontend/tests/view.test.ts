@@ -39,7 +39,7 @@ test("dragging to the right moves the map to the right", () => {
   expect(panBy(view, 32, 0).x).toBeCloseTo(view.x - 10);
 });
 
-test("nobody gets lost beside the map", () => {
+test("the view does not get lost beside the map", () => {
   expect(clampTo({ x: 999, y: -999, scale: 1 }, [0, 0, 10, 20])).toEqual({ x: 10, y: 0, scale: 1 });
 });
 

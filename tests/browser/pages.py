@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 MOST_TABS = 120
-FAILED = "broke off"
+FAILED = "The run failed"
 """What is said of a run that has failed."""
 
 ACTIONS = """
@@ -190,7 +190,7 @@ class OdscenPage:
 
     @property
     def add_shipped(self) -> Locator:
-        return self.page.get_by_role("button", name="Add the maps that come along")
+        return self.page.get_by_role("button", name="Add the example maps")
 
     def new_scenario(self, map_name: str) -> Locator:
         return self.page.get_by_role("button", name=f"New scenario on {map_name}")
@@ -220,8 +220,8 @@ class OdscenPage:
         palette = self.page.get_by_role("group", name="Kind of road user to place")
         return palette.get_by_role("button", name=word, exact=True)
 
-    def stream(self, word: str) -> Locator:
-        palette = self.page.get_by_role("group", name="Stream to place")
+    def flow(self, word: str) -> Locator:
+        palette = self.page.get_by_role("group", name="Flow to place")
         return palette.get_by_role("button", name=word, exact=True)
 
     @property
@@ -257,8 +257,8 @@ class OdscenPage:
         return self.page.get_by_role("region", name="Problems").get_by_role("button")
 
     @property
-    def keys(self) -> Locator:
-        return self.page.get_by_role("button", name="Keyboard shortcuts")
+    def help(self) -> Locator:
+        return self.page.get_by_role("button", name="Help: keyboard shortcuts and glossary")
 
     @contextmanager
     def changing(self) -> Iterator[None]:
@@ -311,7 +311,7 @@ class OdscenPage:
 
     def choose_pace(self, word: str) -> None:
         """Choose how fast a run begins."""
-        pace = self.page.get_by_role("radiogroup", name="Pace at the start")
+        pace = self.page.get_by_role("radiogroup", name="Speed at the start")
         pace.get_by_text(word, exact=True).click()
 
     # What the server knows

@@ -94,7 +94,7 @@ def test_a_problem_leads_to_its_place(region: OdscenPage) -> None:
     expect(region.problems).to_have_count(0)
     region.names.first.click()
     with region.changing():
-        late = region.page.get_by_label("Starts after")
+        late = region.page.get_by_label("Departs after")
         late.fill("80000")  # long after the end of the run
         late.press("Enter")
     expect(region.problems).to_have_count(1)
@@ -118,7 +118,7 @@ def test_every_kind_of_road_user_can_be_placed(region: OdscenPage) -> None:
     expect(region.names).to_have_count(len(kinds))
 
 
-def test_a_goal_is_chosen_on_the_map_and_given_back_to_chance(region: OdscenPage) -> None:
+def test_a_goal_is_chosen_on_the_map_and_made_random_again(region: OdscenPage) -> None:
     name = place(region, "Car", 3)
     actor = region.document()["actors"][0]
     goals = region.get(f"/scenarios/{region.scenario}/goals?spawn={actor['spawn']}")["goals"]
@@ -127,7 +127,7 @@ def test_a_goal_is_chosen_on_the_map_and_given_back_to_chance(region: OdscenPage
         region.map.click(region.graph.place(goals[0]))
     assert region.document()["actors"][0]["goal"] == goals[0]
     with region.changing():
-        region.page.get_by_role("button", name="By chance").click()
+        region.page.get_by_role("button", name="Random goal").click()
     assert region.document()["actors"][0]["goal"] is None
     assert region.document()["actors"][0]["id"] == name
 
@@ -190,9 +190,9 @@ def test_a_scenario_that_is_not_there_is_said_with_a_way_back(user: OdscenPage) 
     expect(user.maps).to_have_count(1)
 
 
-def test_a_stream_of_traffic_is_placed_and_undone(region: OdscenPage) -> None:
+def test_a_flow_is_placed_and_undone(region: OdscenPage) -> None:
     region.step("Road users").click()
-    region.stream("Stream of traffic").click()
+    region.flow("Vehicle flow").click()
     with region.changing():
         region.map.click(region.graph.starts(region.document()["roi"], 3)[2])
     (flow,) = region.document()["flows"]

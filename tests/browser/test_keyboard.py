@@ -68,13 +68,13 @@ def test_shortcuts_are_listed_and_the_list_gives_the_focus_back(
     user: OdscenPage, sampled: str
 ) -> None:
     user.open_editor(sampled)
-    user.tab_to(user.keys)
+    user.tab_to(user.help)
     user.page.keyboard.press("Enter")
     sheet = user.page.get_by_role("dialog")
     expect(sheet).to_contain_text("Ctrl+Z")
     user.page.keyboard.press("Escape")
     expect(sheet).to_have_count(0)
-    expect(user.keys).to_be_focused()
+    expect(user.help).to_be_focused()
 
 
 def test_a_dialog_keeps_the_focus_and_escape_keeps_the_map(user: OdscenPage) -> None:

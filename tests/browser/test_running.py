@@ -22,7 +22,7 @@ def start(user: OdscenPage, scenario: str) -> None:
 def stand_still(user: OdscenPage) -> None:
     """Pause, until the page shows where the run stands."""
     user.control("Pause").click()
-    expect(user.control("Go on")).to_be_enabled()
+    expect(user.control("Resume")).to_be_enabled()
     expect(user.control("One step")).to_be_enabled()
     run = user.page.url.rsplit("/", 1)[1]
     while user.get(f"/runs/{run}")["state"] != "paused":
@@ -49,7 +49,7 @@ def test_a_run_is_held_stepped_and_sped_up_and_the_scenario_stays_as_it_is(
         times.append(user.time())
     step = before["simulation"]["step_length"]
     assert [round(b - a, 6) for a, b in pairwise(times)] == [round(step, 6)] * 2
-    user.control("Go on").click()
+    user.control("Resume").click()
     user.choose_speed("As fast")
     expect(user.result).to_contain_text("finished")
     expect(user.result.get_by_role("link", name="Full report")).to_be_visible()

@@ -42,7 +42,7 @@ def open_traffic(user: OdscenPage, scenario: str) -> None:
 
 
 def send_table(user: OdscenPage, kind: str, path: Path) -> None:
-    user.choose("What the table has", kind)
+    user.choose("Contents of the table", kind)
     with user.page.expect_file_chooser() as chooser:
         user.page.get_by_role("button", name="Choose a table").click()
     chooser.value.set_files(path)
@@ -59,14 +59,14 @@ def test_background_traffic_is_added_changed_and_taken_back(
     with user.changing():
         user.page.get_by_role("button", name="Add background traffic").click()
     with user.changing():
-        user.choose("How much", "Trips in all")
+        user.choose("Amount given as", "Number of trips")
     with user.changing():
         background(user).get_by_label("Trips", exact=True).fill("80")
         user.page.keyboard.press("Enter")
     with user.changing():
-        user.choose("Spread over the day", "Weekend")
+        user.choose("Day profile", "Weekend")
     expect(background(user).get_by_role("img", name="Weekend over the day")).to_be_visible()
-    background(user).get_by_role("button", name="Change the kinds").click()
+    background(user).get_by_role("button", name="Change the mix").click()
     with user.changing():
         background(user).get_by_label("Bus", exact=True).fill("1")
         user.page.keyboard.press("Enter")
@@ -96,42 +96,42 @@ def test_background_traffic_is_added_changed_and_taken_back(
     assert user.document()["demand"]["background"][0]["end"] is None
 
 
-def test_a_table_with_a_mistake_names_line_and_column_and_mended_it_is_read_in(
+def test_a_table_with_a_mistake_names_line_and_column_and_corrected_it_is_imported(
     user: OdscenPage, crossing: str, tmp_path: Path
 ) -> None:
     open_traffic(user, crossing)
     before = user.document()
-    user.page.get_by_role("button", name="Add from a table").click()
+    user.page.get_by_role("button", name="Import a table").click()
     table = tmp_path / "commuters.csv"
     table.write_text("from,to,trips\nr1,r2,30\nr1,r77,20\n")
-    send_table(user, "Trips from where to where", table)
-    refused = user.page.get_by_role("alert").filter(has_text="commuters.csv was not read in")
+    send_table(user, "Trips between zones", table)
+    refused = user.page.get_by_role("alert").filter(has_text="commuters.csv was not imported")
     expect(refused).to_contain_text("Line 3, column 'to': 'r77' is neither a zone nor a segment")
     assert user.document() == before
     table.write_text("from,to,trips\nr1,r2,30\nr1,r3,20\n")
-    send_table(user, "Trips from where to where", table)
+    send_table(user, "Trips between zones", table)
     expect(refused).to_have_count(0)
-    card = user.page.get_by_role("region", name="Trips from where to where trips")
+    card = user.page.get_by_role("region", name="Trips between zones trips")
     expect(card).to_contain_text("50 trips in 2 rows")
     with user.changing():
         user.undo.click()
     assert user.document() == before
 
 
-def test_a_day_of_the_whole_town_is_made_and_what_it_asks_of_the_junctions_told(
+def test_a_day_on_the_whole_map_is_generated_and_its_load_on_the_junctions_reported(
     user: OdscenPage, crossing: str
 ) -> None:
     open_traffic(user, crossing)
-    user.page.get_by_role("button", name="A weekday of the whole town").click()
-    user.page.get_by_label("Trips of the day, at most").fill("400")
-    user.page.get_by_role("button", name="Make the day").click()
-    expect(user.page.get_by_text("The busiest way into a junction then gets")).to_be_visible()
+    user.page.get_by_role("button", name="Whole day on the whole map").click()
+    user.page.get_by_label("Trips per day, at most").fill("400")
+    user.page.get_by_role("button", name="Generate the day").click()
+    expect(user.page.get_by_text("The busiest approach of a junction then reaches")).to_be_visible()
     document = user.document()
     assert document["simulation"]["duration"] == 24 * HOUR
     assert sum(row[2] for row in document["demand"]["matrices"][0]["trips"]) > 350
 
 
-def test_a_stream_can_have_a_day_profile(user: OdscenPage, crossing: str, served: Served) -> None:
+def test_a_flow_can_have_a_day_profile(user: OdscenPage, crossing: str, served: Served) -> None:
     workspace = Workspace.open(served.workspace)
     loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
@@ -144,7 +144,7 @@ def test_a_stream_can_have_a_day_profile(user: OdscenPage, crossing: str, served
     user.step("Road users").click()
     user.names.first.click()
     with user.changing():
-        user.choose("Spread over the day", "Weekday")
+        user.choose("Day profile", "Weekday")
     assert user.document()["flows"][0]["profile"] == "weekday"
 
 
@@ -152,13 +152,13 @@ def test_the_fit_to_counts_is_shown_with_its_places(
     user: OdscenPage, crossing: str, tmp_path: Path
 ) -> None:
     open_traffic(user, crossing)
-    user.page.get_by_role("button", name="Add from a table").click()
+    user.page.get_by_role("button", name="Import a table").click()
     table = tmp_path / "survey.csv"
     table.write_text("place,begin,end,count\nr1>j10001,0,300,20\nr1>j10001>r2,0,300,900\n")
     send_table(user, "Counts", table)
     expect(user.problems).to_contain_text(["add up to 900"])
     user.step("Run").click()
-    user.choose_pace("As fast as it can")
+    user.choose_pace("As fast as possible")
     user.run.click()
     expect(user.result).to_contain_text("finished", timeout=60_000)
     user.page.get_by_role("tab", name="Counts").click()
@@ -175,7 +175,7 @@ def test_the_fit_to_counts_is_shown_with_its_places(
     assert '"arrived"' in Path(download.value.path()).read_text(encoding="utf-8")
 
 
-def test_a_long_run_is_forecast_interrupted_and_goes_on_to_its_end(
+def test_a_long_run_is_forecast_interrupted_and_resumed_to_its_end(
     user: OdscenPage, crossing: str, served: Served
 ) -> None:
     workspace = Workspace.open(served.workspace)
@@ -190,20 +190,20 @@ def test_a_long_run_is_forecast_interrupted_and_goes_on_to_its_end(
     user.open_editor(crossing)
     user.step("Run").click()
     with user.changing():
-        user.page.get_by_role("textbox", name="Lasts", exact=True).fill("3")
+        user.page.get_by_role("textbox", name="Duration", exact=True).fill("3")
         user.page.keyboard.press("Enter")
     assert user.document()["simulation"]["duration"] == 3 * HOUR
-    user.choose("Record where everybody is", "Every 10 seconds")
-    user.page.get_by_role("button", name="What will it need?").click()
+    user.choose("Record trajectories", "Every 10 seconds")
+    user.page.get_by_role("button", name="Estimate disk and memory").click()
     expect(user.page.get_by_text("of memory")).to_be_visible()
     user.run.click()
-    later = user.strip.get_by_role("button", name="Go on later")
+    later = user.strip.get_by_role("button", name="Resume later")
     expect(later).to_be_enabled()
     later.click()
     expect(user.result).to_contain_text("interrupted")
     user.page.reload()
     expect(user.result).to_contain_text("interrupted")
-    user.result.get_by_role("button", name="Go on", exact=True).click()
+    user.result.get_by_role("button", name="Resume", exact=True).click()
     expect(user.result).to_contain_text("finished", timeout=120_000)
     user.result.get_by_text("The 3 parts of the run").click()
     expect(

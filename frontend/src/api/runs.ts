@@ -4,6 +4,7 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 
 export type RunInfo = Schemas["RunInfo"];
+export type RunProgress = Schemas["RunProgress"];
 export type RunState = RunInfo["state"];
 /** How to run a scenario. */
 export type RunWish = Schemas["NewRun"];
@@ -20,7 +21,7 @@ export type ReplayColumns = Schemas["ReplayColumns"];
 /** Texts of the live view. */
 export type LiveMessage = Schemas["LiveMessage"];
 export type LiveActor = Schemas["LiveActor"];
-export type Action = Schemas["Control"]["action"];
+export type Action = Schemas["RunControl"]["action"];
 
 /** No replay has more places than this; longer runs have fewer moments. */
 const MOST_ROWS = 600_000;
@@ -30,7 +31,7 @@ export const runs = {
   list: (scenario: string) => call("get", "/api/runs", { query: { scenario } }),
   start: (wish: RunWish) => call("post", "/api/runs", { body: wish }),
   forecast: (wish: RunWish) => call("post", "/api/runs/forecast", { body: wish }),
-  goOn: (run: string) => call("post", "/api/runs/{run}/resume", { path: { run }, body: {} }),
+  resume: (run: string) => call("post", "/api/runs/{run}/resume", { path: { run }, body: {} }),
   fit: (run: string) => call("get", "/api/runs/{run}/fit", { path: { run } }),
   files: (run: string) => call("get", "/api/runs/{run}/files", { path: { run } }),
   fileUrl: (run: string, name: string) => address("/api/runs/{run}/files/{name}", { path: { run, name } }),

@@ -788,6 +788,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/figures": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Figures
+         * @description All figures of a run, in the order in which they are shown.
+         */
+        get: operations["figures_api_figures_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/carla": {
         parameters: {
             query?: never;
@@ -1000,7 +1020,7 @@ export interface components {
          *
          *     ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
          *     many are to be on the road at a time; with a profile, on average over a day. ``trips`` is how
-         *     many set out in the window.
+         *     many depart in the window.
          */
         Background: {
             /** Id */
@@ -1030,6 +1050,12 @@ export interface components {
             /** Trips */
             trips: number | null;
         };
+        /**
+         * Better
+         * @description Which way a figure should go.
+         * @enum {string}
+         */
+        Better: "lower" | "higher" | "neither";
         /**
          * BlueprintInfo
          * @description A model of road user; metres.
@@ -1219,26 +1245,11 @@ export interface components {
             junction: string;
         };
         /**
-         * Control
-         * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
-         *
-         *     ``interrupt`` ends a long run at once, so that it can go on later.
-         */
-        Control: {
-            /**
-             * Action
-             * @enum {string}
-             */
-            action: "pause" | "resume" | "step" | "speed" | "stop" | "interrupt";
-            /** Speed */
-            speed?: number | null;
-        };
-        /**
          * ConversionEntry
          * @description What became of one element, and why.
          */
         ConversionEntry: {
-            fate: components["schemas"]["Fate"];
+            fate: components["schemas"]["ElementOutcome"];
             /** Element */
             element: string;
             /** Reason */
@@ -1475,6 +1486,12 @@ export interface components {
             label?: string | null;
         };
         /**
+         * ElementOutcome
+         * @description What happened to an element.
+         * @enum {string}
+         */
+        ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
+        /**
          * Environment
          * @description Weather and time of day: a preset of the asset catalogue and single values that differ.
          */
@@ -1541,11 +1558,40 @@ export interface components {
             passed: boolean;
         };
         /**
-         * Fate
-         * @description What happened to an element.
-         * @enum {string}
+         * FigureDisplay
+         * @description How to write a value: times ``factor``, in ``unit``; ``clock``: as minutes and seconds.
          */
-        Fate: "kept" | "repaired" | "guessed" | "lost";
+        FigureDisplay: {
+            /** Unit */
+            unit: string;
+            /** Factor */
+            factor: number;
+            /** Digits */
+            digits: number;
+            /** Clock */
+            clock: boolean;
+        };
+        /**
+         * FigureInfo
+         * @description A figure of a run; ``part`` is where ``summary.json`` has it, "" for at its top.
+         */
+        FigureInfo: {
+            /** Name */
+            name: string;
+            part: components["schemas"]["SummaryPart"];
+            /** Unit */
+            unit: string;
+            /** Label */
+            label: string;
+            /** Definition */
+            definition: string;
+            /** Source */
+            source: string;
+            better: components["schemas"]["Better"];
+            /** On Page */
+            on_page: boolean;
+            display: components["schemas"]["FigureDisplay"];
+        };
         /**
          * FillRoiEdit
          * @description Put a random crowd into the region in the place of all actors (R47); flows stay.
@@ -1593,7 +1639,7 @@ export interface components {
         };
         /**
          * Flow
-         * @description A stream of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
+         * @description A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
          *
          *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
          *     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
@@ -1732,7 +1778,7 @@ export interface components {
             /** Kept Out */
             kept_out: number;
             /** Places */
-            places: components["schemas"]["Trouble"][];
+            places: components["schemas"]["Incident"][];
         };
         /**
          * GrowRoiEdit
@@ -1758,8 +1804,52 @@ export interface components {
             workspace: string;
         };
         /**
+         * Incident
+         * @description Vehicles gridlocked, teleported or not inserted at a place.
+         *
+         *     Attributes
+         *     ----------
+         *     time
+         *         Seconds: since when.
+         *     until
+         *         Seconds: until when; ``None`` for a jam that did not dissolve, and if not inserted.
+         *     actor
+         *         Who was first in it.
+         *     count
+         *         How many were stopped in the jam when it was found, or were not inserted at this place.
+         *     x, y
+         *         Metres, OpenDRIVE frame; ``None`` if unknown.
+         *     lane
+         *         SUMO lane, ``None`` if unknown.
+         *     place
+         *         Lane-graph node where those not inserted were to depart, else ``None``.
+         *     reason
+         *         As far as it shows; of an actor without a route in words of its own.
+         */
+        Incident: {
+            kind: components["schemas"]["IncidentKind"];
+            /** Time */
+            time: number;
+            /** Until */
+            until: number | null;
+            /** Actor */
+            actor: string;
+            /** Count */
+            count: number;
+            /** X */
+            x: number | null;
+            /** Y */
+            y: number | null;
+            /** Lane */
+            lane: string | null;
+            /** Place */
+            place: string | null;
+            /** Reason */
+            reason: components["schemas"]["StopReason"] | string;
+        };
+        /**
          * IncidentInfo
-         * @description Something that happened to ``actor``; see :class:`~odscen.results.records.Event`.
+         * @description Something that happened to ``actor``; see :class:`~odscen.results.records.run_records.Event`.
          *
          *     What there is nothing to say of is left out.
          */
@@ -1816,6 +1906,15 @@ export interface components {
             queue?: number;
         };
         /**
+         * IncidentKind
+         * @description What can go wrong with traffic at a place.
+         *
+         *     ``jam``: vehicles stand there for minutes; ``moved_on``: SUMO has teleported a vehicle, that is
+         *     taken it out and put it back further on; ``kept_out``: planned, but not inserted.
+         * @enum {string}
+         */
+        IncidentKind: "jam" | "moved_on" | "kept_out";
+        /**
          * JobInfo
          * @description How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made.
          */
@@ -1847,10 +1946,11 @@ export interface components {
          * JunctionTiming
          * @description Timing of the traffic light of one junction, where it differs from the map's program.
          *
-         *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that stands in none.
+         *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
          *     ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-         *     order; empty keeps the program's. Yellow and clearing times cannot be changed. The program
-         *     begins ``offset`` seconds into the scenario, as if it had run before.
+         *     order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
+         *     cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
+         *     before.
          */
         JunctionTiming: {
             /** Junction */
@@ -2332,6 +2432,21 @@ export interface components {
             counts: number;
         };
         /**
+         * RunControl
+         * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
+         *
+         *     ``interrupt`` ends a long run at once, so that it can go on later.
+         */
+        RunControl: {
+            /**
+             * Action
+             * @enum {string}
+             */
+            action: "pause" | "resume" | "step" | "speed" | "stop" | "interrupt";
+            /** Speed */
+            speed?: number | null;
+        };
+        /**
          * RunCurve
          * @description How many are on the road, have arrived, and wait to enter, at each ``time`` in seconds.
          */
@@ -2508,6 +2623,12 @@ export interface components {
             run: string;
         };
         /**
+         * RunStatus
+         * @description How a run ended; one that somebody has stopped early is ``completed``, too.
+         * @enum {string}
+         */
+        RunStatus: "completed" | "failed";
+        /**
          * RunSummary
          * @description Key figures of a run that has ended; seconds, metres, m/s.
          *
@@ -2520,11 +2641,7 @@ export interface components {
             format: string;
             /** Version */
             version: number;
-            /**
-             * Status
-             * @enum {string}
-             */
-            status: "completed" | "failed";
+            status: components["schemas"]["RunStatus"];
             /** Error */
             error: string | null;
             /**
@@ -2910,7 +3027,7 @@ export interface components {
         };
         /**
          * SetSeedEdit
-         * @description Set the seed that open goals and the run's chances are drawn by.
+         * @description Set the random seed of the open goals and of the run.
          */
         SetSeedEdit: {
             /**
@@ -2939,7 +3056,7 @@ export interface components {
         };
         /**
          * SetSimulationEdit
-         * @description Change fields of :class:`~odscen.scenario.document.Simulation`.
+         * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`.
          */
         SetSimulationEdit: {
             /**
@@ -3042,7 +3159,7 @@ export interface components {
         };
         /**
          * Signals
-         * @description How traffic lights are run: by the clock, or with greens that waiting vehicles prolong.
+         * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          */
         Signals: {
             /**
@@ -3115,10 +3232,14 @@ export interface components {
             ][];
         };
         /**
+         * StopReason
+         * @description Why vehicles are stopped for minutes, or are not inserted, as far as it shows.
+         * @enum {string}
+         */
+        StopReason: "vehicles wait for each other in a circle" | "its lane does not lead on along its way" | "it did not get to the lane that its way needs" | "a red light" | "people on a crossing" | "it has to give way to traffic that does not end" | "no room on the road ahead" | "no room where they start" | "the reason does not show";
+        /**
          * SummaryCounts
-         * @description How many actors were planned, and how many of them met each fate; see ``docs/runs.md``.
-         *
-         *     A failed run knows only how many were planned.
+         * @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.
          */
         SummaryCounts: {
             /** Planned */
@@ -3139,56 +3260,11 @@ export interface components {
             emergency_stopped: number | null;
         };
         /**
-         * Trouble
-         * @description A place where traffic got stuck.
-         *
-         *     Attributes
-         *     ----------
-         *     kind
-         *         ``jam``: somebody stood for minutes; ``moved_on``: SUMO took a vehicle out and put it back
-         *         further on (a teleport); ``kept_out``: planned but never on the road.
-         *     time
-         *         Seconds: since when.
-         *     until
-         *         Seconds: until when; ``None`` for a jam that did not dissolve, and for those kept out.
-         *     actor
-         *         Who was first in it.
-         *     count
-         *         How many stood in the jam when it was found, or were kept out at this place.
-         *     x, y
-         *         Metres, OpenDRIVE frame; ``None`` if unknown.
-         *     lane
-         *         SUMO lane, ``None`` if unknown.
-         *     place
-         *         Lane-graph node where those kept out were to start, else ``None``.
-         *     reason
-         *         In words, as far as it shows.
+         * SummaryPart
+         * @description Parts of ``summary.json`` that hold figures; ``actors`` are counts of actors.
+         * @enum {string}
          */
-        Trouble: {
-            /**
-             * Kind
-             * @enum {string}
-             */
-            kind: "jam" | "moved_on" | "kept_out";
-            /** Time */
-            time: number;
-            /** Until */
-            until: number | null;
-            /** Actor */
-            actor: string;
-            /** Count */
-            count: number;
-            /** X */
-            x: number | null;
-            /** Y */
-            y: number | null;
-            /** Lane */
-            lane: string | null;
-            /** Place */
-            place: string | null;
-            /** Reason */
-            reason: string;
-        };
+        SummaryPart: "" | "actors" | "figures";
         /**
          * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
@@ -3314,7 +3390,7 @@ export interface components {
          * LiveHello
          * @description What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
          *
-         *     Made by :mod:`odscen.web.live` without this class, for it may be large.
+         *     Made by :mod:`odscen.web.live_view` without this class, for it may be large.
          */
         LiveHello: {
             /**
@@ -3451,7 +3527,7 @@ export interface components {
          *
          *     ``fill``, a share of those that fit, and ``per_km``, vehicles per kilometre of lane, are how
          *     many are to be on the road at a time; with a profile, on average over a day. ``trips`` is how
-         *     many set out in the window.
+         *     many depart in the window.
          */
         "Background-File": {
             /** Id */
@@ -3588,7 +3664,7 @@ export interface components {
         };
         /**
          * Flow
-         * @description A stream of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
+         * @description A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
          *
          *     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
          *     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
@@ -3640,10 +3716,11 @@ export interface components {
          * JunctionTiming
          * @description Timing of the traffic light of one junction, where it differs from the map's program.
          *
-         *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that stands in none.
+         *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
          *     ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-         *     order; empty keeps the program's. Yellow and clearing times cannot be changed. The program
-         *     begins ``offset`` seconds into the scenario, as if it had run before.
+         *     order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
+         *     cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
+         *     before.
          */
         "JunctionTiming-File": {
             /** Junction */
@@ -3731,7 +3808,7 @@ export interface components {
         };
         /**
          * Signals
-         * @description How traffic lights are run: by the clock, or with greens that waiting vehicles prolong.
+         * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          */
         "Signals-File": {
             /**
@@ -6806,7 +6883,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["Control"];
+                "application/json": components["schemas"]["RunControl"];
             };
         };
         responses: {
@@ -7594,6 +7671,89 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RunFit"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    figures_api_figures_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FigureInfo"][];
                 };
             };
             /** @description The request cannot be read. */

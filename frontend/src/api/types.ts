@@ -24,7 +24,8 @@ export type WalkColumns = Schemas["WalkColumns"];
 export type PackedLines = Schemas["PackedLines"];
 export type PackedDrawing = Schemas["DrawingColumns"];
 export type ConversionReport = Schemas["ConversionInfo"];
-export type Fate = Schemas["Fate"];
+/** What became of an element of the map. */
+export type ElementOutcome = ConversionReport["entries"][number]["fate"];
 
 export type Assets = Schemas["AssetsInfo"];
 export type WeatherPreset = Schemas["WeatherInfo"];

@@ -12,15 +12,20 @@ const WORD: Record<Shown, string> = {
   ended: "CARLA, from above: the last picture",
 };
 
-/** The picture that CARLA's camera gives of a run while it goes on. */
+/** The picture that CARLA's camera gives of a run that is running. */
 export function CameraPanel({ run, over }: { run: string; over: boolean }) {
   const [state, setState] = useState<Shown>("waiting");
   const shown = over && state === "moving" ? "ended" : state;
   if (over && state === "waiting") return null;
   return (
     <figure className="camera">
-      <img src={carla.cameraUrl(run)} alt="The run in CARLA, seen from above" data-state={shown}
-        onLoad={() => setState("moving")} onError={() => setState("ended")} />
+      <img
+        src={carla.cameraUrl(run)}
+        alt="The run in CARLA, seen from above"
+        data-state={shown}
+        onLoad={() => setState("moving")}
+        onError={() => setState("ended")}
+      />
       <figcaption>{WORD[shown]}</figcaption>
     </figure>
   );

@@ -7,25 +7,39 @@ import type { CarlaInfo } from "../api/carla";
 import { useCarla } from "./useCarla";
 
 const WORD: Record<CarlaInfo["state"], string> = {
-  connected: "connected", absent: "not there", wrong_version: "another version",
+  connected: "connected",
+  absent: "not connected",
+  wrong_version: "has another version",
 };
 
-/** Says whether CARLA is there, and offers to show the run in it when it is. */
+/** Whether CARLA is connected, and the offer to show the run in it. */
 export function CarlaChoice({ chosen, onChoose }: { chosen: boolean; onChoose: (chosen: boolean) => void }) {
   const info = useCarla();
   const there = info?.state === "connected";
   // It may go away after it was chosen.
-  useEffect(() => { if (info && !there && chosen) onChoose(false); }, [info, there, chosen, onChoose]);
+  useEffect(() => {
+    if (info && !there && chosen) onChoose(false);
+  }, [info, there, chosen, onChoose]);
   return (
     <div className="carla-choice" role="group" aria-label="CARLA">
       <span className="carla-state" role="status">
         <i aria-hidden="true" data-state={info?.state ?? "unknown"} />
-        CARLA: {info ? WORD[info.state] : "looking …"}
+        CARLA {info ? WORD[info.state] : "…"}
       </span>
-      {there
-        ? <Switch label="Also show the run in CARLA" description="The same road users and lights, with a picture from above"
-            checked={chosen} onChange={(event) => onChoose(event.currentTarget.checked)} />
-        : info && <Text size="xs" c="dimmed">{info.message}</Text>}
+      {there ? (
+        <Switch
+          label="Also show the run in CARLA"
+          description="The same road users and lights, with a picture from above"
+          checked={chosen}
+          onChange={(event) => onChoose(event.currentTarget.checked)}
+        />
+      ) : (
+        info && (
+          <Text size="xs" c="dimmed">
+            {info.message}
+          </Text>
+        )
+      )}
     </div>
   );
 }

@@ -5,6 +5,7 @@ import { api } from "../api/client";
 import { addShipped, followJob } from "../api/maps";
 import type { Job } from "../api/types";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { stepWords } from "./steps";
 
 interface Work {
@@ -20,9 +21,13 @@ interface Refusal {
   reason: string;
 }
 
-/** Takes map files, one after another, by drop or by choice, and shows how far their preparation is. */
-export function AddMap({ empty, onAdded, onReport }: {
-  /** Whether there is no map yet; the maps that come along are offered then. */
+/** Takes map files, one after another, by drop or by choice, and shows the progress of their import. */
+export function AddMap({
+  empty,
+  onAdded,
+  onReport,
+}: {
+  /** Whether there is no map yet; the example maps are offered then. */
   empty: boolean;
   onAdded: () => void;
   onReport: (map: string) => void;
@@ -34,15 +39,24 @@ export function AddMap({ empty, onAdded, onReport }: {
   const queue = useRef<File[]>([]);
   const busy = useRef(false);
 
-  const attempt = async (what: string, start: () => Promise<{ job: string }>, onStep: (job: Job) => void): Promise<Job | null> => {
+  const attempt = async (
+    what: string,
+    start: () => Promise<{ job: string }>,
+    onStep: (job: Job) => void,
+  ): Promise<Job | null> => {
     setWork({ what, step: "Sending the file", share: 0, waiting: queue.current.length });
     try {
       return await followJob((await start()).job, (job) => {
-        setWork({ what, step: stepWords(job.step ?? "preparing"), share: job.share ?? 0, waiting: queue.current.length });
+        setWork({
+          what,
+          step: stepWords(job.step ?? "preparing"),
+          share: job.share ?? 0,
+          waiting: queue.current.length,
+        });
         onStep(job);
       });
     } catch (error) {
-      setRefusals((old) => [...old, { file: what, reason: (error as Error).message }]);
+      setRefusals((old) => [...old, { file: what, reason: reasonOf(error) }]);
       return null;
     }
   };
@@ -54,7 +68,11 @@ export function AddMap({ empty, onAdded, onReport }: {
     setAdded([]);
     for (let file = queue.current.shift(); file; file = queue.current.shift()) {
       const taken = file;
-      const job = await attempt(taken.name, () => api.addMap(taken), () => undefined);
+      const job = await attempt(
+        taken.name,
+        () => api.addMap(taken),
+        () => undefined,
+      );
       const name = job?.result;
       if (name) {
         setAdded((old) => [...old, name]);
@@ -68,7 +86,7 @@ export function AddMap({ empty, onAdded, onReport }: {
     if (busy.current) return;
     busy.current = true;
     let last = "";
-    const job = await attempt("The maps that come along", addShipped, ({ step }) => {
+    const job = await attempt("The example maps", addShipped, ({ step }) => {
       const map = step?.split(":")[0] ?? "";
       if (map !== last && last) onAdded();
       last = map;
@@ -86,24 +104,45 @@ export function AddMap({ empty, onAdded, onReport }: {
 
   return (
     <section aria-label="Add a map">
-      <div className="drop" data-over={over} onDragOver={(event) => { event.preventDefault(); setOver(true); }}
-        onDragLeave={() => setOver(false)} onDrop={onDrop}>
+      <div
+        className="drop"
+        data-over={over}
+        onDragOver={(event) => {
+          event.preventDefault();
+          setOver(true);
+        }}
+        onDragLeave={() => setOver(false)}
+        onDrop={onDrop}
+      >
         {work ? (
           <div style={{ flex: 1 }} role="status">
-            <Text fw={600}>{work.what}{work.waiting > 0 && `, then ${work.waiting} more`}</Text>
-            <Text size="sm" c="dimmed">{work.step} …</Text>
-            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="How far the map is prepared" />
+            <Text fw={600}>
+              {work.what}
+              {work.waiting > 0 && `, then ${work.waiting} more`}
+            </Text>
+            <Text size="sm" c="dimmed">
+              {work.step} …
+            </Text>
+            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="Import progress" />
           </div>
         ) : (
           <>
             <div>
               <Text fw={600}>{empty ? "No maps yet" : "Add a map of your own"}</Text>
-              <Text size="sm" c="dimmed">{empty ? "Begin with the maps that come along, or drop an OpenDRIVE file (.xodr) of your own here." : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}</Text>
+              <Text size="sm" c="dimmed">
+                {empty
+                  ? "Begin with the example maps, or drop an OpenDRIVE file (.xodr) of your own here."
+                  : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}
+              </Text>
             </div>
             <div style={{ display: "flex", gap: 10, flexWrap: "wrap" }}>
-              {empty && <Button onClick={() => void addThose()}>Add the maps that come along</Button>}
+              {empty && <Button onClick={() => void addThose()}>Add the example maps</Button>}
               <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
-                {(props) => <Button variant="default" {...props}>Choose a file</Button>}
+                {(props) => (
+                  <Button variant="default" {...props}>
+                    Choose a file
+                  </Button>
+                )}
               </FileButton>
             </div>
           </>
@@ -111,12 +150,24 @@ export function AddMap({ empty, onAdded, onReport }: {
       </div>
       {added.map((name) => (
         <Alert key={name} color="blue" mt="sm" role="status" title={`${name} is ready`}>
-          <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>How {name} was taken over</Button>
+          <Button size="compact-sm" variant="default" onClick={() => onReport(name)}>
+            Import report of {name}
+          </Button>
         </Alert>
       ))}
       {refusals.map(({ file, reason }, n) => (
-        <Alert key={n} color="red" mt="sm" title={`${file} could not be added`} withCloseButton closeButtonLabel="Close this message"
-          onClose={() => setRefusals((old) => old.filter((_, k) => k !== n))} style={{ overflowWrap: "anywhere" }}>{reason}</Alert>
+        <Alert
+          key={n}
+          color="red"
+          mt="sm"
+          title={`${file} could not be added`}
+          withCloseButton
+          closeButtonLabel="Close this message"
+          onClose={() => setRefusals((old) => old.filter((_, k) => k !== n))}
+          style={{ overflowWrap: "anywhere" }}
+        >
+          {reason}
+        </Alert>
       ))}
     </section>
   );

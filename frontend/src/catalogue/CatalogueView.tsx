@@ -6,7 +6,7 @@ import type { MapInfo } from "../api/types";
 import { forgetMaps } from "../map/loaded";
 import { IconSearch } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 import { AddMap } from "./AddMap";
@@ -15,7 +15,7 @@ import { MapCard } from "./MapCard";
 import { arranged, type Order, ORDERS, type Wish, WISHES } from "./order";
 import { Scenarios } from "./Scenarios";
 
-/** The first screen: choose a map, or go on with a scenario. */
+/** The first screen: choose a map, or open a scenario. */
 export function CatalogueView() {
   const maps = useLoaded(api.maps);
   const scenarios = useLoaded(api.scenarios);
@@ -30,53 +30,109 @@ export function CatalogueView() {
     setStarting(map.name);
     api.newScenario(map.name).then(
       (made) => go({ view: "editor", scenario: made.name }),
-      (error: unknown) => { tellError(error); setStarting(null); },
+      (error: unknown) => {
+        tellError(error);
+        setStarting(null);
+      },
     );
   };
   const remove = (): void => {
     if (!removing) return;
     const { what, name } = removing;
     setRemoving(null);
-    (what === "map" ? api.removeMap(name) : api.removeScenario(name)).then(
-      () => { tell(`${name} is removed.`); if (what === "map") forgetMaps(); maps.reload(); scenarios.reload(); },
-      tellError,
-    );
+    (what === "map" ? api.removeMap(name) : api.removeScenario(name)).then(() => {
+      tell(`${name} is removed.`);
+      if (what === "map") forgetMaps();
+      maps.reload();
+      scenarios.reload();
+    }, tellError);
   };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);
 
   return (
     <div className="catalogue">
-      <Title order={1} size="h2">Choose a map</Title>
-      <Text c="dimmed">Pick where your traffic scenario takes place. You can look at every map before you decide.</Text>
-      {maps.error && <Alert color="red" my="md" title="The maps cannot be shown">{maps.error}
-        <Button ml="md" size="compact-sm" variant="white" onClick={maps.reload}>Try again</Button></Alert>}
+      <Title order={1} size="h2">
+        Choose a map
+      </Title>
+      <Text c="dimmed">
+        Pick where your traffic scenario takes place. You can look at every map before you decide.
+      </Text>
+      {maps.error && (
+        <Alert color="red" my="md" title="The maps cannot be shown">
+          {maps.error}
+          <Button ml="md" size="compact-sm" variant="white" onClick={maps.reload}>
+            Try again
+          </Button>
+        </Alert>
+      )}
       {!maps.value && !maps.error && <Loader my="xl" aria-label="Loading the maps" />}
       {all.length > 0 && (
         <>
           <div className="bar">
-            <TextInput label="Search" placeholder="Part of the name" leftSection={<IconSearch />} value={search}
-              onChange={(event) => setSearch(event.currentTarget.value)} />
-            <Select label="Sort by" data={ORDERS} value={order} allowDeselect={false}
-              onChange={(value) => setOrder((value ?? "name") as Order)} />
-            <Text size="sm" c="dimmed" pb={8} role="status">{count(found.length, "map")}</Text>
+            <TextInput
+              label="Search"
+              placeholder="Part of the name"
+              leftSection={<IconSearch />}
+              value={search}
+              onChange={(event) => setSearch(event.currentTarget.value)}
+            />
+            <Select
+              label="Sort by"
+              data={ORDERS}
+              value={order}
+              allowDeselect={false}
+              onChange={(value) => setOrder(ORDERS.find((one) => one.value === value)?.value ?? "name")}
+            />
+            <Text size="sm" c="dimmed" pb={8} role="status">
+              {count(found.length, "map")}
+            </Text>
           </div>
-          <Chip.Group multiple value={wishes} onChange={(value) => setWishes(value as Wish[])}>
+          <Chip.Group
+            multiple
+            value={wishes}
+            onChange={(chosen) =>
+              setWishes(WISHES.map(({ value }) => value).filter((one) => chosen.includes(one)))
+            }
+          >
             <Group gap={8} mb="md" role="group" aria-label="Only maps with">
-              <Text size="sm" aria-hidden="true">Only maps with</Text>
-              {WISHES.map(({ value, label }) => <Chip key={value} value={value} size="sm" variant="outline">{label}</Chip>)}
+              <Text size="sm" aria-hidden="true">
+                Only maps with
+              </Text>
+              {WISHES.map(({ value, label }) => (
+                <Chip key={value} value={value} size="sm" variant="outline">
+                  {label}
+                </Chip>
+              ))}
             </Group>
           </Chip.Group>
         </>
       )}
       {all.length > 0 && found.length === 0 && (
-        <Text my="xl">No map is like that. <Button variant="subtle" size="compact-sm" onClick={() => { setSearch(""); setWishes([]); }}>Show all maps</Button></Text>
+        <Text my="xl">
+          No matching maps.{" "}
+          <Button
+            variant="subtle"
+            size="compact-sm"
+            onClick={() => {
+              setSearch("");
+              setWishes([]);
+            }}
+          >
+            Show all maps
+          </Button>
+        </Text>
       )}
       <ul className="cards" aria-label="Maps">
         {found.map((map) => (
           <li key={map.name}>
-            <MapCard map={map} starting={starting === map.name} onStart={() => start(map)} onReport={() => setReported(map.name)}
-              onRemove={() => setRemoving({ what: "map", name: map.name })} />
+            <MapCard
+              map={map}
+              starting={starting === map.name}
+              onStart={() => start(map)}
+              onReport={() => setReported(map.name)}
+              onRemove={() => setRemoving({ what: "map", name: map.name })}
+            />
           </li>
         ))}
       </ul>
@@ -87,14 +143,24 @@ export function CatalogueView() {
       )}
       <Scenarios list={scenarios.value ?? []} onRemove={(name) => setRemoving({ what: "scenario", name })} />
       {reported && <Conversion map={reported} onClose={() => setReported(null)} />}
-      <Modal opened={removing !== null} onClose={() => setRemoving(null)} centered
-        title={`Remove ${removing?.name ?? ""}?`}>
-        <Text size="sm">{removing?.what === "map"
-          ? "The map and what was prepared for it are deleted. Scenarios on it stay, but need it to run."
-          : "The scenario is deleted. The results of its runs stay."}</Text>
+      <Modal
+        opened={removing !== null}
+        onClose={() => setRemoving(null)}
+        centered
+        title={`Remove ${removing?.name ?? ""}?`}
+      >
+        <Text size="sm">
+          {removing?.what === "map"
+            ? "The map and all that was built from it are deleted. Scenarios on it stay, but need it to run."
+            : "The scenario is deleted. The results of its runs stay."}
+        </Text>
         <Group justify="flex-end" mt="lg">
-          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>Keep it</Button>
-          <Button color="red" onClick={remove}>Remove</Button>
+          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>
+            Keep it
+          </Button>
+          <Button color="red" onClick={remove}>
+            Remove
+          </Button>
         </Group>
       </Modal>
     </div>

@@ -8,10 +8,10 @@ import { coverage, type Finding, type Group, grouped } from "./conversion";
 /** Places named in the list; the rest are in the file. */
 const NAMED = 40;
 
-/** How a map was taken over, in plain words. */
+/** The import report of a map. */
 export function Conversion({ map, onClose }: { map: string; onClose: () => void }) {
   return (
-    <Modal opened onClose={onClose} size="lg" title={`How ${map} was taken over`}>
+    <Modal opened onClose={onClose} size="lg" title={`Import report of ${map}`}>
       <Body map={map} />
     </Modal>
   );
@@ -19,15 +19,32 @@ export function Conversion({ map, onClose }: { map: string; onClose: () => void 
 
 function Body({ map }: { map: string }) {
   const { value, error } = useLoaded(useCallback(() => conversionReport(map), [map]));
-  if (error) return <Alert color="red" title="The report cannot be shown">{error}</Alert>;
+  if (error)
+    return (
+      <Alert color="red" title="The report cannot be shown">
+        {error}
+      </Alert>
+    );
   if (!value) return <Loader aria-label="Loading the report" />;
   const { driving, walking } = coverage(value);
   return (
     <>
-      {driving !== null && <Text><b>{driving} %</b> of the lanes can be driven on in the simulation.</Text>}
-      {walking !== null && <Text><b>{walking} %</b> of the footways can be walked on.</Text>}
-      {grouped(value).map((group) => <Section key={group.fate} group={group} />)}
-      <Anchor href={reportUrl(map)} target="_blank" rel="noreferrer" size="sm">Everything in detail, for experts (JSON)</Anchor>
+      {driving !== null && (
+        <Text>
+          <b>{driving} %</b> of the lanes can be driven on in the simulation.
+        </Text>
+      )}
+      {walking !== null && (
+        <Text>
+          <b>{walking} %</b> of the footways can be walked on.
+        </Text>
+      )}
+      {grouped(value).map((group) => (
+        <Section key={group.outcome} group={group} />
+      ))}
+      <Anchor href={reportUrl(map)} target="_blank" rel="noreferrer" size="sm">
+        Everything in detail, for experts (JSON)
+      </Anchor>
     </>
   );
 }
@@ -35,22 +52,41 @@ function Body({ map }: { map: string }) {
 function Section({ group }: { group: Group }) {
   return (
     <section aria-label={group.title}>
-      <Title order={3} size="h5" mt="lg">{group.title}</Title>
+      <Title order={3} size="h5" mt="lg">
+        {group.title}
+      </Title>
       <ul style={{ margin: "6px 0 14px", paddingLeft: 20 }}>
-        {group.findings.map((finding) => <li key={finding.text} style={{ marginBottom: 6 }}><Found finding={finding} /></li>)}
+        {group.findings.map((finding) => (
+          <li key={finding.text} style={{ marginBottom: 6 }}>
+            <Found finding={finding} />
+          </li>
+        ))}
       </ul>
     </section>
   );
 }
 
 function Found({ finding: { text, places } }: { finding: Finding }) {
-  if (places.length === 1) return <>{text} <Text span size="sm" c="dimmed">({places[0]})</Text></>;
+  if (places.length === 1)
+    return (
+      <>
+        {text}{" "}
+        <Text span size="sm" c="dimmed">
+          ({places[0]})
+        </Text>
+      </>
+    );
   return (
     <>
       {text}
       <details>
-        <summary style={{ cursor: "pointer", fontSize: 13 }}>{places.length.toLocaleString("en")} places</summary>
-        <Text size="sm" c="dimmed">{places.slice(0, NAMED).join("; ")}{places.length > NAMED && ` and ${places.length - NAMED} more`}</Text>
+        <summary style={{ cursor: "pointer", fontSize: 13 }}>
+          {places.length.toLocaleString("en")} places
+        </summary>
+        <Text size="sm" c="dimmed">
+          {places.slice(0, NAMED).join("; ")}
+          {places.length > NAMED && ` and ${places.length - NAMED} more`}
+        </Text>
       </details>
     </>
   );

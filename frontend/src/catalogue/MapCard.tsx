@@ -6,24 +6,51 @@ import { mapFacts } from "../ui/words";
 import { Preview } from "./Preview";
 
 /** A map with its picture and what there is in it. */
-export function MapCard({ map, starting, onStart, onRemove, onReport }: {
-  map: MapInfo; starting: boolean; onStart: () => void; onRemove: () => void; onReport: () => void;
+export function MapCard({
+  map,
+  starting,
+  onStart,
+  onRemove,
+  onReport,
+}: {
+  map: MapInfo;
+  starting: boolean;
+  onStart: () => void;
+  onRemove: () => void;
+  onReport: () => void;
 }) {
   return (
     <Card withBorder padding={0} className="card">
       <Preview name={map.name} picture={map.preview} />
       <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
         <Group justify="space-between" wrap="nowrap">
-          <Title order={2} size="h4" style={{ overflowWrap: "anywhere" }}>{map.name}</Title>
+          <Title order={2} size="h4" style={{ overflowWrap: "anywhere" }}>
+            {map.name}
+          </Title>
           <Tooltip label={`Remove ${map.name}`}>
-            <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${map.name}`} onClick={onRemove}><IconTrash /></ActionIcon>
+            <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${map.name}`} onClick={onRemove}>
+              <IconTrash />
+            </ActionIcon>
           </Tooltip>
         </Group>
         <ul className="card-facts" style={{ flex: 1, alignContent: "flex-start" }}>
-          {mapFacts(map.statistics).map((fact) => <li key={fact}>{fact}</li>)}
+          {mapFacts(map.statistics).map((fact) => (
+            <li key={fact}>{fact}</li>
+          ))}
         </ul>
-        <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>New scenario</Button>
-        <Button fullWidth mt={6} variant="subtle" size="compact-sm" onClick={onReport} aria-label={`How it was taken over: ${map.name}`}>How it was taken over</Button>
+        <Button fullWidth onClick={onStart} loading={starting} aria-label={`New scenario on ${map.name}`}>
+          New scenario
+        </Button>
+        <Button
+          fullWidth
+          mt={6}
+          variant="subtle"
+          size="compact-sm"
+          onClick={onReport}
+          aria-label={`Import report of ${map.name}`}
+        >
+          Import report
+        </Button>
       </div>
     </Card>
   );

@@ -10,20 +10,25 @@ import { fit } from "../map/view";
 export function Preview({ name, picture }: { name: string; picture: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const dark = useComputedColorScheme("light") === "dark";
-  const [layer, setLayer] = useState<{ base: BaseLayer; bounds: [number, number, number, number] } | null>(null);
+  const [layer, setLayer] = useState<{ base: BaseLayer; bounds: [number, number, number, number] } | null>(
+    null,
+  );
   const [failed, setFailed] = useState(false);
   const label = `The map ${name} seen from above`;
 
   useEffect(() => {
     if (!canvas.current) return;
-    const observer = new IntersectionObserver((entries) => {
-      if (!entries.some((entry) => entry.isIntersecting)) return;
-      observer.disconnect();
-      loadDrawing(name).then(
-        (drawing) => setLayer({ base: new BaseLayer(drawing), bounds: drawing.bounds }),
-        () => setFailed(true),
-      );
-    }, { rootMargin: "200px" });
+    const observer = new IntersectionObserver(
+      (entries) => {
+        if (!entries.some((entry) => entry.isIntersecting)) return;
+        observer.disconnect();
+        loadDrawing(name).then(
+          (drawing) => setLayer({ base: new BaseLayer(drawing), bounds: drawing.bounds }),
+          () => setFailed(true),
+        );
+      },
+      { rootMargin: "200px" },
+    );
     observer.observe(canvas.current);
     return () => observer.disconnect();
   }, [name]);

@@ -1,14 +1,25 @@
-import { ActionIcon, Anchor, Badge, Button, FileButton, Group, Table, Text, Title, VisuallyHidden } from "@mantine/core";
+import {
+  ActionIcon,
+  Anchor,
+  Badge,
+  Button,
+  FileButton,
+  Group,
+  Table,
+  Text,
+  Title,
+  VisuallyHidden,
+} from "@mantine/core";
 import { useState } from "react";
 
 import { api } from "../api/client";
 import type { ScenarioEntry } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { tellError } from "../ui/notices";
-import { go, hashOf } from "../ui/route";
+import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
 
-/** The scenarios there are; one can be brought along as a file. */
+/** The scenarios there are; one can be opened from a file. */
 export function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove: (name: string) => void }) {
   const [busy, setBusy] = useState(false);
   const bring = (file: File | null): void => {
@@ -16,33 +27,78 @@ export function Scenarios({ list, onRemove }: { list: ScenarioEntry[]; onRemove:
     setBusy(true);
     api.uploadScenario(file).then(
       (made) => go({ view: "editor", scenario: made.name }),
-      (error: unknown) => { setBusy(false); tellError(error); });
+      (error: unknown) => {
+        setBusy(false);
+        tellError(error);
+      },
+    );
   };
   return (
     <section aria-labelledby="scenarios" style={{ marginTop: 34 }}>
       <Group justify="space-between" mb="sm">
-        <Title order={2} size="h3" id="scenarios">Your scenarios</Title>
+        <Title order={2} size="h3" id="scenarios">
+          Your scenarios
+        </Title>
         <FileButton accept=".json,.graphml" onChange={bring}>
-          {(props) => <Button variant="default" size="sm" loading={busy} {...props}>Open a scenario file</Button>}
+          {(props) => (
+            <Button variant="default" size="sm" loading={busy} {...props}>
+              Open a scenario file
+            </Button>
+          )}
         </FileButton>
       </Group>
-      {list.length === 0 ? <Text c="dimmed">None yet. Choose a map above, or open a scenario file.</Text> : (
+      {list.length === 0 ? (
+        <Text c="dimmed">None yet. Choose a map above, or open a scenario file.</Text>
+      ) : (
         <Table highlightOnHover verticalSpacing="xs" aria-labelledby="scenarios">
           <Table.Thead>
-            <Table.Tr><Table.Th>Name</Table.Th><Table.Th>Map</Table.Th><Table.Th>Road users</Table.Th>
-              <Table.Th>Changed</Table.Th><Table.Th><VisuallyHidden>Actions</VisuallyHidden></Table.Th></Table.Tr>
+            <Table.Tr>
+              <Table.Th>Name</Table.Th>
+              <Table.Th>Map</Table.Th>
+              <Table.Th>Road users</Table.Th>
+              <Table.Th>Changed</Table.Th>
+              <Table.Th>
+                <VisuallyHidden>Actions</VisuallyHidden>
+              </Table.Th>
+            </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
             {list.map((one) => (
               <Table.Tr key={one.name}>
-                <Table.Td><Anchor href={hashOf({ view: "editor", scenario: one.name })}>{one.title ?? one.name}</Anchor>{one.error && <Text size="xs" c="red">{one.error}</Text>}</Table.Td>
-                <Table.Td><Badge variant="default" tt="none">{one.map ?? "?"}</Badge></Table.Td>
+                <Table.Td>
+                  <Anchor href={hashOf({ view: "editor", scenario: one.name })}>
+                    {one.title ?? one.name}
+                  </Anchor>
+                  {one.error && (
+                    <Text size="xs" c="red">
+                      {one.error}
+                    </Text>
+                  )}
+                </Table.Td>
+                <Table.Td>
+                  <Badge variant="default" tt="none">
+                    {one.map ?? "?"}
+                  </Badge>
+                </Table.Td>
                 <Table.Td>{one.actors}</Table.Td>
                 <Table.Td>{when(one.modified)}</Table.Td>
                 <Table.Td>
                   <Group gap={12} justify="flex-end" wrap="nowrap">
-                    <Anchor size="sm" href={hashOf({ view: "runs", scenario: one.name })} aria-label={`Runs of ${one.name}`}>Runs</Anchor>
-                    <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${one.name}`} onClick={() => onRemove(one.name)}><IconTrash /></ActionIcon>
+                    <Anchor
+                      size="sm"
+                      href={hashOf({ view: "runs", scenario: one.name })}
+                      aria-label={`Runs of ${one.name}`}
+                    >
+                      Runs
+                    </Anchor>
+                    <ActionIcon
+                      variant="subtle"
+                      color="gray"
+                      aria-label={`Remove ${one.name}`}
+                      onClick={() => onRemove(one.name)}
+                    >
+                      <IconTrash />
+                    </ActionIcon>
                   </Group>
                 </Table.Td>
               </Table.Tr>

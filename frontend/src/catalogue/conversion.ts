@@ -1,32 +1,45 @@
-import type { ConversionReport, Fate } from "../api/types";
+import type { ConversionReport, ElementOutcome } from "../api/types";
 
-/** Entries that say the same of several elements. */
+/** Entries with the same reason for several elements. */
 export interface Finding {
   text: string;
   places: string[];
 }
 
 export interface Group {
-  fate: Fate;
+  outcome: ElementOutcome;
   title: string;
   findings: Finding[];
 }
 
-const TITLES: [fate: Fate, title: string][] = [
+const TITLES: [outcome: ElementOutcome, title: string][] = [
   ["lost", "Could not be used"],
-  ["repaired", "Was repaired"],
-  ["guessed", "Was adapted or filled in"],
-  ["kept", "Was taken over as it is"],
+  ["repaired", "Repaired"],
+  ["guessed", "Adapted or completed"],
+  ["kept", "Imported unchanged"],
 ];
 
-/** The commonest findings as people say them. */
+/** The commonest findings in plain sentences. */
 const PLAIN: [RegExp, string][] = [
-  [/of a connecting road have no SUMO lane: nothing leads there/, "Short pieces of lanes inside junctions are left out, as no lane leads there"],
+  [
+    /of a connecting road have no SUMO lane: nothing leads there/,
+    "Short pieces of lanes inside junctions are left out, as no lane leads there",
+  ],
   [/have no SUMO lane: nothing leads there/, "Short pieces of lanes are left out, as no lane leads there"],
-  [/lanes of type (\w+) are open to (?:nobody|no road user) and left out/, "Lanes of the kind “$1” are not driven on and are left out"],
-  [/every crossing of a junction with lights has a light/, "Every crosswalk of a junction with traffic lights got a light for pedestrians"],
+  [
+    /lanes of type (\w+) are open to no(?:body| road user) and left out/,
+    "Lanes of the kind “$1” are not driven on and are left out",
+  ],
+  [
+    /every crossing of a junction with lights has a light/,
+    "Every crosswalk of a junction with traffic lights got a light for pedestrians",
+  ],
   [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
-  [/traffic lights? have programs of odscen's own/, "The map does not say when its lights turn green: they got a timing of their own, in which no two ways that meet have green"],
+  [
+    /traffic lights? have programs of odscen's own/,
+    "The map does not say when its lights turn green: they got a timing of their own, " +
+      "in which no two conflicting connections have green at the same time",
+  ],
   [/^crosswalk, as a crossing/, "Crosswalks, with place and width"],
   [/^yield, as right of way/, "Signs to give way"],
   [/^traffic light, as right of way/, "Traffic lights"],
@@ -45,16 +58,16 @@ export function plainFinding(reason: string): string {
 
 /** What became of a map, what matters most first; elements of which the same is said are together. */
 export function grouped(report: ConversionReport): Group[] {
-  return TITLES.flatMap(([fate, title]) => {
+  return TITLES.flatMap(([outcome, title]) => {
     const found = new Map<string, string[]>();
     for (const entry of report.entries) {
-      if (entry.fate !== fate) continue;
+      if (entry.fate !== outcome) continue;
       const text = plainFinding(entry.reason);
       found.set(text, [...(found.get(text) ?? []), entry.element]);
     }
     const findings = [...found].map(([text, places]) => ({ text, places }));
     findings.sort((a, b) => b.places.length - a.places.length);
-    return findings.length > 0 ? [{ fate, title, findings }] : [];
+    return findings.length > 0 ? [{ outcome, title, findings }] : [];
   });
 }
 

@@ -30,20 +30,32 @@ export const WISHES: { value: Wish; label: string; has: (map: MapInfo) => boolea
   { value: "crosswalks", label: "Crosswalks", has: ({ statistics }) => statistics.crosswalks > 0 },
   { value: "junctions", label: "Junctions", has: ({ statistics }) => statistics.junctions > 0 },
   { value: "left", label: "Left-hand traffic", has: ({ statistics }) => statistics.rule === "LHT" },
-  { value: "small", label: "Small (up to 3 km of lanes)", has: ({ statistics }) => statistics.driving_lane_length <= SMALL },
-  { value: "large", label: "Large (from 15 km of lanes)", has: ({ statistics }) => statistics.driving_lane_length >= LARGE },
+  {
+    value: "small",
+    label: "Small (up to 3 km of lanes)",
+    has: ({ statistics }) => statistics.driving_lane_length <= SMALL,
+  },
+  {
+    value: "large",
+    label: "Large (from 15 km of lanes)",
+    has: ({ statistics }) => statistics.driving_lane_length >= LARGE,
+  },
 ];
 
 /** The maps whose name has all words of `search` and that have all that is wished for, in order. */
 export function arranged(
-  maps: readonly MapInfo[], search: string, order: Order, wishes: readonly Wish[] = [],
+  maps: readonly MapInfo[],
+  search: string,
+  order: Order,
+  wishes: readonly Wish[] = [],
 ): MapInfo[] {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
   const wanted = WISHES.filter(({ value }) => wishes.includes(value));
-  const found = maps.filter((map) =>
-    words.every((word) => map.name.toLowerCase().includes(word)) && wanted.every(({ has }) => has(map)));
-  const byName = (a: MapInfo, b: MapInfo): number =>
-    a.name.localeCompare(b.name, "en", { numeric: true });
+  const found = maps.filter(
+    (map) =>
+      words.every((word) => map.name.toLowerCase().includes(word)) && wanted.every(({ has }) => has(map)),
+  );
+  const byName = (a: MapInfo, b: MapInfo): number => a.name.localeCompare(b.name, "en", { numeric: true });
   if (order === "name") return found.sort(byName);
   return found.sort((a, b) => FIGURE[order](b) - FIGURE[order](a) || byName(a, b));
 }

@@ -1,6 +1,7 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
-import type { Actor, Assets, Edit, Style } from "../api/types";
+import type { Actor, Assets, Edit } from "../api/types";
+import { isKey } from "../lists";
 import { modelWord, STYLE_WORD } from "../ui/words";
 import { Committed } from "./Committed";
 import { bodyOf } from "./scene";
@@ -9,62 +10,154 @@ import { Silhouette } from "./Silhouette";
 const STYLES = Object.entries(STYLE_WORD).map(([value, label]) => ({ value, label }));
 
 /** What one road user is and how it moves. */
-export function ActorForm({ actor, assets, onEdit }: {
-  actor: Actor; assets: Assets | null; onEdit: (edit: Edit) => void;
+export function ActorForm({
+  actor,
+  assets,
+  onEdit,
+}: {
+  actor: Actor;
+  assets: Assets | null;
+  onEdit: (edit: Edit) => void;
 }) {
-  const change = (fields: Partial<Actor>): void => onEdit({ kind: "change_actor", actor: actor.id, ...fields });
+  const change = (fields: Partial<Actor>): void =>
+    onEdit({ kind: "change_actor", actor: actor.id, ...fields });
   const walks = actor.category === "pedestrian";
-  const models = (assets?.blueprints ?? []).filter((one) => one.category === actor.category)
+  const models = (assets?.blueprints ?? [])
+    .filter((one) => one.category === actor.category)
     .map((one) => ({ value: one.id, label: modelWord(one.id) }));
   const [length, width] = bodyOf(actor, assets);
   return (
     <Stack gap="sm">
       <Silhouette actor={actor} length={length} width={width} />
-      <Select label="Model" searchable clearable placeholder="Any" data={models} value={actor.model} nothingFoundMessage="No such model"
-        clearButtonProps={{ "aria-label": "Any model" }} onChange={(model) => change({ model })} />
+      <Select
+        label="Model"
+        searchable
+        clearable
+        placeholder="Any"
+        data={models}
+        value={actor.model}
+        nothingFoundMessage="No such model"
+        clearButtonProps={{ "aria-label": "Any model" }}
+        onChange={(model) => change({ model })}
+      />
       <Group grow align="flex-start">
-        <Committed label={walks ? "Walking speed" : "Desired speed"} suffix=" km/h" min={1} max={walks ? 15 : 250} digits={1}
-          placeholder={walks ? "usual" : "the limit"} value={actor.speed === null ? "" : actor.speed * 3.6}
-          onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })} />
-        <Committed label="Starts after" suffix=" s" min={0} max={86_400} digits={1} value={actor.depart}
-          onCommit={(value) => change({ depart: value ?? 0 })} />
+        <Committed
+          label={walks ? "Walking speed" : "Desired speed"}
+          suffix=" km/h"
+          min={1}
+          max={walks ? 15 : 250}
+          digits={1}
+          placeholder={walks ? "default" : "speed limit"}
+          value={actor.speed === null ? "" : actor.speed * 3.6}
+          onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
+        />
+        <Committed
+          label="Departs after"
+          suffix=" s"
+          min={0}
+          max={86_400}
+          digits={1}
+          value={actor.depart}
+          onCommit={(value) => change({ depart: value ?? 0 })}
+        />
       </Group>
       {!walks && (
         <Group grow align="flex-start">
-          <Committed label="Left of lane centre" suffix=" m" min={-3} max={3} step={0.1} digits={2} value={actor.lateral_offset}
-            onCommit={(value) => change({ lateral_offset: value ?? 0 })} />
-          <Select label="Driving style" allowDeselect={false} value={actor.style} data={STYLES}
-            onChange={(style) => change({ style: (style ?? "normal") as Style })} />
+          <Committed
+            label="Offset to the left"
+            suffix=" m"
+            min={-3}
+            max={3}
+            step={0.1}
+            digits={2}
+            value={actor.lateral_offset}
+            onCommit={(value) => change({ lateral_offset: value ?? 0 })}
+          />
+          <Select
+            label="Driving style"
+            allowDeselect={false}
+            value={actor.style}
+            data={STYLES}
+            onChange={(style) => {
+              if (isKey(STYLE_WORD, style)) change({ style });
+            }}
+          />
         </Group>
       )}
-      {!walks && <Checkbox label="This is my vehicle under test (ego)" checked={actor.ego}
-        onChange={(event) => onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })} />}
+      {!walks && (
+        <Checkbox
+          label="Ego: my vehicle under test"
+          checked={actor.ego}
+          onChange={(event) =>
+            onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })
+          }
+        />
+      )}
       {/* No run acts on it yet: shown only where a document has it. */}
-      {walks && actor.crosses_anywhere && <Checkbox label="Crosses the road anywhere" checked={actor.crosses_anywhere}
-        onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })} />}
-      {walks && <Checkbox label="Ignores red lights" checked={actor.ignores_red}
-        onChange={(event) => change({ ignores_red: event.currentTarget.checked })} />}
+      {walks && actor.crosses_anywhere && (
+        <Checkbox
+          label="Crosses the road anywhere"
+          checked={actor.crosses_anywhere}
+          onChange={(event) => change({ crosses_anywhere: event.currentTarget.checked })}
+        />
+      )}
+      {walks && (
+        <Checkbox
+          label="Ignores red lights"
+          checked={actor.ignores_red}
+          onChange={(event) => change({ ignores_red: event.currentTarget.checked })}
+        />
+      )}
     </Stack>
   );
 }
 
 /** Changes that several road users can share; each is one step for undo. */
-export function ManyForm({ actors, onChange }: {
-  actors: readonly Actor[]; onChange: (fields: Partial<Actor>, what: string) => void;
+export function ManyForm({
+  actors,
+  onChange,
+}: {
+  actors: readonly Actor[];
+  onChange: (fields: Partial<Actor>, what: string) => void;
 }) {
+  const [first, ...others] = actors;
   const same = <K extends keyof Actor>(key: K): Actor[K] | undefined =>
-    actors.every((one) => one[key] === actors[0][key]) ? actors[0][key] : undefined;
+    others.every((one) => one[key] === first?.[key]) ? first?.[key] : undefined;
   const speed = same("speed");
   return (
     <Stack gap="sm">
       <Group grow align="flex-start">
-        <Committed label="Speed of all" suffix=" km/h" min={1} max={250} digits={1} placeholder={speed === undefined ? "different" : "usual"}
-          value={speed ? speed * 3.6 : ""} onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, "Speed")} />
-        <Committed label="All start after" suffix=" s" min={0} max={86_400} digits={1} placeholder="different"
-          value={same("depart") ?? ""} onCommit={(value) => onChange({ depart: value ?? 0 }, "Start time")} />
+        <Committed
+          label="Desired speed of all"
+          suffix=" km/h"
+          min={1}
+          max={250}
+          digits={1}
+          placeholder={speed === undefined ? "different" : "default"}
+          value={speed ? speed * 3.6 : ""}
+          onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, "Speed")}
+        />
+        <Committed
+          label="All depart after"
+          suffix=" s"
+          min={0}
+          max={86_400}
+          digits={1}
+          placeholder="different"
+          value={same("depart") ?? ""}
+          onCommit={(value) => onChange({ depart: value ?? 0 }, "Departure")}
+        />
       </Group>
-      <Select label="Driving style of all" placeholder="different" allowDeselect={false} value={same("style") ?? null} data={STYLES}
-        onChange={(style) => onChange({ style: (style ?? "normal") as Style }, "Driving style")} />
+      <Select
+        label="Driving style of all"
+        placeholder="different"
+        allowDeselect={false}
+        value={same("style") ?? null}
+        data={STYLES}
+        onChange={(style) => {
+          if (isKey(STYLE_WORD, style)) onChange({ style }, "Driving style");
+        }}
+      />
     </Stack>
   );
 }

@@ -1,15 +1,20 @@
 import { Button, Collapse, Group, Stack, Text } from "@mantine/core";
-import { useState } from "react";
+import { type ReactNode, useState } from "react";
 
 import { type Actor, type Assets, CATEGORIES, type Edit, type Flow } from "../api/types";
 import type { Graph, Place } from "../map/graph";
-import { CategoryGlyph, IconStream, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD } from "../ui/words";
+import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
+import { CATEGORY_WORD, flowWord } from "../ui/words";
 import { ActorForm, ManyForm } from "./ActorForm";
 import type { Profiles } from "./DayProfiles";
 import { FillForm } from "./FillForm";
 import { FlowForm } from "./FlowForm";
-import { isFlow, type Starts, type Tool, toolWord } from "./placing";
+import { copyTool } from "./handlers/copy";
+import { flowTool } from "./handlers/flow";
+import type { Tool } from "./handlers/handler";
+import { moveTool } from "./handlers/move";
+import { placeTool } from "./handlers/place";
+import { isFlow, type Starts } from "./placing";
 import { StartAndGoal } from "./StartAndGoal";
 
 interface Props {
@@ -34,7 +39,7 @@ interface Props {
   onFill: (share: number, seed: number) => void;
 }
 
-/** Choose who, place them on the map, then say where they go and how. */
+/** Choose a kind, place road users on the map, then set where they go and how. */
 export function ActorStep(props: Props) {
   const { assets, graph, starts, selected, tool, goals, onTool, onEdit } = props;
   const [filling, setFilling] = useState(false);
@@ -43,68 +48,140 @@ export function ActorStep(props: Props) {
   return (
     <>
       <div className="palette" role="group" aria-label="Kind of road user to place">
-        {CATEGORIES.map((category) => {
-          const on = tool?.does === "place" && tool.category === category;
-          return (
-            <button type="button" key={category} aria-pressed={on} onClick={() => onTool(on ? null : { does: "place", category })}>
-              <CategoryGlyph category={category} size={32} />
-              {CATEGORY_WORD[category]}
-            </button>
-          );
-        })}
+        {CATEGORIES.map((category) => (
+          <ToolButton key={category} of={placeTool(category)} tool={tool} onTool={onTool}>
+            <CategoryGlyph category={category} size={32} />
+            {CATEGORY_WORD[category]}
+          </ToolButton>
+        ))}
       </div>
-      <div className="palette streams" role="group" aria-label="Stream to place">
-        {[false, true].map((walk) => {
-          const on = tool?.does === "stream" && tool.walk === walk;
-          return (
-            <button type="button" key={String(walk)} aria-pressed={on} onClick={() => onTool(on ? null : { does: "stream", walk })}>
-              <IconStream size={22} />{walk ? "Stream of people" : "Stream of traffic"}
-            </button>
-          );
-        })}
+      <div className="palette flows" role="group" aria-label="Flow to place">
+        {[false, true].map((walks) => (
+          <ToolButton key={String(walks)} of={flowTool(walks)} tool={tool} onTool={onTool}>
+            <IconFlow size={22} />
+            {flowWord(walks)}
+          </ToolButton>
+        ))}
       </div>
       <ToolHint tool={tool} onPlaceSomewhere={props.onPlaceSomewhere} />
       {selected.length > 0 && (
-        <Stack gap="sm" component="section" aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}>
+        <Stack
+          gap="sm"
+          component="section"
+          aria-label={one ? `Settings of ${one.id}` : `Settings of ${selected.length} road users`}
+        >
           <Group gap={8} wrap="nowrap">
-            {one && (isFlow(one) ? <IconStream size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
+            {one &&
+              (isFlow(one) ? <IconFlow size={24} /> : <CategoryGlyph category={one.category} size={26} />)}
             <Text fw={700}>{one ? one.id : `${selected.length} selected`}</Text>
           </Group>
           <Group gap={6}>
-            {actors.length > 0 && <Button size="compact-sm" variant="default" onClick={() => onTool({ does: "copy", ids: actors.map((each) => each.id) })}>Copy</Button>}
-            <Button size="compact-sm" variant="default" onClick={() => onTool({ does: "move", ids: selected.map((each) => each.id) })}>Move</Button>
-            <Button size="compact-sm" color="red" variant="light" leftSection={<IconTrash size={15} />} onClick={props.onRemove}>Remove</Button>
-            <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>Select none</Button>
+            {actors.length > 0 && (
+              <Button
+                size="compact-sm"
+                variant="default"
+                onClick={() => onTool(copyTool(actors.map((each) => each.id)))}
+              >
+                Copy
+              </Button>
+            )}
+            <Button
+              size="compact-sm"
+              variant="default"
+              onClick={() => onTool(moveTool(selected.map((each) => each.id)))}
+            >
+              Move
+            </Button>
+            <Button
+              size="compact-sm"
+              color="red"
+              variant="light"
+              leftSection={<IconTrash size={15} />}
+              onClick={props.onRemove}
+            >
+              Remove
+            </Button>
+            <Button size="compact-sm" variant="subtle" onClick={() => props.onSelect([])}>
+              Clear selection
+            </Button>
           </Group>
-          {one && <StartAndGoal one={one} graph={graph} starts={starts} goals={goals} onShowGoals={props.onShowGoals}
-            onStart={(spawn) => props.onStart(one, spawn)} onGoal={(goal) => props.onGoal(one, goal)} />}
-          {one && (isFlow(one)
-            ? <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
-            : <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />)}
-          {!one && actors.length > 0 && <ManyForm actors={actors} onChange={(fields, what) => onEdit(
-            actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })), `${what} of ${actors.length} road users`)} />}
+          {one && (
+            <StartAndGoal
+              one={one}
+              graph={graph}
+              starts={starts}
+              goals={goals}
+              onShowGoals={props.onShowGoals}
+              onStart={(spawn) => props.onStart(one, spawn)}
+              onGoal={(goal) => props.onGoal(one, goal)}
+            />
+          )}
+          {one &&
+            (isFlow(one) ? (
+              <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
+            ) : (
+              <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />
+            ))}
+          {!one && actors.length > 0 && (
+            <ManyForm
+              actors={actors}
+              onChange={(fields, what) =>
+                onEdit(
+                  actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })),
+                  `${what} of ${actors.length} road users`,
+                )
+              }
+            />
+          )}
         </Stack>
       )}
-      <Button variant="subtle" size="compact-sm" justify="flex-start" aria-expanded={filling} onClick={() => setFilling(!filling)}>
+      <Button
+        variant="subtle"
+        size="compact-sm"
+        justify="flex-start"
+        aria-expanded={filling}
+        onClick={() => setFilling(!filling)}
+      >
         {filling ? "Hide random fill" : "Fill the region at random"}
       </Button>
-      <Collapse in={filling}>{filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}</Collapse>
+      <Collapse in={filling}>
+        {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}
+      </Collapse>
     </>
   );
 }
 
+/** Takes a tool into the hand, or puts it back. */
+function ToolButton({
+  of,
+  tool,
+  onTool,
+  children,
+}: {
+  of: Tool;
+  tool: Tool | null;
+  onTool: (tool: Tool | null) => void;
+  children: ReactNode;
+}) {
+  const on = tool?.key === of.key;
+  return (
+    <button type="button" aria-pressed={on} onClick={() => onTool(on ? null : of)}>
+      {children}
+    </button>
+  );
+}
+
 function ToolHint({ tool, onPlaceSomewhere }: { tool: Tool | null; onPlaceSomewhere: () => void }) {
-  if (!tool) return <Text size="sm" c="dimmed" aria-live="polite">Choose a kind, then click on the map to place it.</Text>;
-  const people = (tool.does === "place" && tool.category === "pedestrian") || (tool.does === "stream" && tool.walk);
-  const who = toolWord(tool, CATEGORY_WORD);
   return (
     <>
       <Text size="sm" c="dimmed" aria-live="polite">
-        {tool.does === "copy" || tool.does === "move"
-          ? `Click where the ${tool.does === "copy" ? "copy" : "first of them"} starts. Escape stops.`
-          : `Now click where the ${who} starts: a ${people ? "yellow" : "blue"} point on the map. Escape stops placing.`}
+        {tool ? tool.help : "Choose a kind, then click on the map to place it."}
       </Text>
-      <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>Use the next free point</Button>
+      {tool && (
+        <Button size="compact-sm" variant="default" onClick={onPlaceSomewhere}>
+          Use the next free point
+        </Button>
+      )}
     </>
   );
 }

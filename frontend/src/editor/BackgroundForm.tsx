@@ -7,24 +7,50 @@ import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { AMOUNTS, amountOf } from "./demand";
 import { MixFold, PartCard, WindowFields } from "./DemandParts";
 
-/** Vehicles that come and go anywhere: how many, when, and of which kinds. */
-export function BackgroundForm({ background, profiles, onEdit, onRemove }: {
-  background: Background; profiles: Profiles; onEdit: (edit: Edit) => void; onRemove: () => void;
+/** Vehicles with random starts and goals: how many, when, and their mix. */
+export function BackgroundForm({
+  background,
+  profiles,
+  onEdit,
+  onRemove,
+}: {
+  background: Background;
+  profiles: Profiles;
+  onEdit: (edit: Edit) => void;
+  onRemove: () => void;
 }) {
   const amount = amountOf(background);
-  const change = (fields: FieldsOf<"set_background", "background">): void => onEdit({ kind: "set_background", background: background.id, ...fields });
+  const change = (fields: FieldsOf<"set_background", "background">): void =>
+    onEdit({ kind: "set_background", background: background.id, ...fields });
   return (
     <PartCard name={background.id} what="Background traffic" onRemove={onRemove}>
-      <Select label="How much" data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))} value={amount.key} allowDeselect={false}
+      <Select
+        label="Amount given as"
+        data={AMOUNTS.map(({ key, word }) => ({ value: key, label: word }))}
+        value={amount.key}
+        allowDeselect={false}
         onChange={(key) => {
           const chosen = AMOUNTS.find((one) => one.key === key);
           if (chosen && chosen !== amount) change({ [chosen.key]: chosen.begin });
-        }} />
-      <Committed label={amount.unit} suffix={amount.suffix} min={amount.min} max={amount.max} digits={amount.digits}
+        }}
+      />
+      <Committed
+        label={amount.unit}
+        suffix={amount.suffix}
+        min={amount.min}
+        max={amount.max}
+        digits={amount.digits}
         value={(background[amount.key] ?? amount.begin) * amount.scale}
-        onCommit={(value) => { if (value !== null) change({ [amount.key]: value / amount.scale }); }} />
+        onCommit={(value) => {
+          if (value !== null) change({ [amount.key]: value / amount.scale });
+        }}
+      />
       <WindowFields begin={background.begin} end={background.end} onChange={change} />
-      <ProfileChoice value={background.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
+      <ProfileChoice
+        value={background.profile}
+        profiles={profiles}
+        onChange={(profile) => change({ profile })}
+      />
       <MixFold mix={background.mix} onChange={(mix) => change({ mix })} />
     </PartCard>
   );

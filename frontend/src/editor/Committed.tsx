@@ -1,9 +1,22 @@
 import { NumberInput } from "@mantine/core";
 
 /** A number that is sent when it is finished, not with every key. */
-export function Committed({ label, value, digits, onCommit, ...rest }: {
-  label: string; value: number | ""; digits: number; suffix: string; min: number; max: number;
-  step?: number; placeholder?: string; onCommit: (value: number | null) => void;
+export function Committed({
+  label,
+  value,
+  digits,
+  onCommit,
+  ...rest
+}: {
+  label: string;
+  value: number | "";
+  digits: number;
+  suffix: string;
+  min: number;
+  max: number;
+  step?: number;
+  placeholder?: string;
+  onCommit: (value: number | null) => void;
 }) {
   const shown = value === "" ? "" : Number(value.toFixed(digits));
   const commit = (text: string): void => {
@@ -12,8 +25,16 @@ export function Committed({ label, value, digits, onCommit, ...rest }: {
     if (next !== (shown === "" ? null : shown)) onCommit(next);
   };
   return (
-    <NumberInput key={String(shown)} label={label} defaultValue={shown} decimalScale={digits} {...rest}
+    <NumberInput
+      key={String(shown)}
+      label={label}
+      defaultValue={shown}
+      decimalScale={digits}
+      {...rest}
       onBlur={(event) => commit(event.currentTarget.value)}
-      onKeyDown={(event) => { if (event.key === "Enter") commit(event.currentTarget.value); }} />
+      onKeyDown={(event) => {
+        if (event.key === "Enter") commit(event.currentTarget.value);
+      }}
+    />
   );
 }

@@ -10,20 +10,38 @@ const H = 44;
 const WORD: Record<string, string> = { weekday: "Weekday", weekend: "Weekend" };
 export const profileWord = (id: string): string => WORD[id] ?? id;
 
-/** All day profiles that a scenario can use: those that come along and its own. */
+/** All day profiles that a scenario can use: the built-in ones and its own. */
 export const profilesOf = (demand: Demand, builtIn: Profiles): Profiles => ({
-  ...builtIn, ...Object.fromEntries(demand.profiles.map(({ id, shares }) => [id, shares])),
+  ...builtIn,
+  ...Object.fromEntries(demand.profiles.map(({ id, shares }) => [id, shares])),
 });
 
-/** When of the day traffic comes, with a picture of it. */
-export function ProfileChoice({ value, profiles, onChange }: {
-  value: string | null; profiles: Profiles; onChange: (profile: string | null) => void;
+/** How traffic varies over the day, with a picture of it. */
+export function ProfileChoice({
+  value,
+  profiles,
+  onChange,
+}: {
+  value: string | null;
+  profiles: Profiles;
+  onChange: (profile: string | null) => void;
 }) {
-  const data = [{ value: "", label: "Evenly" }, ...Object.keys(profiles).map((id) => ({ value: id, label: profileWord(id) }))];
+  const data = [
+    { value: "", label: "Uniform" },
+    ...Object.keys(profiles).map((id) => ({ value: id, label: profileWord(id) })),
+  ];
   return (
     <div>
-      <Select label="Spread over the day" data={data} value={value ?? ""} allowDeselect={false} onChange={(chosen) => onChange(chosen || null)} />
-      {value !== null && profiles[value] && <ProfileChart name={profileWord(value)} shares={profiles[value]} />}
+      <Select
+        label="Day profile"
+        data={data}
+        value={value ?? ""}
+        allowDeselect={false}
+        onChange={(chosen) => onChange(chosen || null)}
+      />
+      {value !== null && profiles[value] && (
+        <ProfileChart name={profileWord(value)} shares={profiles[value]} />
+      )}
     </div>
   );
 }
@@ -33,13 +51,31 @@ export function ProfileChart({ name, shares }: { name: string; shares: readonly 
   const most = Math.max(...shares);
   const width = W / shares.length;
   return (
-    <svg className="profile" viewBox={`0 0 ${W} ${H + 14}`} role="img" aria-label={`${name} over the day: ${peakWords(shares)}`}>
+    <svg
+      className="profile"
+      viewBox={`0 0 ${W} ${H + 14}`}
+      role="img"
+      aria-label={`${name} over the day: ${peakWords(shares)}`}
+    >
       {shares.map((share, n) => (
-        <rect key={n} x={n * width + Math.min(0.6, width / 8)} width={Math.max(0.3, width - Math.min(1.2, width / 4))} y={H - (H * share) / most} height={(H * share) / most} />
+        <rect
+          key={n}
+          x={n * width + Math.min(0.6, width / 8)}
+          width={Math.max(0.3, width - Math.min(1.2, width / 4))}
+          y={H - (H * share) / most}
+          height={(H * share) / most}
+        />
       ))}
       <line x1={0} x2={W} y1={H + 0.5} y2={H + 0.5} />
       {[0, 6, 12, 18, 24].map((hour) => (
-        <text key={hour} x={(W * hour) / 24} y={H + 12} textAnchor={hour === 0 ? "start" : hour === 24 ? "end" : "middle"}>{hour}:00</text>
+        <text
+          key={hour}
+          x={(W * hour) / 24}
+          y={H + 12}
+          textAnchor={hour === 0 ? "start" : hour === 24 ? "end" : "middle"}
+        >
+          {hour}:00
+        </text>
       ))}
     </svg>
   );

@@ -2,14 +2,25 @@ import { Group, NumberInput, Select } from "@mantine/core";
 import { useState } from "react";
 
 const UNITS = [
-  { value: "1", label: "seconds" }, { value: "60", label: "minutes" }, { value: "3600", label: "hours" },
+  { value: "1", label: "seconds" },
+  { value: "60", label: "minutes" },
+  { value: "3600", label: "hours" },
 ];
 
 /** The largest unit in which a time is a whole number, in seconds. */
-export const unitOf = (seconds: number): number => [3600, 60].find((unit) => seconds > unit && seconds % unit === 0) ?? 1;
+export const unitOf = (seconds: number): number =>
+  [3600, 60].find((unit) => seconds > unit && seconds % unit === 0) ?? 1;
 
-/** A length of time in the unit that one thinks in; told in seconds when it is finished. */
-export function Duration({ label, seconds, onCommit }: { label: string; seconds: number; onCommit: (seconds: number) => void }) {
+/** A length of time in the unit that one thinks in; committed in seconds when it is finished. */
+export function Duration({
+  label,
+  seconds,
+  onCommit,
+}: {
+  label: string;
+  seconds: number;
+  onCommit: (seconds: number) => void;
+}) {
   const [unit, setUnit] = useState(unitOf(seconds));
   const commit = (text: string): void => {
     const value = Math.round(Number.parseFloat(text) * unit * 1000) / 1000;
@@ -17,10 +28,27 @@ export function Duration({ label, seconds, onCommit }: { label: string; seconds:
   };
   return (
     <Group gap={6} wrap="nowrap" align="flex-end">
-      <NumberInput key={`${seconds} ${unit}`} style={{ flex: 1 }} label={label} min={1 / unit} max={1e6 / unit} decimalScale={3} defaultValue={seconds / unit}
+      <NumberInput
+        key={`${seconds} ${unit}`}
+        style={{ flex: 1 }}
+        label={label}
+        min={1 / unit}
+        max={1e6 / unit}
+        decimalScale={3}
+        defaultValue={seconds / unit}
         onBlur={(event) => commit(event.currentTarget.value)}
-        onKeyDown={(event) => { if (event.key === "Enter") commit(event.currentTarget.value); }} />
-      <Select w={112} aria-label={`${label}: unit`} data={UNITS} value={String(unit)} allowDeselect={false} onChange={(value) => setUnit(Number(value))} />
+        onKeyDown={(event) => {
+          if (event.key === "Enter") commit(event.currentTarget.value);
+        }}
+      />
+      <Select
+        w={112}
+        aria-label={`${label}: unit`}
+        data={UNITS}
+        value={String(unit)}
+        allowDeselect={false}
+        onChange={(value) => setUnit(Number(value))}
+      />
     </Group>
   );
 }

@@ -4,7 +4,8 @@ import { useEffect, useState } from "react";
 import { api } from "../api/client";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
+import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
 import { Editor } from "./Editor";
 import { createEditorStore } from "./store";
@@ -19,11 +20,14 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   const assets = useLoaded(api.assets);
 
   useEffect(() => {
-    store.getState().load().catch((error: unknown) => setFailure(String((error as Error).message)));
+    store
+      .getState()
+      .load()
+      .catch((error: unknown) => setFailure(reasonOf(error)));
   }, [store]);
   useEffect(() => {
     if (!map) return;
-    const fail = (error: unknown): void => setFailure(String((error as Error).message));
+    const fail = (error: unknown): void => setFailure(reasonOf(error));
     loadDrawing(map).then(setDrawing, fail);
     loadGraph(map).then(setLoaded, fail);
   }, [map]);
@@ -31,14 +35,23 @@ export function EditorView({ scenario: name }: { scenario: string }) {
   if (failure) {
     return (
       <div className="catalogue">
-        <Title order={1} size="h3" mb="md">“{name}” cannot be opened</Title>
+        <Title order={1} size="h3" mb="md">
+          “{name}” cannot be opened
+        </Title>
         <Alert color="red">{failure}</Alert>
-        <Button mt="md" onClick={() => go({ view: "catalogue" })}>Back to the maps</Button>
+        <Button mt="md" onClick={() => go({ view: "catalogue" })}>
+          Back to the maps
+        </Button>
       </div>
     );
   }
   if (!drawing || !loaded || !map) {
-    return <div className="empty"><Loader aria-label="Opening the scenario" /><Text mt="sm">Opening {name} …</Text></div>;
+    return (
+      <div className="empty">
+        <Loader aria-label="Opening the scenario" />
+        <Text mt="sm">Opening {name} …</Text>
+      </div>
+    );
   }
   return <Editor store={store} drawing={drawing} loaded={loaded} assets={assets.value} />;
 }

@@ -4,29 +4,65 @@ import { useState } from "react";
 import { IconDice } from "../ui/icons";
 import { count } from "../ui/words";
 
-/** A random crowd in the place of all road users; streams stay. */
-export function FillForm({ actors, busy, onFill }: {
-  actors: number; busy: boolean; onFill: (share: number, seed: number) => void;
+/** Random road users in the place of all that were placed; flows stay. */
+export function FillForm({
+  actors,
+  busy,
+  onFill,
+}: {
+  actors: number;
+  busy: boolean;
+  onFill: (share: number, seed: number) => void;
 }) {
   const [share, setShare] = useState(30);
   const [seed, setSeed] = useState(1);
+  const replaced =
+    actors === 1
+      ? "the road user of the scenario; undo restores it"
+      : `the ${count(actors, "road user")} of the scenario; undo restores them`;
   return (
     <div className="fold">
       <div>
-        <Text size="sm" fw={500}>How full: {share} %</Text>
-        <Slider min={5} max={100} step={5} label={null} value={share} onChange={setShare} thumbLabel="How full, percent" />
+        <Text size="sm" fw={500}>
+          Density: {share} % of the maximum
+        </Text>
+        <Slider
+          min={5}
+          max={100}
+          step={5}
+          label={null}
+          value={share}
+          onChange={setShare}
+          thumbLabel="Density, percent of the maximum"
+        />
       </div>
       <Group gap={6} align="flex-end" wrap="nowrap">
-        <NumberInput style={{ flex: 1 }} label="Crowd number" min={0} max={2 ** 31 - 1} allowDecimal={false} value={seed}
-          onChange={(value) => setSeed(Number(value) || 0)} />
-        <Tooltip label="Roll another crowd">
-          <ActionIcon variant="default" size={36} aria-label="Roll another crowd" onClick={() => setSeed(Math.floor(Math.random() * 100_000))}><IconDice /></ActionIcon>
+        <NumberInput
+          style={{ flex: 1 }}
+          label="Random seed"
+          min={0}
+          max={2 ** 31 - 1}
+          allowDecimal={false}
+          value={seed}
+          onChange={(value) => setSeed(Number(value) || 0)}
+        />
+        <Tooltip label="New random seed">
+          <ActionIcon
+            variant="default"
+            size={36}
+            aria-label="New random seed"
+            onClick={() => setSeed(Math.floor(Math.random() * 100_000))}
+          >
+            <IconDice />
+          </ActionIcon>
         </Tooltip>
       </Group>
       <Text size="sm" c="dimmed">
-        The same number gives the same crowd.{actors > 0 && ` It takes the place of the ${count(actors, "road user")} there; undo brings ${actors === 1 ? "it" : "them"} back.`}
+        The same seed gives the same road users.{actors > 0 && ` They replace ${replaced}.`}
       </Text>
-      <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed)}>Fill the region</Button>
+      <Button variant="light" loading={busy} onClick={() => onFill(share / 100, seed)}>
+        Fill the region
+      </Button>
     </div>
   );
 }

@@ -5,24 +5,63 @@ import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { MixForm } from "./MixForm";
 
-/** How many come, when, and of which kinds. */
-export function FlowForm({ flow, profiles, onEdit }: { flow: Flow; profiles: Profiles; onEdit: (edit: Edit) => void }) {
+/** Volume, time and mix of a flow. */
+export function FlowForm({
+  flow,
+  profiles,
+  onEdit,
+}: {
+  flow: Flow;
+  profiles: Profiles;
+  onEdit: (edit: Edit) => void;
+}) {
   const change = (fields: Partial<Flow>): void => onEdit({ kind: "change_flow", flow: flow.id, ...fields });
   const walks = "pedestrian" in flow.mix;
   return (
     <Stack gap="sm">
-      <Committed label={walks ? "People an hour" : "Vehicles an hour"} suffix="" min={1} max={20_000} step={50} digits={0} value={flow.per_hour}
-        onCommit={(value) => change({ per_hour: value ?? flow.per_hour })} />
+      <Committed
+        label={walks ? "Pedestrians per hour" : "Vehicles per hour"}
+        suffix=""
+        min={1}
+        max={20_000}
+        step={50}
+        digits={0}
+        value={flow.per_hour}
+        onCommit={(value) => change({ per_hour: value ?? flow.per_hour })}
+      />
       <ProfileChoice value={flow.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <Group grow align="flex-start">
-        <Committed label="From" suffix=" s" min={0} max={1e6} step={10} digits={0} value={flow.begin}
-          onCommit={(value) => change({ begin: value ?? 0 })} />
-        <Committed label="Until" suffix=" s" min={1} max={1e6} step={10} digits={0} value={flow.end}
-          onCommit={(value) => change({ end: value ?? flow.end })} />
+        <Committed
+          label="From"
+          suffix=" s"
+          min={0}
+          max={1e6}
+          step={10}
+          digits={0}
+          value={flow.begin}
+          onCommit={(value) => change({ begin: value ?? 0 })}
+        />
+        <Committed
+          label="Until"
+          suffix=" s"
+          min={1}
+          max={1e6}
+          step={10}
+          digits={0}
+          value={flow.end}
+          onCommit={(value) => change({ end: value ?? flow.end })}
+        />
       </Group>
-      <Committed label={walks ? "Walking speed" : "Desired speed"} suffix=" km/h" min={1} max={walks ? 15 : 250} digits={1}
-        placeholder={walks ? "usual" : "the limit"} value={flow.speed === null ? "" : flow.speed * 3.6}
-        onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })} />
+      <Committed
+        label={walks ? "Walking speed" : "Desired speed"}
+        suffix=" km/h"
+        min={1}
+        max={walks ? 15 : 250}
+        digits={1}
+        placeholder={walks ? "default" : "speed limit"}
+        value={flow.speed === null ? "" : flow.speed * 3.6}
+        onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
+      />
       {!walks && <MixForm mix={flow.mix} onChange={(mix) => change({ mix })} />}
     </Stack>
   );

@@ -2,9 +2,18 @@ import { ELIGIBLE, FLOW, GOAL, PEDESTRIAN_NODE, ROI_BASE, ROI_MEMBER, VEHICLE_NO
 import type { Step } from "./scene";
 
 const ROWS: Partial<Record<Step, [color: string, word: string][]>> = {
-  region: [[ROI_BASE, "First segment"], [ROI_MEMBER, "Region"], [ELIGIBLE, "Can be added"]],
-  actors: [[VEHICLE_NODE, "Vehicles can start"], [PEDESTRIAN_NODE, "People can start"], ["#8b949d", "Nobody can start"],
-    [GOAL, "Possible goal"], [FLOW, "Stream of traffic"]],
+  region: [
+    [ROI_BASE, "First segment"],
+    [ROI_MEMBER, "Region"],
+    [ELIGIBLE, "Can be added"],
+  ],
+  actors: [
+    [VEHICLE_NODE, "Vehicle start"],
+    [PEDESTRIAN_NODE, "Pedestrian start"],
+    ["#8b949d", "No start possible"],
+    [GOAL, "Possible goal"],
+    [FLOW, "Vehicle flow"],
+  ],
 };
 
 export function Legend({ step }: { step: Step }) {
@@ -12,7 +21,12 @@ export function Legend({ step }: { step: Step }) {
   if (!rows) return null;
   return (
     <div className="map-legend" aria-hidden="true">
-      {rows.map(([color, word]) => <span key={word}><i style={{ background: color }} />{word}</span>)}
+      {rows.map(([color, word]) => (
+        <span key={word}>
+          <i style={{ background: color }} />
+          {word}
+        </span>
+      ))}
     </div>
   );
 }

@@ -2,9 +2,9 @@ import { Button, Group, Text } from "@mantine/core";
 import { useCallback } from "react";
 
 import { api } from "../api/client";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
-import { mapFacts } from "../ui/words";
+import { count, mapFacts } from "../ui/words";
 import type { Region } from "./asked";
 
 export function MapStep({ name, onShow }: { name: string; onShow: () => void }) {
@@ -14,30 +14,63 @@ export function MapStep({ name, onShow }: { name: string; onShow: () => void }) 
     <>
       <Text size="sm">{value ? mapFacts(value.statistics).join(" · ") : "…"}</Text>
       <Group>
-        <Button size="compact-sm" variant="default" onClick={onShow}>Show the whole map</Button>
-        <Button size="compact-sm" variant="subtle" onClick={() => go({ view: "catalogue" })}>Choose another map</Button>
+        <Button size="compact-sm" variant="default" onClick={onShow}>
+          Show the whole map
+        </Button>
+        <Button size="compact-sm" variant="subtle" onClick={() => go({ view: "catalogue" })}>
+          Choose another map
+        </Button>
       </Group>
     </>
   );
 }
 
-export function RegionStep({ segments, roi, onNext, onAll, onBegin, onShow }: {
-  segments: number; roi: Region; onNext: () => void; onAll: () => void; onBegin: () => void; onShow: () => void;
+export function RegionStep({
+  segments,
+  region,
+  onNext,
+  onAll,
+  onBegin,
+  onShow,
+}: {
+  segments: number;
+  region: Region;
+  onNext: () => void;
+  onAll: () => void;
+  onBegin: () => void;
+  onShow: () => void;
 }) {
   if (segments === 0) {
     return (
       <>
-        <Text size="sm">Click the road or junction where your scenario begins. It turns dark blue; then let the region grow around it.</Text>
-        <Group><Button size="compact-sm" variant="default" onClick={onBegin}>Begin in the middle of what I see</Button></Group>
+        <Text size="sm">
+          Click the road or junction where your scenario begins. It turns dark blue; then let the region grow
+          around it.
+        </Text>
+        <Group>
+          <Button size="compact-sm" variant="default" onClick={onBegin}>
+            Begin in the middle of what I see
+          </Button>
+        </Group>
       </>
     );
   }
   return (
     <>
-      <Text size="sm">Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.</Text>
+      <Text size="sm">
+        Click a <b>light-blue</b> segment to add it, or a segment of the region to take it out again.
+      </Text>
       <Group>
-        <Button size="compact-sm" variant="default" disabled={!roi.current || roi.candidates.length === 0} onClick={onAll}>Add all {roi.candidates.length} neighbours</Button>
-        <Button size="compact-sm" variant="subtle" onClick={onShow}>Show the region</Button>
+        {(!region.current || region.candidates.length > 0) && (
+          <Button size="compact-sm" variant="default" disabled={!region.current} onClick={onAll}>
+            {region.current
+              ? `Add all ${count(region.candidates.length, "neighbour")}`
+              : "Add all neighbours"}
+          </Button>
+        )}
+        <Button size="compact-sm" variant="subtle" onClick={onShow}>
+          Show the region
+        </Button>
       </Group>
       <Button onClick={onNext}>Next: weather and time</Button>
     </>

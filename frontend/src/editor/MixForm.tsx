@@ -9,10 +9,14 @@ import { mixWords } from "./demand";
 const VEHICLES = CATEGORIES.filter((category) => category !== "pedestrian");
 
 /** Shares of the kinds of road users; at least one stays. */
-export function MixForm({ mix, people = false, onChange }: {
+export function MixForm({
+  mix,
+  pedestrians = false,
+  onChange,
+}: {
   mix: Mix;
-  /** Whether people on foot can be among them. */
-  people?: boolean;
+  /** Whether pedestrians can be among them. */
+  pedestrians?: boolean;
   onChange: (mix: Mix) => void;
 }) {
   const setShare = (category: Category, share: number): void => {
@@ -22,12 +26,22 @@ export function MixForm({ mix, people = false, onChange }: {
   };
   return (
     <fieldset className="mix">
-      <legend>Shares of the kinds</legend>
-      {(people ? CATEGORIES : VEHICLES).map((category) => (
-        <Committed key={category} label={CATEGORY_WORD[category]} suffix="" min={0} max={1000} digits={2} value={mix[category] ?? 0}
-          onCommit={(share) => setShare(category, share ?? 0)} />
+      <legend>Mix of road users</legend>
+      {(pedestrians ? CATEGORIES : VEHICLES).map((category) => (
+        <Committed
+          key={category}
+          label={CATEGORY_WORD[category]}
+          suffix=""
+          min={0}
+          max={1000}
+          digits={2}
+          value={mix[category] ?? 0}
+          onCommit={(share) => setShare(category, share ?? 0)}
+        />
       ))}
-      <Text size="xs" c="dimmed">{mixWords(mix)}</Text>
+      <Text size="xs" c="dimmed">
+        {mixWords(mix)}
+      </Text>
     </fieldset>
   );
 }

@@ -8,9 +8,29 @@ export function RefusalAlert({ store }: { store: EditorStore }) {
   if (!refusal) return null;
   return (
     <div className="notices refusal">
-      <Alert color="red.9" variant="filled" title={refusal.title} withCloseButton closeButtonLabel="Close this message" onClose={clearRefusal} role="alert">
+      <Alert
+        color="red.9"
+        variant="filled"
+        title={refusal.title}
+        withCloseButton
+        closeButtonLabel="Close this message"
+        onClose={clearRefusal}
+        role="alert"
+      >
         {refusal.message}
-        {refusal.again && <div><Button mt="xs" size="compact-sm" variant="white" color="dark" onClick={() => void refusal.again?.()}>Make my change again</Button></div>}
+        {refusal.again && (
+          <div>
+            <Button
+              mt="xs"
+              size="compact-sm"
+              variant="white"
+              color="dark"
+              onClick={() => void refusal.again?.()}
+            >
+              Apply my change again
+            </Button>
+          </div>
+        )}
       </Alert>
     </div>
   );

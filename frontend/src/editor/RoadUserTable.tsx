@@ -3,8 +3,8 @@ import { type KeyboardEvent, memo, useEffect, useMemo, useRef, useState } from "
 
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
-import { CategoryGlyph, IconStream, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD, count, kmh, modelWord, STYLE_WORD } from "../ui/words";
+import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
+import { CATEGORY_WORD, count, flowWord, kmh, modelWord, STYLE_WORD } from "../ui/words";
 import { placeWord } from "./placeWords";
 import { isFlow } from "./placing";
 import { rowsInSight } from "./windowed";
@@ -12,12 +12,23 @@ import { rowsInSight } from "./windowed";
 const ROW = 34;
 /** From so many on it is worth searching. */
 const MANY = 8;
-const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Starts after", "Style", "Ego"];
+const COLUMNS = ["Name", "Kind", "Model", "Start", "Goal", "Speed", "Departs", "Driving style", "Ego"];
 
-/** Everybody in the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
-export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, onRemove }: {
-  ones: readonly (Actor | Flow)[]; graph: Graph; selection: readonly string[];
-  onSelect: (id: string, more: boolean) => void; onSelectAll: (ids: string[]) => void; onRemove: (ids: readonly string[]) => void;
+/** All road users and flows of the scenario, only the rows in sight drawn; choosing a row is choosing on the map. */
+export function RoadUserTable({
+  ones,
+  graph,
+  selection,
+  onSelect,
+  onSelectAll,
+  onRemove,
+}: {
+  ones: readonly (Actor | Flow)[];
+  graph: Graph;
+  selection: readonly string[];
+  onSelect: (id: string, more: boolean) => void;
+  onSelectAll: (ids: string[]) => void;
+  onRemove: (ids: readonly string[]) => void;
 }) {
   const [filter, setFilter] = useState("");
   const [scroll, setScroll] = useState({ top: 0, height: 300 });
@@ -25,15 +36,27 @@ export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, o
   const chosen = useMemo(() => new Set(selection), [selection]);
   const rows = useMemo(() => {
     const words = filter.toLowerCase().trim();
-    return words ? ones.filter((one) => `${one.id} ${kindWord(one)} ${isFlow(one) ? "" : one.model ?? ""} ${placeWord(graph, one.spawn)}`.toLowerCase().includes(words)) : ones;
+    return words
+      ? ones.filter((one) =>
+          `${one.id} ${kindWord(one)} ${isFlow(one) ? "" : (one.model ?? "")} ${placeWord(graph, one.spawn)}`
+            .toLowerCase()
+            .includes(words),
+        )
+      : ones;
   }, [ones, filter, graph]);
   const [first, end] = rowsInSight(rows.length, ROW, scroll.top, scroll.height);
 
   const latest = useRef({ onSelect, onRemove });
-  useEffect(() => { latest.current = { onSelect, onRemove }; });
-  const actions = useMemo<RowActions>(() => ({
-    select: (id, more) => latest.current.onSelect(id, more), remove: (id) => latest.current.onRemove([id]),
-  }), []);
+  useEffect(() => {
+    latest.current = { onSelect, onRemove };
+  });
+  const actions = useMemo<RowActions>(
+    () => ({
+      select: (id, more) => latest.current.onSelect(id, more),
+      remove: (id) => latest.current.onRemove([id]),
+    }),
+    [],
+  );
   const one = selection.length === 1 ? selection[0] : null;
   useEffect(() => {
     const n = one === null ? -1 : rows.findIndex((row) => row.id === one);
@@ -41,40 +64,78 @@ export function RoadUserTable({ ones, graph, selection, onSelect, onSelectAll, o
     if (n < 0 || !element) return;
     // Below the heading, which stays.
     if (n * ROW < element.scrollTop) element.scrollTop = n * ROW;
-    else if ((n + 2) * ROW > element.scrollTop + element.clientHeight) element.scrollTop = (n + 2) * ROW - element.clientHeight;
+    else if ((n + 2) * ROW > element.scrollTop + element.clientHeight)
+      element.scrollTop = (n + 2) * ROW - element.clientHeight;
   }, [one, rows]);
 
   const onKeyDown = (event: KeyboardEvent): void => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-    const row = (event.target as HTMLElement).closest<HTMLElement>("[data-row]");
+    const row = event.target instanceof Element ? event.target.closest<HTMLElement>("[data-row]") : null;
     if (!step || !row) return;
     event.preventDefault();
-    const next = row.parentElement?.querySelector<HTMLElement>(`[data-row="${Number(row.dataset.row) + step}"] .row-button`);
+    const next = row.parentElement?.querySelector<HTMLElement>(
+      `[data-row="${Number(row.dataset.row) + step}"] .row-button`,
+    );
     next?.focus();
   };
   return (
     <>
       <div className="table-bar">
-        <span role="status">{count(ones.length, "entry", "entries")}{selection.length > 0 && `, ${selection.length} selected`}</span>
-        <Button size="compact-xs" variant="default" onClick={() => onSelectAll(rows.map((row) => row.id))}>Select all</Button>
-        {ones.length > MANY && <TextInput size="xs" placeholder="Search" aria-label="Search the table of road users" value={filter} onChange={(event) => setFilter(event.currentTarget.value)} />}
+        <span role="status">
+          {count(ones.length, "entry", "entries")}
+          {selection.length > 0 && `, ${selection.length} selected`}
+        </span>
+        <Button size="compact-xs" variant="default" onClick={() => onSelectAll(rows.map((row) => row.id))}>
+          Select all
+        </Button>
+        {ones.length > MANY && (
+          <TextInput
+            size="xs"
+            placeholder="Search"
+            aria-label="Search the table of road users"
+            value={filter}
+            onChange={(event) => setFilter(event.currentTarget.value)}
+          />
+        )}
       </div>
-      <div className="table" role="region" aria-label="Table of road users" tabIndex={0} ref={box} onKeyDown={onKeyDown}
-        onScroll={({ currentTarget: { scrollTop, clientHeight } }) => setScroll({ top: scrollTop, height: clientHeight })}>
+      <div
+        className="table"
+        role="region"
+        aria-label="Table of road users"
+        tabIndex={0}
+        ref={box}
+        onKeyDown={onKeyDown}
+        onScroll={({ currentTarget: { scrollTop, clientHeight } }) =>
+          setScroll({ top: scrollTop, height: clientHeight })
+        }
+      >
         <table aria-rowcount={rows.length + 1}>
           <thead>
             <tr aria-rowindex={1}>
-              {COLUMNS.map((word) => <th scope="col" key={word}>{word}</th>)}
+              {COLUMNS.map((word) => (
+                <th scope="col" key={word}>
+                  {word}
+                </th>
+              ))}
               <td />
             </tr>
           </thead>
           <tbody>
             {first > 0 && <tr aria-hidden="true" style={{ height: first * ROW }} />}
-            {rows.slice(first, end).map((row, n) => <Row key={row.id} one={row} n={first + n} graph={graph} chosen={chosen.has(row.id)} actions={actions} />)}
+            {rows.slice(first, end).map((row, n) => (
+              <Row
+                key={row.id}
+                one={row}
+                n={first + n}
+                graph={graph}
+                chosen={chosen.has(row.id)}
+                actions={actions}
+              />
+            ))}
             {end < rows.length && <tr aria-hidden="true" style={{ height: (rows.length - end) * ROW }} />}
           </tbody>
         </table>
-        {rows.length === 0 && <p className="table-empty">Nobody is called “{filter}”.</p>}
+        {rows.length === 0 && <p className="table-empty">No road user matches “{filter}”.</p>}
       </div>
     </>
   );
@@ -85,40 +146,101 @@ interface RowActions {
   remove: (id: string) => void;
 }
 
-const Row = memo(function Row({ one, n, graph, chosen, actions }: {
-  one: Actor | Flow; n: number; graph: Graph; chosen: boolean; actions: RowActions;
+const Row = memo(function Row({
+  one,
+  n,
+  graph,
+  chosen,
+  actions,
+}: {
+  one: Actor | Flow;
+  n: number;
+  graph: Graph;
+  chosen: boolean;
+  actions: RowActions;
 }) {
   return (
-    <tr data-row={n} aria-rowindex={n + 2} data-selected={chosen} style={{ height: ROW }}
-      onClick={(event) => actions.select(one.id, event.shiftKey || event.ctrlKey)}>
+    <tr
+      data-row={n}
+      aria-rowindex={n + 2}
+      data-selected={chosen}
+      style={{ height: ROW }}
+      onClick={(event) => actions.select(one.id, event.shiftKey || event.ctrlKey)}
+    >
       <td>
-        <button type="button" className="row-button" aria-pressed={chosen}
-          onClick={(event) => { event.stopPropagation(); actions.select(one.id, event.shiftKey || event.ctrlKey); }}>{one.id}</button>
+        <button
+          type="button"
+          className="row-button"
+          aria-pressed={chosen}
+          onClick={(event) => {
+            event.stopPropagation();
+            actions.select(one.id, event.shiftKey || event.ctrlKey);
+          }}
+        >
+          {one.id}
+        </button>
       </td>
-      <td><span className="kind">{isFlow(one) ? <IconStream size={20} /> : <CategoryGlyph category={one.category} size={22} />}{kindWord(one)}</span></td>
+      <td>
+        <span className="kind">
+          {isFlow(one) ? <IconFlow size={20} /> : <CategoryGlyph category={one.category} size={22} />}
+          {kindWord(one)}
+        </span>
+      </td>
       <td>{isFlow(one) ? "–" : one.model ? modelWord(one.model) : "any"}</td>
-      <td><Tooltip label={one.spawn}><span>{placeWord(graph, one.spawn)}</span></Tooltip></td>
-      <td>{one.goal ? <Tooltip label={one.goal}><span>{placeWord(graph, one.goal)}</span></Tooltip> : "by chance"}</td>
+      <td>
+        <Tooltip label={one.spawn}>
+          <span>{placeWord(graph, one.spawn)}</span>
+        </Tooltip>
+      </td>
+      <td>
+        {one.goal ? (
+          <Tooltip label={one.goal}>
+            <span>{placeWord(graph, one.goal)}</span>
+          </Tooltip>
+        ) : (
+          "random"
+        )}
+      </td>
       <td>{speedWord(one)}</td>
-      <td>{isFlow(one) ? `${one.begin} s, until ${one.end} s` : `${one.depart} s`}</td>
-      <td>{isFlow(one) ? `${Math.round(one.per_hour)} an hour` : one.category === "pedestrian" ? "–" : STYLE_WORD[one.style]}</td>
+      <td>{isFlow(one) ? `${one.begin} to ${one.end} s` : `after ${one.depart} s`}</td>
+      <td>
+        {isFlow(one)
+          ? `${Math.round(one.per_hour)} per hour`
+          : one.category === "pedestrian"
+            ? "–"
+            : STYLE_WORD[one.style]}
+      </td>
       <td>{!isFlow(one) && one.ego ? "yes" : ""}</td>
       <td>
-        <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Remove ${one.id}`}
-          onClick={(event) => { event.stopPropagation(); actions.remove(one.id); }}><IconTrash size={15} /></ActionIcon>
+        <ActionIcon
+          size="sm"
+          variant="subtle"
+          color="gray"
+          aria-label={`Remove ${one.id}`}
+          onClick={(event) => {
+            event.stopPropagation();
+            actions.remove(one.id);
+          }}
+        >
+          <IconTrash size={15} />
+        </ActionIcon>
       </td>
     </tr>
   );
 });
 
-const walks = (one: Actor | Flow): boolean => isFlow(one) ? "pedestrian" in one.mix : one.category === "pedestrian";
+const walks = (one: Actor | Flow): boolean =>
+  isFlow(one) ? "pedestrian" in one.mix : one.category === "pedestrian";
 
 function kindWord(one: Actor | Flow): string {
   if (!isFlow(one)) return CATEGORY_WORD[one.category];
-  return `Stream: ${CATEGORIES.filter((category) => one.mix[category]).map((category) => CATEGORY_WORD[category].toLowerCase()).join(", ")}`;
+  if (walks(one)) return flowWord(true);
+  return `Flow: ${CATEGORIES.filter((category) => one.mix[category])
+    .map((category) => CATEGORY_WORD[category].toLowerCase())
+    .join(", ")}`;
 }
 
 function speedWord(one: Actor | Flow): string {
   if (one.speed !== null) return kmh(one.speed);
-  return walks(one) ? "usual" : "the limit";
+  return walks(one) ? "default" : "speed limit";
 }

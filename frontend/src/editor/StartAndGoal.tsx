@@ -5,39 +5,91 @@ import type { Graph, Place } from "../map/graph";
 import { placeWord } from "./placeWords";
 import type { Starts } from "./placing";
 
-/** Where one starts and goes: all that a click on the map does, without the map. */
-export function StartAndGoal({ one, graph, starts, goals, onStart, onGoal, onShowGoals }: {
-  one: Actor | Flow; graph: Graph; starts: Starts; goals: readonly Place[] | null;
-  onStart: (spawn: string) => void; onGoal: (goal: string | null) => void; onShowGoals: () => void;
+/** Start and goal: all that a click on the map does, without the map. */
+export function StartAndGoal({
+  one,
+  graph,
+  starts,
+  goals,
+  onStart,
+  onGoal,
+  onShowGoals,
+}: {
+  one: Actor | Flow;
+  graph: Graph;
+  starts: Starts;
+  goals: readonly Place[] | null;
+  onStart: (spawn: string) => void;
+  onGoal: (goal: string | null) => void;
+  onShowGoals: () => void;
 }) {
   const start = graph.place(one.spawn);
-  const moves: [string, () => Place | null][] = start ? [
-    ["Further back", () => starts.along(start, -1)],
-    ["Further on", () => starts.along(start, 1)],
-    ["Another lane", () => starts.otherLane(start)],
-  ] : [];
+  const moves: [string, () => Place | null][] = start
+    ? [
+        ["Further back", () => starts.along(start, -1)],
+        ["Further on", () => starts.along(start, 1)],
+        ["Another lane", () => starts.otherLane(start)],
+      ]
+    : [];
   const ids = (goals ?? []).map((goal) => goal.id);
   const all = one.goal && !ids.includes(one.goal) ? [one.goal, ...ids] : ids;
   return (
     <>
       <div>
-        <Text size="sm" fw={500}>Start</Text>
-        <Tooltip label={one.spawn} position="top-start"><Text size="sm">{placeWord(graph, one.spawn)}</Text></Tooltip>
+        <Text size="sm" fw={500}>
+          Start
+        </Text>
+        <Tooltip label={one.spawn} position="top-start">
+          <Text size="sm">{placeWord(graph, one.spawn)}</Text>
+        </Tooltip>
         <Group gap={6} mt={4} role="group" aria-label="Move the start">
           {moves.map(([word, find]) => (
-            <Button key={word} size="compact-xs" variant="default" onClick={() => { const place = find(); if (place) onStart(place.id); }}>{word}</Button>
+            <Button
+              key={word}
+              size="compact-xs"
+              variant="default"
+              onClick={() => {
+                const place = find();
+                if (place) onStart(place.id);
+              }}
+            >
+              {word}
+            </Button>
           ))}
         </Group>
       </div>
-      {goals?.length === 0 && !one.goal
-        ? <Text size="sm" c="red">No goal can be reached from here. Move the start or let the region grow.</Text>
-        : <Group gap={6} align="flex-end">
-          <Select style={{ flex: "1 1 170px" }} label="Goal" searchable disabled={goals === null} allowDeselect={false} value={one.goal ?? ""}
-            data={[{ value: "", label: `By chance${goals ? ` among ${goals.length}` : ""}` }, ...all.map((id) => ({ value: id, label: placeWord(graph, id) }))]}
-            nothingFoundMessage="No such place" onChange={(goal) => { if ((goal || null) !== one.goal) onGoal(goal || null); }} />
-          <Button variant="default" px="sm" disabled={!goals?.length} onClick={onShowGoals}>Show goals</Button>
-          {one.goal && <Button variant="default" px="sm" onClick={() => onGoal(null)}>By chance</Button>}
-        </Group>}
+      {goals?.length === 0 && !one.goal ? (
+        <Text size="sm" c="red">
+          No goal can be reached from here. Move the start or extend the region.
+        </Text>
+      ) : (
+        <Group gap={6} align="flex-end">
+          <Select
+            style={{ flex: "1 1 170px" }}
+            label="Goal"
+            searchable
+            disabled={goals === null}
+            allowDeselect={false}
+            value={one.goal ?? ""}
+            data={[
+              { value: "", label: `Random${goals ? ` (one of ${goals.length})` : ""}` },
+              ...all.map((id) => ({ value: id, label: placeWord(graph, id) })),
+            ]}
+            nothingFoundMessage="No such goal"
+            onChange={(goal) => {
+              if ((goal || null) !== one.goal) onGoal(goal || null);
+            }}
+          />
+          <Button variant="default" px="sm" disabled={!goals?.length} onClick={onShowGoals}>
+            Show goals
+          </Button>
+          {one.goal && (
+            <Button variant="default" px="sm" onClick={() => onGoal(null)}>
+              Random goal
+            </Button>
+          )}
+        </Group>
+      )}
     </>
   );
 }

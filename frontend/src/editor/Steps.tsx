@@ -11,8 +11,14 @@ export interface StepText {
 }
 
 /** The guided order; every step can be opened at any time. */
-export function Steps({ open, onOpen, steps }: {
-  open: Step; onOpen: (step: Step) => void; steps: Record<Step, StepText>;
+export function Steps({
+  open,
+  onOpen,
+  steps,
+}: {
+  open: Step;
+  onOpen: (step: Step) => void;
+  steps: Record<Step, StepText>;
 }) {
   const list = useRef<HTMLDivElement>(null);
   useEffect(() => {
@@ -26,10 +32,19 @@ export function Steps({ open, onOpen, steps }: {
         const expanded = open === step;
         return (
           <section key={step} aria-label={title}>
-            <button type="button" className="step-head" aria-expanded={expanded} data-done={done} onClick={() => onOpen(step)}>
-              <span className="step-number" aria-hidden="true">{done && !expanded ? <IconCheck size={15} /> : n + 1}</span>
+            <button
+              type="button"
+              className="step-head"
+              aria-expanded={expanded}
+              data-done={done}
+              onClick={() => onOpen(step)}
+            >
+              <span className="step-number" aria-hidden="true">
+                {done && !expanded ? <IconCheck size={15} /> : n + 1}
+              </span>
               <span>
-                <span className="step-title">{title}</span><br />
+                <span className="step-title">{title}</span>
+                <br />
                 <span className="step-note">{note}</span>
               </span>
             </button>

@@ -3,25 +3,46 @@ import { useEffect, useRef, useState } from "react";
 
 import { ApiError } from "../api/client";
 import { type Demand, demand, type TableKind } from "../api/demand";
+import { isKey } from "../lists";
 import { tell } from "../ui/notices";
+import { reasonOf } from "../ui/reason";
 import { exampleTable } from "./demand";
 import type { EditorStore } from "./store";
 
-const KINDS: readonly { value: TableKind; label: string; stem: string | null; text: string }[] = [
-  { value: "od", label: "Trips from where to where", stem: "trips", text: "How many go from one place to another. Columns “begin” and “end” may say when." },
-  { value: "counts", label: "Counts", stem: "counts", text: "How many vehicles passed a place. Traffic is made that reproduces them. A place is a segment, or segments one after another: r1>j2>r3." },
-  { value: "profile", label: "A day profile", stem: "my-day", text: "How much comes in each equal slice of a day, from midnight on." },
-  { value: "zones", label: "Zones", stem: null, text: "Names for several segments, which tables of trips can use." },
-];
+const KINDS: Record<TableKind, { label: string; stem: string | null; text: string }> = {
+  od: {
+    label: "Trips between zones",
+    stem: "trips",
+    text: "How many trips go from one segment or zone to another. Columns “begin” and “end” may say when.",
+  },
+  counts: {
+    label: "Counts",
+    stem: "counts",
+    text:
+      "How many vehicles passed a count station, to be reproduced by traffic. " +
+      "A count station is a segment, or consecutive segments: r1>j2>r3.",
+  },
+  profile: {
+    label: "A day profile",
+    stem: "my-day",
+    text: "The share of the traffic in each equal slice of a day, from midnight.",
+  },
+  zones: { label: "Zones", stem: null, text: "Names for groups of segments, for use in tables of trips." },
+};
 
 interface Refusal {
   file: string;
   problems: string[];
 }
 
-/** Reads a table into the scenario, all of it or nothing. */
-export function TableForm({ store, demand: known, roads }: {
-  store: EditorStore; demand: Demand;
+/** Imports a table into the scenario, all of it or nothing. */
+export function TableForm({
+  store,
+  demand: known,
+  roads,
+}: {
+  store: EditorStore;
+  demand: Demand;
   /** Roads of the region, for the example. */
   roads: readonly string[];
 }) {
@@ -32,46 +53,94 @@ export function TableForm({ store, demand: known, roads }: {
   const [refusal, setRefusal] = useState<Refusal | null>(null);
   const reset = useRef<() => void>(null);
   const alert = useRef<HTMLDivElement>(null);
-  useEffect(() => { if (refusal) alert.current?.scrollIntoView({ block: "nearest" }); }, [refusal]);
-  const chosen = KINDS.find((one) => one.value === kind) ?? KINDS[0];
+  useEffect(() => {
+    if (refusal) alert.current?.scrollIntoView({ block: "nearest" });
+  }, [refusal]);
+  const chosen = KINDS[kind];
   const example = exampleTable(kind, known, roads);
   const choose = (next: string | null): void => {
-    const found = KINDS.find((one) => one.value === next);
-    if (!found) return;
-    setKind(found.value);
-    setPart(found.stem ?? "");
+    if (!isKey(KINDS, next)) return;
+    setKind(next);
+    setPart(KINDS[next].stem ?? "");
     setRefusal(null);
   };
   const send = (file: File | null): void => {
-    reset.current?.();  // the same file can be chosen again once it is mended
+    reset.current?.(); // the same file can be chosen again once it is corrected
     if (!file) return;
     setBusy(true);
     setRefusal(null);
     take((version) => demand.table(name, version, kind, file, chosen.stem && part.trim()))
-      .then(() => tell(`${file.name} is read in.`), (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }))
+      .then(
+        () => tell(`${file.name} is imported.`),
+        (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }),
+      )
       .finally(() => setBusy(false));
   };
   return (
     <div className="fold">
-      <Select label="What the table has" data={KINDS.map(({ value, label }) => ({ value, label }))} value={kind} allowDeselect={false} onChange={choose} />
+      <Select
+        label="Contents of the table"
+        data={Object.entries(KINDS).map(([value, { label }]) => ({ value, label }))}
+        value={kind}
+        allowDeselect={false}
+        onChange={choose}
+      />
       <Text size="sm">{chosen.text}</Text>
       <div>
-        <Text size="xs" c="dimmed">For example, as text with commas, semicolons or tabs:</Text>
-        <pre className="example" tabIndex={0} aria-label="An example">{example}</pre>
-        <Anchor size="sm" underline="always" href={`data:text/csv;charset=utf-8,${encodeURIComponent(example)}`} download={`${chosen.stem ?? "zones"}.csv`}>Download this example</Anchor>
+        <Text size="xs" c="dimmed">
+          For example, as text with commas, semicolons or tabs:
+        </Text>
+        <pre className="example" tabIndex={0} aria-label="An example">
+          {example}
+        </pre>
+        <Anchor
+          size="sm"
+          underline="always"
+          href={`data:text/csv;charset=utf-8,${encodeURIComponent(example)}`}
+          download={`${chosen.stem ?? "zones"}.csv`}
+        >
+          Download this example
+        </Anchor>
       </div>
-      {kind !== "profile" && <Text size="xs" c="dimmed">Point at a road or junction on the map to see what tables call it.</Text>}
-      {chosen.stem && <TextInput label="Name" description="what has this name already is replaced" inputWrapperOrder={["label", "input", "description"]}
-        value={part} onChange={(event) => setPart(event.currentTarget.value)} />}
+      {kind !== "profile" && (
+        <Text size="xs" c="dimmed">
+          Point at a road or junction on the map to see its id for tables.
+        </Text>
+      )}
+      {chosen.stem && (
+        <TextInput
+          label="Name"
+          description="replaces what has this name already"
+          inputWrapperOrder={["label", "input", "description"]}
+          value={part}
+          onChange={(event) => setPart(event.currentTarget.value)}
+        />
+      )}
       {refusal && (
-        <Alert ref={alert} color="red" title={`${refusal.file} was not read in`} style={{ overflowWrap: "anywhere" }}>
-          {refusal.problems.length === 1 ? refusal.problems[0]
-            : <List size="sm">{refusal.problems.map((problem) => <List.Item key={problem}>{problem}</List.Item>)}</List>}
+        <Alert
+          ref={alert}
+          color="red"
+          title={`${refusal.file} was not imported`}
+          style={{ overflowWrap: "anywhere" }}
+        >
+          {refusal.problems.length === 1 ? (
+            refusal.problems[0]
+          ) : (
+            <List size="sm">
+              {refusal.problems.map((problem) => (
+                <List.Item key={problem}>{problem}</List.Item>
+              ))}
+            </List>
+          )}
         </Alert>
       )}
       <Group>
         <FileButton accept=".csv,.tsv,.txt,text/csv" resetRef={reset} onChange={send}>
-          {(props) => <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>Choose a table</Button>}
+          {(props) => (
+            <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>
+              Choose a table
+            </Button>
+          )}
         </FileButton>
       </Group>
     </div>
@@ -80,6 +149,8 @@ export function TableForm({ store, demand: known, roads }: {
 
 /** All reasons for a refusal; each begins with a capital letter. */
 function problemsOf(error: unknown): string[] {
-  const told = error instanceof ApiError ? error.body.problems : [];
-  return (told.length > 0 ? told : [(error as Error).message]).map((text) => text.charAt(0).toUpperCase() + text.slice(1));
+  const reported = error instanceof ApiError ? error.body.problems : [];
+  return (reported.length > 0 ? reported : [reasonOf(error)]).map(
+    (text) => text.charAt(0).toUpperCase() + text.slice(1),
+  );
 }

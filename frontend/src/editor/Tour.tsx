@@ -1,14 +1,25 @@
 import { Button, CloseButton, Group, Text } from "@mantine/core";
 import { useState } from "react";
 
+import { nth } from "../lists";
+
 const KEY = "odscen.tour";
 const STEPS: readonly [title: string, text: string][] = [
-  ["1. Choose where", "Click a road or junction: it is the first segment of your region. Light-blue segments can be added."],
-  ["2. Choose who", "Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for people."],
-  ["3. Run it", "Open “Run” and press Run: you see everybody move. Everything is saved by itself, and everything can be undone."],
+  [
+    "1. Choose where",
+    "Click a road or junction: it is the first segment of your region. Light-blue segments can be added.",
+  ],
+  [
+    "2. Choose who",
+    "Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for pedestrians.",
+  ],
+  [
+    "3. Run it",
+    "Open “Run” and press Run to watch the traffic. Every change is saved automatically and can be undone.",
+  ],
 ];
 
-/** Whether somebody is here for the first time; without storage nobody is bothered. */
+/** Whether this is the first visit; without storage no visit is. */
 export function firstVisit(): boolean {
   try {
     return localStorage.getItem(KEY) === null;
@@ -29,20 +40,40 @@ export function tourSeen(): void {
 /** Three cards beside the map; the page can be used while they are there. */
 export function Tour({ onClose }: { onClose: () => void }) {
   const [at, setAt] = useState(0);
-  const [title, text] = STEPS[at];
+  const [title, text] = nth(STEPS, at);
   const last = at === STEPS.length - 1;
   return (
-    <div className="tour" role="dialog" aria-label="Short tour" onKeyDown={(event) => { if (event.key === "Escape") { onClose(); event.stopPropagation(); } }}>
+    <div
+      className="tour"
+      role="dialog"
+      aria-label="Short tour"
+      onKeyDown={(event) => {
+        if (event.key === "Escape") {
+          onClose();
+          event.stopPropagation();
+        }
+      }}
+    >
       <Group justify="space-between" wrap="nowrap">
         <Text fw={700}>{title}</Text>
         <CloseButton aria-label="Close the tour" onClick={onClose} />
       </Group>
-      <Text size="sm" aria-live="polite">{text}</Text>
+      <Text size="sm" aria-live="polite">
+        {text}
+      </Text>
       <Group justify="space-between" mt="sm">
-        <Text size="xs" c="dimmed">{at + 1} of {STEPS.length}</Text>
+        <Text size="xs" c="dimmed">
+          {at + 1} of {STEPS.length}
+        </Text>
         <Group gap={6}>
-          {at > 0 && <Button size="compact-sm" variant="default" onClick={() => setAt(at - 1)}>Back</Button>}
-          <Button size="compact-sm" onClick={() => (last ? onClose() : setAt(at + 1))}>{last ? "Done" : "Next"}</Button>
+          {at > 0 && (
+            <Button size="compact-sm" variant="default" onClick={() => setAt(at - 1)}>
+              Back
+            </Button>
+          )}
+          <Button size="compact-sm" onClick={() => (last ? onClose() : setAt(at + 1))}>
+            {last ? "Done" : "Next"}
+          </Button>
         </Group>
       </Group>
     </div>

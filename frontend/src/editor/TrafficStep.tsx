@@ -12,9 +12,20 @@ import { WholeDay } from "./WholeDay";
 
 type Adding = "day" | "table" | null;
 
-/** Everybody who comes besides those placed by hand: background, trips from tables, counts. */
-export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }: {
-  store: EditorStore; document: ScenarioDocument; roads: readonly string[]; profiles: Profiles; onEdit: (edit: Edit) => void;
+/** All traffic besides the road users placed by hand: background, trips from tables, counts. */
+export function TrafficStep({
+  store,
+  document,
+  roads,
+  profiles,
+  onEdit,
+  onShow,
+}: {
+  store: EditorStore;
+  document: ScenarioDocument;
+  roads: readonly string[];
+  profiles: Profiles;
+  onEdit: (edit: Edit) => void;
   /** Shows segments on the map. */
   onShow: (segments: readonly string[]) => void;
 }) {
@@ -23,27 +34,72 @@ export function TrafficStep({ store, document, roads, profiles, onEdit, onShow }
   const remove = (part: string): void => onEdit({ kind: "remove_demand", part });
   const setClock = (text: string): void => {
     const clock = secondsOfDay(text);
-    if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60)) onEdit({ kind: "set_clock", clock });
+    if (clock !== null && Math.floor(clock / 60) !== Math.floor(demand.clock / 60))
+      onEdit({ kind: "set_clock", clock });
   };
   const toggle = (what: Adding): void => setAdding(adding === what ? null : what);
   return (
     <>
-      <TextInput type="time" label="Time of day at the start" key={demand.clock} defaultValue={timeOfDay(demand.clock)}
+      <TextInput
+        type="time"
+        label="Time of day at the start"
+        key={demand.clock}
+        defaultValue={timeOfDay(demand.clock)}
         onBlur={(event) => setClock(event.currentTarget.value)}
-        onKeyDown={(event) => { if (event.key === "Enter") setClock(event.currentTarget.value); }} />
-      {demand.background.map((one) => <BackgroundForm key={one.id} background={one} profiles={profiles} onEdit={onEdit} onRemove={() => remove(one.id)} />)}
-      {demand.matrices.map((one) => <MatrixForm key={one.id} matrix={one} profiles={profiles} onEdit={onEdit} onRemove={() => remove(one.id)} />)}
-      {demand.counts.map((one) => <CountsList key={one.id} counts={one} onEdit={onEdit} onShow={onShow} onRemove={() => remove(one.id)} />)}
+        onKeyDown={(event) => {
+          if (event.key === "Enter") setClock(event.currentTarget.value);
+        }}
+      />
+      {demand.background.map((one) => (
+        <BackgroundForm
+          key={one.id}
+          background={one}
+          profiles={profiles}
+          onEdit={onEdit}
+          onRemove={() => remove(one.id)}
+        />
+      ))}
+      {demand.matrices.map((one) => (
+        <MatrixForm
+          key={one.id}
+          matrix={one}
+          profiles={profiles}
+          onEdit={onEdit}
+          onRemove={() => remove(one.id)}
+        />
+      ))}
+      {demand.counts.map((one) => (
+        <CountsList
+          key={one.id}
+          counts={one}
+          onEdit={onEdit}
+          onShow={onShow}
+          onRemove={() => remove(one.id)}
+        />
+      ))}
       {demand.zones.length > 0 && <ZoneList zones={demand.zones} onShow={onShow} onRemove={remove} />}
       <Stack gap={6}>
-        <Button variant="default" onClick={() => onEdit({ kind: "set_background", background: freeName(demand, "background"), per_km: 5 })}>Add background traffic</Button>
-        <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>A weekday of the whole town</Button>
+        <Button
+          variant="default"
+          onClick={() =>
+            onEdit({ kind: "set_background", background: freeName(demand, "background"), per_km: 5 })
+          }
+        >
+          Add background traffic
+        </Button>
+        <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>
+          Whole day on the whole map
+        </Button>
         {adding === "day" && <WholeDay store={store} onDone={() => setAdding(null)} />}
-        <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>Add from a table</Button>
+        <Button variant="default" aria-expanded={adding === "table"} onClick={() => toggle("table")}>
+          Import a table
+        </Button>
         {adding === "table" && <TableForm store={store} demand={demand} roads={roads} />}
       </Stack>
       <ProfileList profiles={profiles} own={demand.profiles.map(({ id }) => id)} onRemove={remove} />
-      <Text size="xs" c="dimmed">Whoever was placed by hand keeps place and time, whatever is added here.</Text>
+      <Text size="xs" c="dimmed">
+        Road users that were placed by hand keep their start and departure.
+      </Text>
     </>
   );
 }

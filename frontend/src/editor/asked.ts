@@ -5,7 +5,7 @@ import { runs, type RunWish } from "../api/runs";
 import type { Actor, Flow, Roi } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 
 const NO_ROI: Roi = { inside: [], candidates: [], removable: [] };
 
@@ -19,22 +19,27 @@ export function useRegion(name: string, roiKey: string): Region {
   const [{ roi, key }, setAnswer] = useState<{ roi: Roi; key: string | null }>({ roi: NO_ROI, key: null });
   useEffect(() => {
     let current = true;
-    api.roi(name).then((found) => { if (current) setAnswer({ roi: found, key: roiKey }); }, tellError);
-    return () => { current = false; };
+    api.roi(name).then((found) => {
+      if (current) setAnswer({ roi: found, key: roiKey });
+    }, tellError);
+    return () => {
+      current = false;
+    };
   }, [name, roiKey]);
   return useMemo(() => ({ ...roi, current: key === roiKey }), [roi, key, roiKey]);
 }
 
-export interface Ways {
+export interface Goals {
   /** Null until they are known. */
   goals: Place[] | null;
-  path: [number, number][];
+  /** Points of the route to the goal that is chosen. */
+  route: [number, number][];
 }
 
-/** Where the chosen one can go, and the way to its goal. */
-export function useWays(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Ways {
+/** Where the selected one can go, and its route to its goal. */
+export function useGoals(name: string, one: Actor | Flow | null, roiKey: string, graph: Graph): Goals {
   const [goals, setGoals] = useState<Place[] | null>(null);
-  const [path, setPath] = useState<[number, number][]>([]);
+  const [route, setRoute] = useState<[number, number][]>([]);
   const spawn = one?.spawn ?? null;
   const goal = one?.goal ?? null;
   useEffect(() => {
@@ -42,19 +47,32 @@ export function useWays(name: string, one: Actor | Flow | null, roiKey: string, 
     if (spawn === null) return;
     let current = true;
     api.goals(name, spawn).then(
-      (found) => { if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? [])); },
-      () => { if (current) setGoals([]); },
+      (found) => {
+        if (current) setGoals(found.goals.flatMap((id) => graph.place(id) ?? []));
+      },
+      () => {
+        if (current) setGoals([]);
+      },
     );
-    return () => { current = false; };
+    return () => {
+      current = false;
+    };
   }, [name, spawn, roiKey, graph]);
   useEffect(() => {
-    setPath([]);
+    setRoute([]);
     if (spawn === null || goal === null) return;
     let current = true;
-    api.path(name, spawn, goal).then((found) => { if (current) setPath(found.points); }, () => undefined);
-    return () => { current = false; };
+    api.path(name, spawn, goal).then(
+      (found) => {
+        if (current) setRoute(found.points);
+      },
+      () => undefined,
+    );
+    return () => {
+      current = false;
+    };
   }, [name, spawn, goal, roiKey]);
-  return { goals, path };
+  return { goals, route };
 }
 
 /** Starts a run and leads to it. */
@@ -66,7 +84,10 @@ export function useStarter(name: string): { busy: boolean; start: (wish: RunWish
       setBusy(true);
       runs.start(wish).then(
         ({ run }) => go({ view: "run", scenario: name, run }),
-        (error: unknown) => { setBusy(false); tellError(error); },
+        (error: unknown) => {
+          setBusy(false);
+          tellError(error);
+        },
       );
     },
   };

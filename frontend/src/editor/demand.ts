@@ -2,27 +2,58 @@ import type { Background, Demand, Matrix, Mix, TableKind } from "../api/demand";
 import { CATEGORIES } from "../api/types";
 import { CATEGORY_WORD, count } from "../ui/words";
 
-/** Ways to say how much background traffic there is, with what to begin with. */
+/** Ways to give the amount of background traffic, with what to begin with. */
 export const AMOUNTS = [
-  { key: "fill", word: "Share of the room on the roads", unit: "Percent", suffix: " %", scale: 100, min: 0.1, max: 100, digits: 1, begin: 0.1 },
-  { key: "per_km", word: "Vehicles per kilometre of lane", unit: "Vehicles per kilometre", suffix: "", scale: 1, min: 0.1, max: 200, digits: 1, begin: 5 },
-  { key: "trips", word: "Trips in all", unit: "Trips", suffix: "", scale: 1, min: 1, max: 1e7, digits: 0, begin: 500 },
+  {
+    key: "fill",
+    word: "Percent of the maximum density",
+    unit: "Density",
+    suffix: " %",
+    scale: 100,
+    min: 0.1,
+    max: 100,
+    digits: 1,
+    begin: 0.1,
+  },
+  {
+    key: "per_km",
+    word: "Vehicles per kilometre of lane",
+    unit: "Vehicles per kilometre",
+    suffix: "",
+    scale: 1,
+    min: 0.1,
+    max: 200,
+    digits: 1,
+    begin: 5,
+  },
+  {
+    key: "trips",
+    word: "Number of trips",
+    unit: "Trips",
+    suffix: "",
+    scale: 1,
+    min: 1,
+    max: 1e7,
+    digits: 0,
+    begin: 500,
+  },
 ] as const;
 export type Amount = (typeof AMOUNTS)[number];
 
 export const amountOf = (one: Background): Amount =>
   AMOUNTS.find(({ key }) => one[key] !== null) ?? AMOUNTS[0];
 
-/** Whether anybody comes by the demand of a scenario. */
-export const bringsSomebody = ({ matrices, counts, background }: Demand): boolean =>
+/** Whether the demand of a scenario has trips to make. */
+export const bringsTraffic = ({ matrices, counts, background }: Demand): boolean =>
   matrices.length + counts.length + background.length > 0;
 
-export const tripsOf = (matrix: Matrix): number => matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
+export const tripsOf = (matrix: Matrix): number =>
+  matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
 
 /** What a scenario's traffic is, in a line. */
 export function trafficNote(demand: Demand): string {
   const { matrices, counts, background } = demand;
-  if (!bringsSomebody(demand)) return "Who else is on the road?";
+  if (!bringsTraffic(demand)) return "Who else is on the road?";
   const trips = Math.round(matrices.reduce((sum, one) => sum + tripsOf(one), 0));
   const counted = counts.reduce((sum, one) => sum + one.rows.length, 0);
   return [
@@ -32,7 +63,7 @@ export function trafficNote(demand: Demand): string {
   ].join(", ");
 }
 
-/** Shares of the kinds, the largest first. */
+/** A mix in words, the largest share first. */
 export function mixWords(mix: Mix): string {
   const total = Object.values(mix).reduce((sum, share) => sum + share, 0);
   return CATEGORIES.filter((one) => mix[one])
@@ -43,7 +74,11 @@ export function mixWords(mix: Mix): string {
 
 /** A name that no part of the demand has yet. */
 export function freeName(demand: Demand, stem: string): string {
-  const taken = new Set([demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background].flat().map(({ id }) => id));
+  const taken = new Set(
+    [demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background]
+      .flat()
+      .map(({ id }) => id),
+  );
   for (let n = 1; ; n++) {
     const name = n === 1 ? stem : `${stem}-${n}`;
     if (!taken.has(name)) return name;
@@ -63,10 +98,11 @@ export function secondsOfDay(text: string): number | null {
   return seconds < 86_400 ? seconds : null;
 }
 
-/** When most and fewest come. */
+/** When traffic is highest and lowest. */
 export function peakWords(shares: readonly number[]): string {
   const at = (n: number): string => timeOfDay((n * 86_400) / shares.length);
-  return `most from ${at(shares.indexOf(Math.max(...shares)))}, fewest from ${at(shares.indexOf(Math.min(...shares)))}`;
+  const [most, fewest] = [shares.indexOf(Math.max(...shares)), shares.indexOf(Math.min(...shares))];
+  return `most trips from ${at(most)}, fewest from ${at(fewest)}`;
 }
 
 /** What a table looks like, with roads of the scenario's own; it can be read in as it is. */

@@ -2,14 +2,26 @@ import { Alert, Button, Group, Loader, Modal, Stack, Text, TextInput } from "@ma
 import { type FormEvent, useState } from "react";
 
 import { api } from "../api/client";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
+import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 
 /** Asks for a name; a name that the server refuses can be changed and tried again. */
-export function NameDialog({ title, label, value, action, onName, onClose }: {
-  title: string; label: string; value: string; action: string;
-  onName: (name: string) => Promise<void>; onClose: () => void;
+export function NameDialog({
+  title,
+  label,
+  value,
+  action,
+  onName,
+  onClose,
+}: {
+  title: string;
+  label: string;
+  value: string;
+  action: string;
+  onName: (name: string) => Promise<void>;
+  onClose: () => void;
 }) {
   const [name, setName] = useState(value);
   const [busy, setBusy] = useState(false);
@@ -18,15 +30,27 @@ export function NameDialog({ title, label, value, action, onName, onClose }: {
     event.preventDefault();
     setBusy(true);
     setFailure(null);
-    onName(name.trim()).catch((error: unknown) => setFailure(String((error as Error).message))).finally(() => setBusy(false));
+    onName(name.trim())
+      .catch((error: unknown) => setFailure(reasonOf(error)))
+      .finally(() => setBusy(false));
   };
   return (
     <Modal opened onClose={onClose} title={title} centered>
       <form onSubmit={submit}>
-        <TextInput data-autofocus label={label} value={name} error={failure} onChange={(event) => setName(event.currentTarget.value)} />
+        <TextInput
+          data-autofocus
+          label={label}
+          value={name}
+          error={failure}
+          onChange={(event) => setName(event.currentTarget.value)}
+        />
         <Group justify="flex-end" mt="md">
-          <Button variant="default" onClick={onClose}>Cancel</Button>
-          <Button type="submit" loading={busy} disabled={!name.trim()}>{action}</Button>
+          <Button variant="default" onClick={onClose}>
+            Cancel
+          </Button>
+          <Button type="submit" loading={busy} disabled={!name.trim()}>
+            {action}
+          </Button>
         </Group>
       </form>
     </Modal>
@@ -41,11 +65,24 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
     <Modal opened onClose={onClose} title="Open another scenario" centered>
       {error && <Alert color="red">{error}</Alert>}
       {!others && !error && <Loader aria-label="Loading the scenarios" />}
-      {others?.length === 0 && <Text size="sm">There is no other one yet. “Save as” makes a copy of this one.</Text>}
+      {others?.length === 0 && (
+        <Text size="sm">There is no other one yet. “Save as” makes a copy of this one.</Text>
+      )}
       <Stack gap={6}>
         {others?.map((one) => (
-          <Button key={one.name} variant="default" justify="space-between" onClick={() => go({ view: "editor", scenario: one.name })}
-            rightSection={<Text size="xs" c="dimmed">{one.map}, {count(one.actors, "road user")}</Text>}>{one.name}</Button>
+          <Button
+            key={one.name}
+            variant="default"
+            justify="space-between"
+            onClick={() => go({ view: "editor", scenario: one.name })}
+            rightSection={
+              <Text size="xs" c="dimmed">
+                {one.map}, {count(one.actors, "road user")}
+              </Text>
+            }
+          >
+            {one.name}
+          </Button>
         ))}
       </Stack>
     </Modal>

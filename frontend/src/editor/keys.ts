@@ -9,18 +9,23 @@ export interface KeyActions {
   copy: () => void;
   move: () => void;
   selectAll: () => void;
-  /** 1 to 7 a kind of road user, 8 and 9 a stream. */
+  /** 1 to 7 a kind of road user, 8 and 9 a flow. */
   tool: (n: number) => void;
 }
 
 /** Shortcuts that hold everywhere but in fields and dialogs. */
 export function useKeys(actions: KeyActions): void {
   const latest = useRef(actions);
-  useEffect(() => { latest.current = actions; });
+  useEffect(() => {
+    latest.current = actions;
+  });
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
-      const target = event.target as HTMLElement;
-      if (target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")) return;
+      if (
+        event.target instanceof Element &&
+        event.target.closest("input, textarea, [role=dialog][aria-modal=true], [role=listbox], [role=menu]")
+      )
+        return;
       const act = actionOf(event, latest.current);
       if (!act) return;
       act();
@@ -37,14 +42,20 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
     // With text marked on the page, Ctrl+C copies that text.
     const marked = !getSelection()?.isCollapsed;
     const named: Record<string, () => void> = {
-      z: event.shiftKey ? actions.redo : actions.undo, y: actions.redo, a: actions.selectAll,
+      z: event.shiftKey ? actions.redo : actions.undo,
+      y: actions.redo,
+      a: actions.selectAll,
       ...(marked ? {} : { c: actions.copy }),
     };
     return named[key] ?? null;
   }
   if (event.altKey) return null;
   const plain: Record<string, () => void> = {
-    delete: actions.remove, backspace: actions.remove, escape: actions.escape, "?": actions.sheet, m: actions.move,
+    delete: actions.remove,
+    backspace: actions.remove,
+    escape: actions.escape,
+    "?": actions.sheet,
+    m: actions.move,
   };
   if (/^[1-9]$/.test(key)) return () => actions.tool(Number(key) - 1);
   return plain[key] ?? null;
@@ -53,18 +64,18 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
 export const SHORTCUTS: readonly (readonly [keys: string, what: string])[] = [
   ["Ctrl+Z / Ctrl+Y", "Undo / redo"],
   ["1 – 7", "Place a car, van, truck, bus, motorcycle, bicycle, pedestrian"],
-  ["8 / 9", "Place a stream of traffic / of people"],
+  ["8 / 9", "Place a vehicle flow / pedestrian flow"],
   ["Ctrl+C", "Copy what is selected: then choose where"],
   ["M", "Move what is selected: then choose where"],
-  ["Ctrl+A", "Select everybody"],
+  ["Ctrl+A", "Select all"],
   ["Shift + click", "Select several"],
   ["Shift + drag", "Select all in a rectangle"],
   ["Delete", "Remove what is selected"],
-  ["Escape", "Stop placing, select nothing"],
+  ["Escape", "Stop placing, clear the selection"],
   ["Arrow keys", "On the map: move it (with Shift: a little)"],
   ["+ / −", "On the map: zoom"],
   ["0", "On the map: show everything"],
   ["Enter", "On the map: choose what is in the middle"],
   ["↑ / ↓", "In the table: the row before or after"],
-  ["?", "This sheet"],
+  ["?", "This help"],
 ];

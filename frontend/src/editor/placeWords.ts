@@ -1,3 +1,4 @@
+import { nth } from "../lists";
 import type { Graph } from "../map/graph";
 import { kmh } from "../ui/words";
 
@@ -7,7 +8,7 @@ export function placeWord(graph: Graph, id: string): string {
   if (!place) return id;
   const [first] = graph.lanePlaces(place);
   const { columns } = graph;
-  const metres = place.walk ? (place.index - first) * columns.spacing : columns.s[place.index];
+  const metres = place.walk ? (place.index - first) * columns.spacing : nth(columns.s, place.index);
   return `${laneWord(graph, id)}, ${Math.round(metres)} m`;
 }
 
@@ -17,12 +18,12 @@ export function laneWord(graph: Graph, id: string): string {
   if (!place) return id;
   const { columns } = graph;
   const of = place.walk ? columns.walks : columns;
-  const key = of.lane_keys[of.lane[place.index]];
+  const key = nth(of.lane_keys, nth(of.lane, place.index));
   const parts = key.split(".");
   const lane = Number(parts.at(-1));
   const road = parts.slice(0, -2).join(".");
   const side = lane > 0 ? "left" : "right";
-  const junction = place.walk ? null : columns.lane_junctions[columns.lane[place.index]];
+  const junction = place.walk ? null : nth(columns.lane_junctions, nth(columns.lane, place.index));
   if (junction !== null) return `Junction ${junction}, road ${road}, lane ${Math.abs(lane)}`;
   if (Number.isNaN(lane) || !road) return place.walk ? `Walkway ${key}` : `Lane ${key}`;
   return place.walk ? `Road ${road}, ${side} walkway` : `Road ${road}, ${side} lane ${Math.abs(lane)}`;
@@ -33,13 +34,22 @@ export function laneFacts(graph: Graph, id: string): string {
   const place = graph.place(id);
   if (!place) return "";
   const { columns } = graph;
-  if (place.walk) return `Walkway, ${columns.walks.width[place.index].toFixed(1)} m wide`;
-  const kind = columns.lane_types[columns.lane[place.index]];
-  const limit = columns.speed_limit[place.index];
-  return `${KIND[kind] ?? "Lane"}, ${columns.width[place.index].toFixed(1)} m wide, ${limit === null ? "no limit" : `limit ${kmh(limit)}`}`;
+  if (place.walk) return `Walkway, ${nth(columns.walks.width, place.index).toFixed(1)} m wide`;
+  const kind = nth(columns.lane_types, nth(columns.lane, place.index));
+  const width = nth(columns.width, place.index).toFixed(1);
+  const limit = nth(columns.speed_limit, place.index);
+  return `${KIND[kind] ?? "Lane"}, ${width} m wide, ${limit === null ? "no limit" : `limit ${kmh(limit)}`}`;
 }
 
 const KIND: Record<string, string> = {
-  driving: "Driving lane", biking: "Bicycle lane", bidirectional: "Lane for both directions",
-  entry: "Entry lane", exit: "Exit lane", onRamp: "On-ramp", offRamp: "Off-ramp", bus: "Bus lane", taxi: "Taxi lane", HOV: "Carpool lane",
+  driving: "Driving lane",
+  biking: "Bicycle lane",
+  bidirectional: "Lane for both directions",
+  entry: "Entry lane",
+  exit: "Exit lane",
+  onRamp: "On-ramp",
+  offRamp: "Off-ramp",
+  bus: "Bus lane",
+  taxi: "Taxi lane",
+  HOV: "Carpool lane",
 };

@@ -1,19 +1,16 @@
-import type { Actor, Category, Flow, ScenarioDocument } from "../api/types";
+import type { Actor, Flow, ScenarioDocument } from "../api/types";
+import { nth } from "../lists";
 import type { Graph, Place } from "../map/graph";
 import type { Picker } from "../map/picking";
-
-/** What a click on the map does; with no tool it selects. */
-export type Tool =
-  | { does: "place"; category: Category }
-  | { does: "stream"; walk: boolean }
-  | { does: "copy"; ids: readonly string[] }
-  | { does: "move"; ids: readonly string[] };
 
 /** Where each of several goes: its id and its new start. */
 export type Moves = readonly (readonly [id: string, spawn: string])[];
 
 export const isFlow = (one: Actor | Flow): one is Flow => "per_hour" in one;
-export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [...document.actors, ...document.flows];
+export const everyone = (document: ScenarioDocument): (Actor | Flow)[] => [
+  ...document.actors,
+  ...document.flows,
+];
 
 /** How far from a click a start may be found, metres, when the map is zoomed in. */
 const SNAP = 12;
@@ -23,8 +20,10 @@ export class Starts {
   private readonly taken: ReadonlySet<string>;
 
   constructor(
-    private readonly graph: Graph, private readonly picker: Picker,
-    private readonly inside: ReadonlySet<number>, document: ScenarioDocument,
+    private readonly graph: Graph,
+    private readonly picker: Picker,
+    private readonly inside: ReadonlySet<number>,
+    document: ScenarioDocument,
   ) {
     this.taken = new Set(everyone(document).map((one) => one.spawn));
   }
@@ -38,7 +37,10 @@ export class Starts {
   /** The free start nearest to a point; `reach` in metres is that of the pointer. */
   near(x: number, y: number, reach: number, walk: boolean, besides?: ReadonlySet<string>): Place | null {
     return this.picker.place(x, y, Math.max(3 * reach, SNAP), {
-      vehicles: !walk, walks: walk, inside: this.inside, allowed: (i, onFoot) => this.free(i, onFoot, besides),
+      vehicles: !walk,
+      walks: walk,
+      inside: this.inside,
+      allowed: (i, onFoot) => this.free(i, onFoot, besides),
     });
   }
 
@@ -47,13 +49,19 @@ export class Starts {
     const wide = Math.max(3 * reach, SNAP);
     const options = { vehicles: !walk, walks: walk };
     const allowed = (i: number, onFoot: boolean): boolean => this.graph.usable(i, onFoot);
-    if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed })) return `Every point here is taken. Start the ${who} a little further away.`;
-    if (this.picker.place(x, y, wide, { ...options, inside: this.inside })) return `No ${who} may start here: the grey points cannot be used.`;
-    if (this.picker.place(x, y, wide, options)) return `That is outside the region. Start the ${who} inside it, or let the region grow.`;
-    return `No ${who} may start here. ${walk ? "People start on the yellow points beside the road." : "Vehicles start on the blue points of the lanes."}`;
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed }))
+      return `Every point here is occupied. Start the ${who} a little further away.`;
+    if (this.picker.place(x, y, wide, { ...options, inside: this.inside }))
+      return `No ${who} may start here: the grey points cannot be used.`;
+    if (this.picker.place(x, y, wide, options))
+      return `That is outside the region. Start the ${who} inside it, or extend the region.`;
+    const where = walk
+      ? "Pedestrians start on the yellow points beside the road."
+      : "Vehicles start on the blue points of the lanes.";
+    return `No ${who} may start here. ${where}`;
   }
 
-  /** The first free start, in the order of the map; far enough from others to stand there. */
+  /** The first free start, in the order of the map; far enough from others. */
   first(walk: boolean, others: readonly Place[]): Place | null {
     let fallback: Place | null = null;
     for (const place of this.all(walk)) {
@@ -68,7 +76,7 @@ export class Starts {
     const [first, end] = this.graph.lanePlaces(from);
     const segment = (from.walk ? this.graph.columns.walks : this.graph.columns).segment;
     for (let i = from.index + step; i >= first && i < end; i += step) {
-      if (!this.inside.has(segment[i])) return null;
+      if (!this.inside.has(nth(segment, i))) return null;
       if (this.free(i, from.walk)) return this.at(i, from.walk);
     }
     return null;
@@ -92,14 +100,16 @@ export class Starts {
    * free start nearest to where that is; those that find none are left out.
    */
   shifted(ones: readonly (Actor | Flow)[], to: Place): Moves {
-    const lead = ones.length > 0 ? this.graph.place(ones[0].spawn) : undefined;
+    const lead = this.graph.place(ones[0]?.spawn ?? "");
     if (!lead) return [];
     const used = new Set<string>();
     return ones.flatMap((one, n) => {
       const old = this.graph.place(one.spawn);
       if (!old) return [];
-      const place = n === 0 && old.walk === to.walk
-        ? to : this.near(old.x + to.x - lead.x, old.y + to.y - lead.y, 0, old.walk, used);
+      const place =
+        n === 0 && old.walk === to.walk
+          ? to
+          : this.near(old.x + to.x - lead.x, old.y + to.y - lead.y, 0, old.walk, used);
       if (!place || used.has(place.id)) return [];
       used.add(place.id);
       return [[one.id, place.id] as const];
@@ -113,14 +123,7 @@ export class Starts {
   private *all(walk: boolean): Generator<Place> {
     const { segment } = walk ? this.graph.columns.walks : this.graph.columns;
     for (let i = 0; i < segment.length; i++) {
-      if (this.inside.has(segment[i]) && this.free(i, walk)) yield this.at(i, walk);
+      if (this.inside.has(nth(segment, i)) && this.free(i, walk)) yield this.at(i, walk);
     }
   }
-}
-
-/** Whose tool it is, for messages: `bus`, `stream of traffic`, `copy`. */
-export function toolWord(tool: Tool, word: Record<Category, string>): string {
-  if (tool.does === "place") return word[tool.category].toLowerCase();
-  if (tool.does === "stream") return tool.walk ? "stream of people" : "stream of traffic";
-  return tool.does === "copy" ? "copy" : "road user";
 }

@@ -8,14 +8,17 @@ export const STEPS: readonly Step[] = ["map", "region", "environment", "actors",
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(
-  graph: Graph, roi: readonly string[], candidates: readonly string[], growing: boolean,
+  graph: Graph,
+  roi: readonly string[],
+  candidates: readonly string[],
+  growing: boolean,
 ): Map<number, SegmentStyle> {
   const styles = new Map<number, SegmentStyle>();
   const put = (id: string, style: SegmentStyle): void => {
     const row = graph.segmentRow.get(id);
     if (row !== undefined) styles.set(row, style);
   };
-  // With no region yet everything may be chosen: nothing stands out.
+  // With no region yet everything may be chosen: nothing is highlighted.
   if (growing && roi.length > 0) for (const id of candidates) put(id, "eligible");
   if (growing) roi.forEach((id, n) => put(id, n === 0 ? "base" : "member"));
   return styles;
@@ -27,60 +30,94 @@ export function insideRows(graph: Graph, roi: readonly string[]): Set<number> {
 
 /** Length and width in metres: of the model, or what is usual for the kind. */
 export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets | null): [number, number] {
-  const found = assets?.blueprints.find((one) => one.id === actor.model)
-    ?? assets?.categories.find((one) => one.category === actor.category);
+  const found =
+    assets?.blueprints.find((one) => one.id === actor.model) ??
+    assets?.categories.find((one) => one.category === actor.category);
   return found ? [found.length, found.width] : [4, 1.8];
 }
 
 /** Whom a problem is about, from a place such as `actors[3].goal`. */
 export function ofProblem(problem: Problem, document: ScenarioDocument): Actor | Flow | null {
   const found = /^(actors|flows)\[(\d+)\]/.exec(problem.where);
-  return found ? (document[found[1] as "actors" | "flows"][Number(found[2])] ?? null) : null;
+  const row = Number(found?.[2]);
+  return (found?.[1] === "actors" ? document.actors[row] : document.flows[row]) ?? null;
 }
 
 /** Ids of those that cannot be run as they are. */
 export const wrongOnes = (problems: readonly Problem[], document: ScenarioDocument): Set<string> =>
-  new Set(problems.filter((one) => one.severity === "error")
-    .flatMap((one) => ofProblem(one, document)?.id ?? []));
+  new Set(
+    problems.filter((one) => one.severity === "error").flatMap((one) => ofProblem(one, document)?.id ?? []),
+  );
 
 export function sceneActors(
-  graph: Graph, document: ScenarioDocument, assets: Assets | null, selection: ReadonlySet<string>,
+  graph: Graph,
+  document: ScenarioDocument,
+  assets: Assets | null,
+  selection: ReadonlySet<string>,
   wrong: ReadonlySet<string>,
 ): SceneActor[] {
   return document.actors.flatMap((actor) => {
     const place = graph.place(actor.spawn);
     if (!place) return [];
     const [length, width] = bodyOf(actor, assets);
-    return [{
-      id: actor.id, category: actor.category, hdg: place.hdg, length, width, ego: actor.ego,
-      // The offset is to the left of the driving direction.
-      x: place.x - actor.lateral_offset * Math.sin(place.hdg),
-      y: place.y + actor.lateral_offset * Math.cos(place.hdg),
-      offset: actor.lateral_offset, selected: selection.has(actor.id), problem: wrong.has(actor.id),
-    }];
+    return [
+      {
+        id: actor.id,
+        category: actor.category,
+        hdg: place.hdg,
+        length,
+        width,
+        ego: actor.ego,
+        // The offset is to the left of the driving direction.
+        x: place.x - actor.lateral_offset * Math.sin(place.hdg),
+        y: place.y + actor.lateral_offset * Math.cos(place.hdg),
+        offset: actor.lateral_offset,
+        selected: selection.has(actor.id),
+        problem: wrong.has(actor.id),
+      },
+    ];
   });
 }
 
 export function sceneFlows(
-  graph: Graph, document: ScenarioDocument, selection: ReadonlySet<string>, wrong: ReadonlySet<string>,
+  graph: Graph,
+  document: ScenarioDocument,
+  selection: ReadonlySet<string>,
+  wrong: ReadonlySet<string>,
 ): SceneFlow[] {
   return document.flows.flatMap((flow) => {
     const place = graph.place(flow.spawn);
-    return place ? [{
-      id: flow.id, walk: place.walk, x: place.x, y: place.y, hdg: place.hdg, perHour: flow.per_hour,
-      selected: selection.has(flow.id), problem: wrong.has(flow.id),
-    }] : [];
+    return place
+      ? [
+          {
+            id: flow.id,
+            walk: place.walk,
+            x: place.x,
+            y: place.y,
+            hdg: place.hdg,
+            perHour: flow.per_hour,
+            selected: selection.has(flow.id),
+            problem: wrong.has(flow.id),
+          },
+        ]
+      : [];
   });
 }
 
 /** Ids of all whose start lies in a rectangle. */
-export function inFrame(ones: readonly { id: string; x: number; y: number }[], [x0, y0, x1, y1]: Bounds): string[] {
+export function inFrame(
+  ones: readonly { id: string; x: number; y: number }[],
+  [x0, y0, x1, y1]: Bounds,
+): string[] {
   return ones.filter(({ x, y }) => x >= x0 && x <= x1 && y >= y0 && y <= y1).map((one) => one.id);
 }
 
 /** Who is under the pointer: on the body, or within reach of the middle. */
 export function nearestOne<T extends { x: number; y: number; length?: number }>(
-  ones: readonly T[], x: number, y: number, reach: number,
+  ones: readonly T[],
+  x: number,
+  y: number,
+  reach: number,
 ): T | null {
   let best: T | null = null;
   let least = Infinity;
@@ -92,14 +129,12 @@ export function nearestOne<T extends { x: number; y: number; length?: number }>(
 }
 
 /** What to show of the map so that a problem is seen; null if it has no place. */
-export function boundsOfProblem(
-  problem: Problem, graph: Graph, document: ScenarioDocument,
-): Bounds | null {
+export function boundsOfProblem(problem: Problem, graph: Graph, document: ScenarioDocument): Bounds | null {
   const one = ofProblem(problem, document);
   const nodes = [...problem.nodes, ...(one ? [one.spawn] : [])];
-  const boxes: Bounds[] = nodes.flatMap((id) => {
+  const boxes = nodes.flatMap((id): Bounds[] => {
     const place = graph.place(id);
-    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25] as Bounds] : [];
+    return place ? [[place.x - 25, place.y - 25, place.x + 25, place.y + 25]] : [];
   });
   if (boxes.length === 0) return segmentsBounds(graph, problem.segments);
   return boxes.reduce(join);
@@ -109,13 +144,17 @@ export function segmentsBounds(graph: Graph, ids: readonly string[]): Bounds | n
   const all = segmentBounds(graph.columns);
   const boxes = ids.flatMap((id) => {
     const row = graph.segmentRow.get(id);
-    return row === undefined || !Number.isFinite(all[row][0]) ? [] : [all[row]];
+    const bounds = row === undefined ? undefined : all[row];
+    return bounds && Number.isFinite(bounds[0]) ? [bounds] : [];
   });
   return boxes.length > 0 ? boxes.reduce(join) : null;
 }
 
 const join = (a: Bounds, b: Bounds): Bounds => [
-  Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3]),
+  Math.min(a[0], b[0]),
+  Math.min(a[1], b[1]),
+  Math.max(a[2], b[2]),
+  Math.max(a[3], b[3]),
 ];
 
 /** The step to begin with when a scenario is opened. */

@@ -2,6 +2,7 @@ import { create, type StoreApi, type UseBoundStore } from "zustand";
 
 import { api, ApiError } from "../api/client";
 import type { Edit, ScenarioDocument, ScenarioState } from "../api/types";
+import { reasonOf } from "../ui/reason";
 import { everyone } from "./placing";
 
 export type Saving = "saved" | "saving" | "failed";
@@ -12,7 +13,7 @@ export interface EditorState {
   saving: Saving;
   /** What went wrong last, in the server's words. */
   refusal: Refusal | null;
-  /** Ids of road users and streams. */
+  /** Ids of road users and flows. */
   selection: readonly string[];
   load: () => Promise<void>;
   /**
@@ -20,7 +21,7 @@ export interface EditorState {
    * document, or null if it was refused.
    */
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
-  /** Asks for a change that is no edit; a refusal is thrown, for whoever has asked to show it. */
+  /** Asks for a change that is no edit; a refusal is thrown, for the caller to show. */
   take: (call: (version: number) => Promise<ScenarioState>) => Promise<ScenarioState>;
   undo: () => Promise<ScenarioState | null>;
   redo: () => Promise<ScenarioState | null>;
@@ -39,7 +40,9 @@ export type EditorStore = UseBoundStore<StoreApi<EditorState>>;
 
 /** Who is selected after a change: the new ones, else those that are still there. */
 export function selectionAfter(
-  selection: readonly string[], before: ScenarioDocument, after: ScenarioDocument,
+  selection: readonly string[],
+  before: ScenarioDocument,
+  after: ScenarioDocument,
 ): readonly string[] {
   const old = new Set(everyone(before).map((one) => one.id));
   const now = everyone(after).map((one) => one.id);
@@ -91,7 +94,9 @@ export function createEditorStore(name: string): EditorStore {
           set({ saving: "saved" });
           if (!(error instanceof ApiError) || error.status !== 409) throw error;
           await get().load();
-          throw new Error("The scenario was changed in another tab. You now see its newest state; try again.");
+          throw new Error(
+            "The scenario was changed in another tab. You now see its newest state; try again.",
+          );
         }
       });
       queue = turn.catch(() => undefined);
@@ -99,22 +104,35 @@ export function createEditorStore(name: string): EditorStore {
     };
     const refused = async (error: unknown, again: Refusal["again"]): Promise<void> => {
       const status = error instanceof ApiError ? error.status : -1;
-      const message = error instanceof Error ? error.message : String(error);
+      const message = reasonOf(error);
       if (status === 409) {
         try {
           await get().load();
         } catch (failure) {
-          set({ saving: "failed", refusal: { title: "The scenario cannot be read", message: String((failure as Error).message), again } });
+          set({
+            saving: "failed",
+            refusal: { title: "The scenario cannot be read", message: reasonOf(failure), again },
+          });
           return;
         }
         const title = "Changed in another tab";
-        set({ refusal: { title, message: "You now see the newest state. Your last change is not in it; you can make it again on top.", again } });
+        set({
+          refusal: {
+            title,
+            message: "You now see the newest state without your last change, which you can apply again.",
+            again,
+          },
+        });
         return;
       }
       const failed = status <= 0 || status >= 500;
       set({
         saving: failed ? "failed" : "saved",
-        refusal: { title: failed ? "Your last change is not saved" : "That is not possible", message, again: failed ? again : null },
+        refusal: {
+          title: failed ? "Your last change is not saved" : "That is not possible",
+          message,
+          again: failed ? again : null,
+        },
       });
     };
     return {
@@ -125,7 +143,7 @@ export function createEditorStore(name: string): EditorStore {
       selection: [],
       load: async () => accept(await api.scenario(name)),
       edit: (edit, label) => {
-        const edits = Array.isArray(edit) ? edit as readonly Edit[] : [edit as Edit];
+        const edits = Array.isArray(edit) ? (edit as readonly Edit[]) : [edit as Edit];
         return ask((version) => api.edit(name, version, edits, label));
       },
       take,

@@ -15,14 +15,23 @@ export interface Shown {
 
 /** What the map shows of a document; each part is made anew only when its own cause changes. */
 export function useShown(
-  { graph, picker }: LoadedGraph, document: ScenarioDocument, assets: Assets | null,
-  selection: readonly string[], problems: readonly Problem[],
+  { graph, picker }: LoadedGraph,
+  document: ScenarioDocument,
+  assets: Assets | null,
+  selection: readonly string[],
+  problems: readonly Problem[],
 ): Shown {
   const inside = useMemo(() => insideRows(graph, document.roi), [graph, document.roi]);
-  const starts = useMemo(() => new Starts(graph, picker, inside, document), [graph, picker, inside, document]);
+  const starts = useMemo(
+    () => new Starts(graph, picker, inside, document),
+    [graph, picker, inside, document],
+  );
   const wrong = useMemo(() => wrongOnes(problems, document), [problems, document]);
   const chosen = useMemo(() => new Set(selection), [selection]);
-  const actors = useMemo(() => sceneActors(graph, document, assets, chosen, wrong), [graph, document, assets, chosen, wrong]);
+  const actors = useMemo(
+    () => sceneActors(graph, document, assets, chosen, wrong),
+    [graph, document, assets, chosen, wrong],
+  );
   const flows = useMemo(() => sceneFlows(graph, document, chosen, wrong), [graph, document, chosen, wrong]);
   return { inside, starts, actors, flows };
 }

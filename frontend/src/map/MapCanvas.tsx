@@ -1,7 +1,14 @@
 import { ActionIcon, Tooltip, useComputedColorScheme } from "@mantine/core";
 import {
-  type KeyboardEvent, type PointerEvent, type ReactNode, type RefObject, useCallback, useEffect,
-  useImperativeHandle, useRef, useState,
+  type KeyboardEvent,
+  type PointerEvent,
+  type ReactNode,
+  type RefObject,
+  useCallback,
+  useEffect,
+  useImperativeHandle,
+  useRef,
+  useState,
 } from "react";
 
 import type { Bounds } from "../api/types";
@@ -59,12 +66,24 @@ interface Drag {
   does: "pan" | "carry" | "frame";
 }
 
+const KEYS = "Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.";
 const CLICK_SLACK = 4;
 const TOUCH = 14;
 
 /** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
 export function MapCanvas({
-  drawing, graph, picker, scene, label, aim = false, handle, onPick, onPoint, onGrab, onDrop, onFrame,
+  drawing,
+  graph,
+  picker,
+  scene,
+  label,
+  aim = false,
+  handle,
+  onPick,
+  onPoint,
+  onGrab,
+  onDrop,
+  onFrame,
   children,
 }: Props) {
   const host = useRef<HTMLDivElement>(null);
@@ -74,23 +93,28 @@ export function MapCanvas({
   const size = useRef<Size>({ width: 1, height: 1 });
   const least = useRef(0.01);
   const drag = useRef<Drag | null>(null);
-  const [frame, setFrame] = useState<readonly [x: number, y: number, width: number, height: number] | null>(null);
+  const [frame, setFrame] = useState<readonly [x: number, y: number, width: number, height: number] | null>(
+    null,
+  );
   const [shown, setShown] = useState<View>(view.current);
   const [crosshair, setCrosshair] = useState(false);
   const [ready, setReady] = useState<MapRenderer | null>(null);
   const dark = useComputedColorScheme("light") === "dark";
   const queued = useRef(0);
 
-  const apply = useCallback((next: View) => {
-    view.current = clampTo(next, drawing.bounds);
-    renderer.current?.setView(view.current);
-    if (!queued.current) {
-      queued.current = requestAnimationFrame(() => {
-        queued.current = 0;
-        setShown(view.current);
-      });
-    }
-  }, [drawing]);
+  const apply = useCallback(
+    (next: View) => {
+      view.current = clampTo(next, drawing.bounds);
+      renderer.current?.setView(view.current);
+      if (!queued.current) {
+        queued.current = requestAnimationFrame(() => {
+          queued.current = 0;
+          setShown(view.current);
+        });
+      }
+    },
+    [drawing],
+  );
 
   const showAll = useCallback(() => apply(fit(drawing.bounds, size.current)), [apply, drawing]);
 
@@ -126,14 +150,24 @@ export function MapCanvas({
   useEffect(() => ready?.setTheme(dark), [ready, dark]);
   useEffect(() => ready?.setScene(scene), [ready, scene]);
 
-  useImperativeHandle(handle, () => ({
-    setMoving: (moving) => renderer.current?.setMoving(moving),
-    setLamps: (lamps) => renderer.current?.setLamps(lamps),
-    setMarks: (marks) => renderer.current?.setMarks(marks),
-    show: (bounds) => apply(fit(bounds, size.current, 0.15)),
-    centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
-    pickMiddle: () => onPick?.({ x: view.current.x, y: view.current.y, reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale, shift: false }),
-  }), [apply, onPick]);
+  useImperativeHandle(
+    handle,
+    () => ({
+      setMoving: (moving) => renderer.current?.setMoving(moving),
+      setLamps: (lamps) => renderer.current?.setLamps(lamps),
+      setMarks: (marks) => renderer.current?.setMarks(marks),
+      show: (bounds) => apply(fit(bounds, size.current, 0.15)),
+      centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
+      pickMiddle: () =>
+        onPick?.({
+          x: view.current.x,
+          y: view.current.y,
+          reach: Math.max(size.current.width, size.current.height) / 2 / view.current.scale,
+          shift: false,
+        }),
+    }),
+    [apply, onPick],
+  );
 
   // React's wheel listener is passive; the page must not scroll along.
   useEffect(() => {
@@ -144,7 +178,16 @@ export function MapCanvas({
       const box = element.getBoundingClientRect();
       const step = event.deltaMode === 1 ? event.deltaY * 24 : event.deltaY;
       const factor = Math.exp(-step * (event.ctrlKey ? 0.01 : 0.0016));
-      apply(zoomAt(view.current, size.current, factor, event.clientX - box.left, event.clientY - box.top, least.current));
+      apply(
+        zoomAt(
+          view.current,
+          size.current,
+          factor,
+          event.clientX - box.left,
+          event.clientY - box.top,
+          least.current,
+        ),
+      );
     };
     element.addEventListener("wheel", wheel, { passive: false });
     return () => element.removeEventListener("wheel", wheel);
@@ -167,11 +210,15 @@ export function MapCanvas({
     if (event.target !== event.currentTarget || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = event.shiftKey ? 12 : 60;
     const moves: Record<string, [number, number]> = {
-      ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step],
+      ArrowLeft: [step, 0],
+      ArrowRight: [-step, 0],
+      ArrowUp: [0, step],
+      ArrowDown: [0, -step],
     };
     const middle = (): Pointed => pointed(size.current.width / 2, size.current.height / 2, event.shiftKey);
-    if (moves[event.key]) {
-      apply(panBy(view.current, ...moves[event.key]));
+    const move = moves[event.key];
+    if (move) {
+      apply(panBy(view.current, ...move));
       onPoint?.(middle());
     } else if (event.key === "+" || event.key === "=") zoom(1.4);
     else if (event.key === "-") zoom(1 / 1.4);
@@ -191,7 +238,7 @@ export function MapCanvas({
       data-view={`${shown.x} ${shown.y} ${shown.scale}`}
       role="application"
       tabIndex={0}
-      aria-label={`${label}. Arrow keys move, plus and minus zoom, 0 shows everything, Enter chooses what is in the middle.`}
+      aria-label={`${label}. ${KEYS}`}
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {
@@ -213,7 +260,13 @@ export function MapCanvas({
         if (!held.moved && Math.hypot(x - held.from[0], y - held.from[1]) < CLICK_SLACK) return;
         if (held.does === "pan") apply(panBy(view.current, x - held.last[0], y - held.last[1]));
         else if (held.does === "carry") onPoint?.(pointed(x, y, false));
-        else setFrame([Math.min(x, held.from[0]), Math.min(y, held.from[1]), Math.abs(x - held.from[0]), Math.abs(y - held.from[1])]);
+        else
+          setFrame([
+            Math.min(x, held.from[0]),
+            Math.min(y, held.from[1]),
+            Math.abs(x - held.from[0]),
+            Math.abs(y - held.from[1]),
+          ]);
         drag.current = { ...held, last: [x, y], moved: true };
       }}
       onPointerUp={(event) => {
@@ -224,28 +277,58 @@ export function MapCanvas({
         if (!held.moved) onPick?.(pointed(...held.from, event.shiftKey));
         else if (held.does === "carry") onDrop?.(pointed(...local(event), false));
         else if (held.does === "frame") {
-          const [a, b] = [toWorld(view.current, size.current, ...held.from), toWorld(view.current, size.current, ...local(event))];
+          const [a, b] = [
+            toWorld(view.current, size.current, ...held.from),
+            toWorld(view.current, size.current, ...local(event)),
+          ];
           onFrame?.([Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])]);
         }
       }}
-      onPointerCancel={() => { drag.current = null; setFrame(null); }}
-      onPointerLeave={() => { if (!drag.current) onPoint?.(null); }}
+      onPointerCancel={() => {
+        drag.current = null;
+        setFrame(null);
+      }}
+      onPointerLeave={() => {
+        if (!drag.current) onPoint?.(null);
+      }}
     >
       <div ref={layers} className="map-layers" />
-      {frame && <div className="map-frame" aria-hidden="true" style={{ left: frame[0], top: frame[1], width: frame[2], height: frame[3] }} />}
+      {frame && (
+        <div
+          className="map-frame"
+          aria-hidden="true"
+          style={{ left: frame[0], top: frame[1], width: frame[2], height: frame[3] }}
+        />
+      )}
       {crosshair && <div className="map-crosshair" aria-hidden="true" />}
       {/* Controls lie on the map but are not the map. */}
       <div
         className="map-controls"
         onPointerDown={(event) => event.stopPropagation()}
-        onPointerMove={(event) => { event.stopPropagation(); }}
+        onPointerMove={(event) => {
+          event.stopPropagation();
+        }}
       >
-        {ready && <Minimap renderer={ready} bounds={drawing.bounds} view={shown} size={size.current} dark={dark}
-          onMove={(x, y) => apply({ ...view.current, x, y })} />}
+        {ready && (
+          <Minimap
+            renderer={ready}
+            bounds={drawing.bounds}
+            view={shown}
+            size={size.current}
+            dark={dark}
+            onMove={(x, y) => apply({ ...view.current, x, y })}
+          />
+        )}
         <div className="map-buttons">
-          <MapButton label="Zoom in" onClick={() => zoom(1.5)}><IconPlus /></MapButton>
-          <MapButton label="Zoom out" onClick={() => zoom(1 / 1.5)}><IconMinus /></MapButton>
-          <MapButton label="Show the whole map" onClick={showAll}><IconFit /></MapButton>
+          <MapButton label="Zoom in" onClick={() => zoom(1.5)}>
+            <IconPlus />
+          </MapButton>
+          <MapButton label="Zoom out" onClick={() => zoom(1 / 1.5)}>
+            <IconMinus />
+          </MapButton>
+          <MapButton label="Show the whole map" onClick={showAll}>
+            <IconFit />
+          </MapButton>
         </div>
       </div>
       <div className="map-scale" aria-hidden="true" style={{ width: bar * shown.scale }}>
@@ -256,10 +339,20 @@ export function MapCanvas({
   );
 }
 
-function MapButton({ label, onClick, children }: { label: string; onClick: () => void; children: ReactNode }) {
+function MapButton({
+  label,
+  onClick,
+  children,
+}: {
+  label: string;
+  onClick: () => void;
+  children: ReactNode;
+}) {
   return (
     <Tooltip label={label} position="left">
-      <ActionIcon variant="default" size="lg" aria-label={label} onClick={onClick}>{children}</ActionIcon>
+      <ActionIcon variant="default" size="lg" aria-label={label} onClick={onClick}>
+        {children}
+      </ActionIcon>
     </Tooltip>
   );
 }

@@ -51,13 +51,22 @@ export function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
         event.currentTarget.setPointerCapture(event.pointerId);
         go(event);
       }}
-      onPointerMove={(event) => { if (held.current) go(event); }}
-      onPointerUp={() => { held.current = false; }}
+      onPointerMove={(event) => {
+        if (held.current) go(event);
+      }}
+      onPointerUp={() => {
+        held.current = false;
+      }}
     >
       <canvas ref={canvas} style={box} />
       <div
         className="minimap-frame"
-        style={{ left, top, width: Math.max(clamp(x1, box.width) - left, 4), height: Math.max(clamp(y1, box.height) - top, 4) }}
+        style={{
+          left,
+          top,
+          width: Math.max(clamp(x1, box.width) - left, 4),
+          height: Math.max(clamp(y1, box.height) - top, 4),
+        }}
       />
     </div>
   );

@@ -1,4 +1,5 @@
 import type { Bounds } from "../api/types";
+import { nth } from "../lists";
 import type { Palette } from "./colors";
 import { type Lines, type PackedDrawing, type PackedLines, tiles, unpack } from "./drawing";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
@@ -39,7 +40,11 @@ export class BaseLayer {
   }
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     symbols: boolean,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -58,9 +63,7 @@ export class BaseLayer {
     if (symbols) this.drawSymbols(context, view, size, ratio);
   }
 
-  private drawSymbols(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number,
-  ): void {
+  private drawSymbols(context: CanvasRenderingContext2D, view: View, size: Size, ratio: number): void {
     const [x0, y0, x1, y1] = visible(view, size);
     const pixels = Math.min(Math.max(view.scale * 2.2, 7), 24);
     for (const [kind, x, y, , text] of this.drawing.symbols) {
@@ -95,9 +98,9 @@ function item(look: Look, packed: PackedLines, closed: boolean): Item {
 function pathOf(lines: Lines, rows: number[], closed: boolean): Path2D {
   const path = new Path2D();
   for (const k of rows) {
-    for (let i = lines.start[k]; i < lines.start[k + 1]; i++) {
-      if (i === lines.start[k]) path.moveTo(lines.xy[2 * i], lines.xy[2 * i + 1]);
-      else path.lineTo(lines.xy[2 * i], lines.xy[2 * i + 1]);
+    for (let i = nth(lines.start, k); i < nth(lines.start, k + 1); i++) {
+      if (i === lines.start[k]) path.moveTo(nth(lines.xy, 2 * i), nth(lines.xy, 2 * i + 1));
+      else path.lineTo(nth(lines.xy, 2 * i), nth(lines.xy, 2 * i + 1));
     }
     if (closed) path.closePath();
   }
@@ -105,14 +108,12 @@ function pathOf(lines: Lines, rows: number[], closed: boolean): Path2D {
 }
 
 /** Sets colours and widths; false if the thing is too small to be seen at this scale. */
-function style(
-  context: CanvasRenderingContext2D, look: Look, scale: number, palette: Palette,
-): boolean {
+function style(context: CanvasRenderingContext2D, look: Look, scale: number, palette: Palette): boolean {
   context.setLineDash([]);
   context.lineCap = "butt";
   switch (look.what) {
     case "area":
-      context.fillStyle = palette.areas[look.kind] ?? palette.areas.shoulder;
+      context.fillStyle = palette.areas[look.kind] ?? palette.otherArea;
       // A hair of stroke closes the seams between rings that touch.
       context.strokeStyle = context.fillStyle;
       context.lineWidth = 0.5 / scale;

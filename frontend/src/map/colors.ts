@@ -9,13 +9,15 @@ export const ROI_BASE = "#123F8C";
 export const ROI_MEMBER = "#2B62BD";
 export const ELIGIBLE = "#7CC8FF";
 export const GOAL = "#5AC3FF";
-/** Streams of vehicles; those of people have the colour of their places. */
+/** Flows of vehicles; those of pedestrians have the colour of their places. */
 export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
 
 export interface Palette {
   land: string;
   areas: Record<string, string>;
+  /** Of areas of a kind that has no colour of its own. */
+  otherArea: string;
   marks: Record<string, string>;
   crosswalk: string;
   bar: string;
@@ -30,28 +32,65 @@ export interface Palette {
 export const LIGHT: Palette = {
   land: "#eef0ea",
   areas: {
-    road: "#969ea8", shoulder: "#bfc4ca", sidewalk: "#e0d8c8", bicycle: "#c9a79c",
-    parking: "#b3bcc8", border: "#d3d9c8", median: "#cfdcb9", rail: "#b5a892",
+    road: "#969ea8",
+    shoulder: "#bfc4ca",
+    sidewalk: "#e0d8c8",
+    bicycle: "#c9a79c",
+    parking: "#b3bcc8",
+    border: "#d3d9c8",
+    median: "#cfdcb9",
+    rail: "#b5a892",
   },
+  otherArea: "#bfc4ca",
   marks: { white: "#ffffff", yellow: "#f7c325", curb: "#7d848c", bridge: "#4c545c" },
-  crosswalk: "#8a7fd055", bar: "#ffffff", stopLine: "#ffffff", building: "#d5cfc6",
-  parking: "#ffffff", ink: "#22282e", paper: "#ffffff", successor: RELATION[0],
+  crosswalk: "#8a7fd055",
+  bar: "#ffffff",
+  stopLine: "#ffffff",
+  building: "#d5cfc6",
+  parking: "#ffffff",
+  ink: "#22282e",
+  paper: "#ffffff",
+  successor: RELATION[0],
 };
 
 export const DARK: Palette = {
   land: "#1b2024",
   areas: {
-    road: "#4a525b", shoulder: "#363d44", sidewalk: "#57534a", bicycle: "#5f4a44",
-    parking: "#3d4753", border: "#2a332a", median: "#2f3b2a", rail: "#4b443a",
+    road: "#4a525b",
+    shoulder: "#363d44",
+    sidewalk: "#57534a",
+    bicycle: "#5f4a44",
+    parking: "#3d4753",
+    border: "#2a332a",
+    median: "#2f3b2a",
+    rail: "#4b443a",
   },
+  otherArea: "#363d44",
   marks: { white: "#dfe3e6", yellow: "#d9a91f", curb: "#7a828a", bridge: "#9aa3ab" },
-  crosswalk: "#8a7fd066", bar: "#e8ebee", stopLine: "#e8ebee", building: "#33383c",
-  parking: "#cfd4d8", ink: "#e9ecef", paper: "#12161a", successor: RELATION[0],
+  crosswalk: "#8a7fd066",
+  bar: "#e8ebee",
+  stopLine: "#e8ebee",
+  building: "#33383c",
+  parking: "#cfd4d8",
+  ink: "#e9ecef",
+  paper: "#12161a",
+  successor: RELATION[0],
 };
 
 export const CATEGORY_COLOR: Record<Category, string> = {
-  car: "#1971c2", van: "#7048e8", truck: "#a3541a", bus: "#e8590c",
-  motorcycle: "#c2255c", bicycle: "#2b8a3e", pedestrian: "#f2b600",
+  car: "#1971c2",
+  van: "#7048e8",
+  truck: "#a3541a",
+  bus: "#e8590c",
+  motorcycle: "#c2255c",
+  bicycle: "#2b8a3e",
+  pedestrian: "#f2b600",
 };
 export const EGO = "#e03131";
-export const MARK_COLOR: Record<MarkKind, string> = { collision: "#c92a2a", braking: "#b8500b", lifted: "#5f3dc4", met: "#0b7285", unmet: "#d9480f" };
+export const MARK_COLOR: Record<MarkKind, string> = {
+  collision: "#c92a2a",
+  braking: "#b8500b",
+  teleported: "#5f3dc4",
+  met: "#0b7285",
+  unmet: "#d9480f",
+};

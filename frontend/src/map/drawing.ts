@@ -1,4 +1,5 @@
 import type { Bounds, PackedDrawing, PackedLines } from "../api/types";
+import { nth } from "../lists";
 
 export type { PackedDrawing, PackedLines };
 
@@ -14,13 +15,13 @@ export function unpack(packed: PackedLines): Lines {
   let x = 0;
   let y = 0;
   for (let i = 0; i < steps.length; i += 2) {
-    x += steps[i];
-    y += steps[i + 1];
+    x += nth(steps, i);
+    y += nth(steps, i + 1);
     xy[i] = x / 100;
     xy[i + 1] = y / 100;
   }
   const start = new Uint32Array(sizes.length + 1);
-  for (let k = 0; k < sizes.length; k++) start[k + 1] = start[k] + sizes[k];
+  for (let k = 0; k < sizes.length; k++) start[k + 1] = nth(start, k) + nth(sizes, k);
   return { xy, start };
 }
 
@@ -48,9 +49,9 @@ export function tiles(lines: Lines, cell: number): Tile[] {
 
 export function boundsOf(lines: Lines, k: number): Bounds {
   const b: Bounds = [Infinity, Infinity, -Infinity, -Infinity];
-  for (let i = lines.start[k]; i < lines.start[k + 1]; i++) {
-    const x = lines.xy[2 * i];
-    const y = lines.xy[2 * i + 1];
+  for (let i = nth(lines.start, k); i < nth(lines.start, k + 1); i++) {
+    const x = nth(lines.xy, 2 * i);
+    const y = nth(lines.xy, 2 * i + 1);
     if (x < b[0]) b[0] = x;
     if (y < b[1]) b[1] = y;
     if (x > b[2]) b[2] = x;
@@ -60,5 +61,8 @@ export function boundsOf(lines: Lines, k: number): Bounds {
 }
 
 export const joined = (a: Bounds, b: Bounds): Bounds => [
-  Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3]),
+  Math.min(a[0], b[0]),
+  Math.min(a[1], b[1]),
+  Math.max(a[2], b[2]),
+  Math.max(a[3], b[3]),
 ];

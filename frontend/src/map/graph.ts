@@ -1,8 +1,9 @@
 import type { Bounds, GraphColumns, WalkColumns } from "../api/types";
+import { nth } from "../lists";
 
 /** A place on the map where something can start or go. */
 export interface Place {
-  /** Whether it is a place for people on foot. */
+  /** Whether it is a place for pedestrians. */
   walk: boolean;
   index: number;
   id: string;
@@ -20,8 +21,8 @@ interface Keyed {
 }
 
 function nodeId(columns: Keyed, index: number, prefix: string): string {
-  const lane = columns.lane[index];
-  return `${prefix}${columns.lane_keys[lane]}.${index - columns.first_node[lane]}`;
+  const lane = nth(columns.lane, index);
+  return `${prefix}${nth(columns.lane_keys, lane)}.${index - nth(columns.first_node, lane)}`;
 }
 
 /** The graph of a map with its names; the columns are used as they came. */
@@ -46,20 +47,30 @@ export class Graph {
   vehiclePlace(index: number): Place {
     const c = this.columns;
     return {
-      walk: false, index, id: nodeId(c, index, ""), x: c.x[index], y: c.y[index],
-      hdg: c.hdg[index], segment: c.segment[index],
+      walk: false,
+      index,
+      id: nodeId(c, index, ""),
+      x: nth(c.x, index),
+      y: nth(c.y, index),
+      hdg: nth(c.hdg, index),
+      segment: nth(c.segment, index),
     };
   }
 
   walkPlace(index: number): Place {
     const w: WalkColumns = this.columns.walks;
     return {
-      walk: true, index, id: nodeId(w, index, WALK_PREFIX), x: w.x[index], y: w.y[index],
-      hdg: w.hdg[index], segment: w.segment[index],
+      walk: true,
+      index,
+      id: nodeId(w, index, WALK_PREFIX),
+      x: nth(w.x, index),
+      y: nth(w.y, index),
+      hdg: nth(w.hdg, index),
+      segment: nth(w.segment, index),
     };
   }
 
-  /** Whether the simulator can place somebody exactly here. */
+  /** Whether the simulator can insert a road user exactly here. */
   usable(index: number, walk: boolean): boolean {
     return (walk ? this.columns.walks.walkable : this.columns.spawnable)[index] === 1;
   }
@@ -67,16 +78,16 @@ export class Graph {
   /** First and last index, exclusive, of the places of one lane or walkway. */
   lanePlaces({ walk, index }: Pick<Place, "walk" | "index">): [first: number, end: number] {
     const c: Keyed = walk ? this.columns.walks : this.columns;
-    const lane = c.lane[index];
-    return [c.first_node[lane], c.first_node[lane + 1] ?? c.lane.length];
+    const lane = nth(c.lane, index);
+    return [nth(c.first_node, lane), c.first_node[lane + 1] ?? c.lane.length];
   }
 
   segmentId(row: number): string {
-    return this.columns.segments[row].id;
+    return nth(this.columns.segments, row).id;
   }
 }
 
-/** What the names of places for people on foot begin with. */
+/** What the names of places for pedestrians begin with. */
 export const WALK_PREFIX = "ped.";
 
 /** A strip of one lane that lies in one segment: a ring, x and y in turn. */
@@ -89,11 +100,11 @@ export interface Strip {
 export function strips(columns: GraphColumns): Strip[] {
   const found: Strip[] = [];
   for (let lane = 0; lane + 1 < columns.first_node.length; lane++) {
-    const end = columns.first_node[lane + 1];
-    let from = columns.first_node[lane];
+    const end = nth(columns.first_node, lane + 1);
+    let from = nth(columns.first_node, lane);
     for (let i = from + 1; i <= end; i++) {
-      if (i === end || columns.segment[i] !== columns.segment[from]) {
-        found.push({ segment: columns.segment[from], ring: ringOf(columns, from, i) });
+      if (i === end || nth(columns.segment, i) !== nth(columns.segment, from)) {
+        found.push({ segment: nth(columns.segment, from), ring: ringOf(columns, from, i) });
         from = i;
       }
     }
@@ -109,11 +120,11 @@ function ringOf(c: GraphColumns, from: number, end: number): Float64Array {
   for (let k = 0; k < n; k++) {
     const i = Math.min(Math.max(from + k - 1, from), end - 1);
     const shift = k === 0 ? -half : k === n - 1 ? half : 0;
-    const cos = Math.cos(c.hdg[i]);
-    const sin = Math.sin(c.hdg[i]);
-    const x = c.x[i] + shift * cos;
-    const y = c.y[i] + shift * sin;
-    const w = c.width[i] / 2;
+    const cos = Math.cos(nth(c.hdg, i));
+    const sin = Math.sin(nth(c.hdg, i));
+    const x = nth(c.x, i) + shift * cos;
+    const y = nth(c.y, i) + shift * sin;
+    const w = nth(c.width, i) / 2;
     ring[2 * k] = x - w * sin;
     ring[2 * k + 1] = y + w * cos;
     ring[2 * (2 * n - 1 - k)] = x + w * sin;
@@ -126,11 +137,11 @@ function ringOf(c: GraphColumns, from: number, end: number): Float64Array {
 export function segmentBounds(columns: GraphColumns): Bounds[] {
   const bounds: Bounds[] = columns.segments.map(() => [Infinity, Infinity, -Infinity, -Infinity]);
   for (let i = 0; i < columns.x.length; i++) {
-    const b = bounds[columns.segment[i]];
-    b[0] = Math.min(b[0], columns.x[i]);
-    b[1] = Math.min(b[1], columns.y[i]);
-    b[2] = Math.max(b[2], columns.x[i]);
-    b[3] = Math.max(b[3], columns.y[i]);
+    const b = nth(bounds, nth(columns.segment, i));
+    b[0] = Math.min(b[0], nth(columns.x, i));
+    b[1] = Math.min(b[1], nth(columns.y, i));
+    b[2] = Math.max(b[2], nth(columns.x, i));
+    b[3] = Math.max(b[3], nth(columns.y, i));
   }
   return bounds;
 }

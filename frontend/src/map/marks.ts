@@ -1,3 +1,4 @@
+import { nth } from "../lists";
 import { FLOW, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, ROI_BASE, VEHICLE_NODE } from "./colors";
 import type { Graph, Place } from "./graph";
 import type { Scene, SceneActor, SceneFlow } from "./scene";
@@ -5,41 +6,47 @@ import type { View } from "./view";
 import type { Category } from "../api/types";
 
 export function dots(
-  context: CanvasRenderingContext2D, view: View, at: { x: number[]; y: number[] }, rows: number[],
+  context: CanvasRenderingContext2D,
+  view: View,
+  at: { x: number[]; y: number[] },
+  rows: number[],
   color: string,
 ): void {
   const r = Math.min(Math.max(1.5, view.scale * 0.3), 6) / view.scale;
   context.fillStyle = color;
   context.beginPath();
   for (const i of rows) {
-    if (view.scale < 5) context.rect(at.x[i] - r, at.y[i] - r, 2 * r, 2 * r);
+    if (view.scale < 5) context.rect(nth(at.x, i) - r, nth(at.y, i) - r, 2 * r, 2 * r);
     else {
-      context.moveTo(at.x[i] + r, at.y[i]);
-      context.arc(at.x[i], at.y[i], r, 0, 2 * Math.PI);
+      context.moveTo(nth(at.x, i) + r, nth(at.y, i));
+      context.arc(nth(at.x, i), nth(at.y, i), r, 0, 2 * Math.PI);
     }
   }
   context.fill();
 }
 
 export function drawWalkEdges(
-  context: CanvasRenderingContext2D, view: View, graph: Graph, rows: Set<number>,
+  context: CanvasRenderingContext2D,
+  view: View,
+  graph: Graph,
+  rows: Set<number>,
 ): void {
   const { walks } = graph.columns;
   context.beginPath();
   for (let e = 0; e < walks.source.length; e++) {
-    if (!rows.has(walks.source[e])) continue;
-    context.moveTo(walks.x[walks.source[e]], walks.y[walks.source[e]]);
-    context.lineTo(walks.x[walks.target[e]], walks.y[walks.target[e]]);
+    if (!rows.has(nth(walks.source, e))) continue;
+    context.moveTo(nth(walks.x, nth(walks.source, e)), nth(walks.y, nth(walks.source, e)));
+    context.lineTo(nth(walks.x, nth(walks.target, e)), nth(walks.y, nth(walks.target, e)));
   }
   context.strokeStyle = "#a58a00";
   context.lineWidth = 1.1 / view.scale;
   context.stroke();
 }
 
-export function drawPath(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
-  if (scene.path.length < 2) return;
+export function drawRoute(context: CanvasRenderingContext2D, view: View, scene: Scene): void {
+  if (scene.route.length < 2) return;
   context.beginPath();
-  scene.path.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  scene.route.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
   context.lineCap = "round";
   context.lineJoin = "round";
   context.strokeStyle = "#ffffff";
@@ -55,16 +62,21 @@ export function drawLane(context: CanvasRenderingContext2D, graph: Graph, place:
   const at = place.walk ? graph.columns.walks : graph.columns;
   const [first, end] = graph.lanePlaces(place);
   context.beginPath();
-  for (let i = first; i < end; i++) context.lineTo(at.x[i], at.y[i]);
+  for (let i = first; i < end; i++) context.lineTo(nth(at.x, i), nth(at.y, i));
   context.lineCap = "butt";
-  context.lineWidth = at.width[place.index];
+  context.lineWidth = nth(at.width, place.index);
   context.strokeStyle = place.walk ? `${PEDESTRIAN_NODE}55` : `${VEHICLE_NODE}44`;
   context.stroke();
 }
 
-/** How far beside the middle of its lane somebody stands. */
+/** How far beside the middle of its lane a road user starts. */
 export function drawOffset(
-  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, palette: Palette,
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  view: View,
+  actor: SceneActor,
+  palette: Palette,
 ): void {
   const cx = x + actor.offset * Math.sin(actor.hdg) * view.scale;
   const cy = y + actor.offset * Math.cos(actor.hdg) * view.scale;
@@ -87,16 +99,22 @@ export function spot(context: CanvasRenderingContext2D, [x, y]: [number, number]
   context.fill();
 }
 
-/** Chevrons in the direction of travel, and how many come in an hour. */
+/** Chevrons in the direction of travel, and the volume per hour. */
 export function drawFlow(
-  context: CanvasRenderingContext2D, [x, y]: [number, number], flow: SceneFlow, palette: Palette,
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  flow: SceneFlow,
+  palette: Palette,
 ): void {
   context.save();
   context.translate(x, y);
   context.rotate(-flow.hdg);
   context.lineCap = context.lineJoin = "round";
   const rim = flow.problem ? PROBLEM : flow.selected ? palette.ink : "#ffffff";
-  for (const [color, width] of [[rim, flow.selected || flow.problem ? 9 : 7], [flow.walk ? PEDESTRIAN_NODE : FLOW, 4]] as const) {
+  for (const [color, width] of [
+    [rim, flow.selected || flow.problem ? 9 : 7],
+    [flow.walk ? PEDESTRIAN_NODE : FLOW, 4],
+  ] as const) {
     context.strokeStyle = color;
     context.lineWidth = width;
     context.beginPath();
@@ -108,12 +126,10 @@ export function drawFlow(
     context.stroke();
   }
   context.restore();
-  tag(context, `${Math.round(flow.perHour)} an hour`, x, y - 22);
+  tag(context, `${Math.round(flow.perHour)} per hour`, x, y - 22);
 }
 
-export function drawGoal(
-  context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean,
-): void {
+export function drawGoal(context: CanvasRenderingContext2D, [x, y]: [number, number], chosen: boolean): void {
   context.beginPath();
   context.arc(x, y, chosen ? 13 : 7, 0, 2 * Math.PI);
   context.fillStyle = chosen ? ROI_BASE : GOAL;
@@ -123,18 +139,23 @@ export function drawGoal(
   context.stroke();
   if (!chosen) return;
   context.beginPath();
-  context.moveTo(x - 2.500, y + 5);
-  context.lineTo(x - 2.500, y - 6);
+  context.moveTo(x - 2.5, y + 5);
+  context.lineTo(x - 2.5, y - 6);
   context.lineTo(x + 5, y - 3);
-  context.lineTo(x - 2.500, y);
+  context.lineTo(x - 2.5, y);
   context.fillStyle = context.strokeStyle = "#ffffff";
   context.fill();
-  context.lineWidth = 1.500;
+  context.lineWidth = 1.5;
   context.stroke();
 }
 
 export function body(
-  context: CanvasRenderingContext2D, x: number, y: number, view: View, actor: SceneActor, color: string,
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  view: View,
+  actor: SceneActor,
+  color: string,
 ): void {
   context.save();
   context.translate(x, y);
@@ -158,8 +179,13 @@ export function body(
 }
 
 export function badge(
-  context: CanvasRenderingContext2D, glyph: Path2D, x: number, y: number, radius: number,
-  color: string, category: Category,
+  context: CanvasRenderingContext2D,
+  glyph: Path2D,
+  x: number,
+  y: number,
+  radius: number,
+  color: string,
+  category: Category,
 ): void {
   context.save();
   context.translate(x, y);

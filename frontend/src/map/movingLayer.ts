@@ -1,4 +1,5 @@
 import { CATEGORIES } from "../api/types";
+import { nth } from "../lists";
 import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette } from "./colors";
 import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
@@ -19,7 +20,11 @@ export class MovingLayer {
   marks: readonly Mark[] = [];
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     moving: Moving | null,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -31,12 +36,17 @@ export class MovingLayer {
   }
 
   private drawMoving(
-    context: CanvasRenderingContext2D, view: View, size: Size, palette: Palette, moving: Moving,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    palette: Palette,
+    moving: Moving,
   ): void {
     const rows = byCategory(moving, view, size);
-    rows.forEach((of, n) => {
-      if (of.length === 0) return;
-      context.fillStyle = CATEGORY_COLOR[CATEGORIES[n]];
+    for (const [n, category] of CATEGORIES.entries()) {
+      const of = nth(rows, n);
+      if (of.length === 0) continue;
+      context.fillStyle = CATEGORY_COLOR[category];
       context.beginPath();
       for (const row of of) outline(context, moving, row, view, size);
       context.fill();
@@ -45,10 +55,10 @@ export class MovingLayer {
         context.lineWidth = 1;
         context.stroke();
       }
-      if (view.scale >= DETAIL_FROM && CATEGORIES[n] !== "pedestrian") {
+      if (view.scale >= DETAIL_FROM && category !== "pedestrian") {
         for (const row of of) details(context, moving, row, view, size);
       }
-    });
+    }
     if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
     if (moving.followed >= 0) mark(context, moving, moving.followed, view, size, palette.ink);
   }
@@ -58,8 +68,11 @@ export class MovingLayer {
     for (const { x, y, color } of this.lamps) {
       context.beginPath();
       context.arc(
-        (x - view.x) * view.scale + size.width / 2, (view.y - y) * view.scale + size.height / 2,
-        radius, 0, 2 * Math.PI,
+        (x - view.x) * view.scale + size.width / 2,
+        (view.y - y) * view.scale + size.height / 2,
+        radius,
+        0,
+        2 * Math.PI,
       );
       context.fillStyle = color;
       context.fill();
@@ -75,10 +88,10 @@ function byCategory(moving: Moving, view: View, size: Size): number[][] {
   const slack = 12;
   const rows: number[][] = CATEGORIES.map(() => []);
   for (let i = 0; i < moving.count; i++) {
-    const x = moving.pose[5 * i];
-    const y = moving.pose[5 * i + 1];
+    const x = nth(moving.pose, 5 * i);
+    const y = nth(moving.pose, 5 * i + 1);
     if (x > x0 - slack && x < x1 + slack && y > y0 - slack && y < y1 + slack) {
-      rows[moving.category[i]].push(i);
+      nth(rows, nth(moving.category, i)).push(i);
     }
   }
   return rows;
@@ -86,16 +99,20 @@ function byCategory(moving: Moving, view: View, size: Size): number[][] {
 
 /** A body seen from above, its front cut to a blunt wedge so that the heading shows. */
 function outline(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
 ): void {
   const { pose } = moving;
   const p = 5 * row;
-  const hdg = pose[p + 2];
-  const k = Math.max(view.scale, LEAST / Math.max(pose[p + 3], 0.9));
-  const half = (pose[p + 3] / 2) * k;
-  const side = (pose[p + 4] / 2) * k;
-  const x = (pose[p] - view.x) * view.scale + size.width / 2;
-  const y = (view.y - pose[p + 1]) * view.scale + size.height / 2;
+  const hdg = nth(pose, p + 2);
+  const k = Math.max(view.scale, LEAST / Math.max(nth(pose, p + 3), 0.9));
+  const half = (nth(pose, p + 3) / 2) * k;
+  const side = (nth(pose, p + 4) / 2) * k;
+  const x = (nth(pose, p) - view.x) * view.scale + size.width / 2;
+  const y = (view.y - nth(pose, p + 1)) * view.scale + size.height / 2;
   const cos = Math.cos(hdg);
   const sin = Math.sin(hdg);
   const nose = half - Math.min(side * 0.7, half);
@@ -110,19 +127,23 @@ function outline(
 
 /** Windscreen, brake lights and indicators. */
 function details(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
 ): void {
   const { pose } = moving;
   const p = 5 * row;
-  const half = pose[p + 3] / 2;
-  const side = pose[p + 4] / 2;
-  const flags = moving.flags[row];
+  const half = nth(pose, p + 3) / 2;
+  const side = nth(pose, p + 4) / 2;
+  const flags = nth(moving.flags, row);
   context.save();
   context.translate(
-    (pose[p] - view.x) * view.scale + size.width / 2,
-    (view.y - pose[p + 1]) * view.scale + size.height / 2,
+    (nth(pose, p) - view.x) * view.scale + size.width / 2,
+    (view.y - nth(pose, p + 1)) * view.scale + size.height / 2,
   );
-  context.rotate(-pose[p + 2]);
+  context.rotate(-nth(pose, p + 2));
   context.scale(view.scale, view.scale);
   if (side > 0.6) {
     context.fillStyle = "#10202caa";
@@ -146,25 +167,46 @@ function corners(context: CanvasRenderingContext2D, half: number, y: number, lam
 }
 
 function mark(
-  context: CanvasRenderingContext2D, moving: Moving, row: number, view: View, size: Size,
+  context: CanvasRenderingContext2D,
+  moving: Moving,
+  row: number,
+  view: View,
+  size: Size,
   color: string,
 ): void {
   const p = 5 * row;
-  const x = (moving.pose[p] - view.x) * view.scale + size.width / 2;
-  const y = (view.y - moving.pose[p + 1]) * view.scale + size.height / 2;
+  const x = (nth(moving.pose, p) - view.x) * view.scale + size.width / 2;
+  const y = (view.y - nth(moving.pose, p + 1)) * view.scale + size.height / 2;
   context.strokeStyle = color;
   context.lineWidth = 2.5;
   context.beginPath();
-  context.arc(x, y, Math.max(11, moving.pose[p + 3] * 0.75 * view.scale), 0, 2 * Math.PI);
+  context.arc(x, y, Math.max(11, nth(moving.pose, p + 3) * 0.75 * view.scale), 0, 2 * Math.PI);
   context.stroke();
 }
 
 const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
-  collision: (context) => { line(context, -4, -4, 4, 4); line(context, -4, 4, 4, -4); },
-  braking: (context) => { line(context, 0, -5, 0, 1); line(context, 0, 4, 0, 4.5); },
-  lifted: (context) => { line(context, 0, 5, 0, -4); line(context, -3.5, -1, 0, -5); line(context, 3.5, -1, 0, -5); },
-  met: (context) => { line(context, -4, 0.5, -1, 3.5); line(context, -1, 3.5, 4, -3.5); },
-  unmet: (context) => { line(context, -4, -2, 4, -2); line(context, -4, 2, 4, 2); line(context, 2.5, -5, -2.5, 5); },
+  collision: (context) => {
+    line(context, -4, -4, 4, 4);
+    line(context, -4, 4, 4, -4);
+  },
+  braking: (context) => {
+    line(context, 0, -5, 0, 1);
+    line(context, 0, 4, 0, 4.5);
+  },
+  teleported: (context) => {
+    line(context, 0, 5, 0, -4);
+    line(context, -3.5, -1, 0, -5);
+    line(context, 3.5, -1, 0, -5);
+  },
+  met: (context) => {
+    line(context, -4, 0.5, -1, 3.5);
+    line(context, -1, 3.5, 4, -3.5);
+  },
+  unmet: (context) => {
+    line(context, -4, -2, 4, -2);
+    line(context, -4, 2, 4, 2);
+    line(context, 2.5, -5, -2.5, 5);
+  },
 };
 
 function line(context: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
@@ -175,7 +217,10 @@ function line(context: CanvasRenderingContext2D, x0: number, y0: number, x1: num
 /** A sign of constant size; what is past is paler, what is new has a ring around it. */
 function drawMark(context: CanvasRenderingContext2D, mark: Mark, view: View, size: Size): void {
   context.save();
-  context.translate((mark.x - view.x) * view.scale + size.width / 2, (view.y - mark.y) * view.scale + size.height / 2);
+  context.translate(
+    (mark.x - view.x) * view.scale + size.width / 2,
+    (view.y - mark.y) * view.scale + size.height / 2,
+  );
   context.globalAlpha = mark.fresh ? 1 : 0.6;
   context.beginPath();
   context.arc(0, 0, mark.fresh ? 11 : 8.5, 0, 2 * Math.PI);

@@ -1,6 +1,7 @@
 import Flatbush from "flatbush";
 
 import type { GraphColumns } from "../api/types";
+import { nth } from "../lists";
 import { Graph, type Place } from "./graph";
 
 export interface PickOptions {
@@ -41,7 +42,7 @@ export class Picker {
   /** Row of the segment whose lane is nearest. */
   segment(x: number, y: number, reach: number): number | null {
     const i = nearest(this.nodes, x, y, reach, this.graph.columns.segment, false);
-    return i === undefined ? null : this.graph.columns.segment[i];
+    return i === undefined ? null : nth(this.graph.columns.segment, i);
   }
 
   /** Rows of the nodes in a rectangle. */
@@ -53,16 +54,22 @@ export class Picker {
 function indexed(columns: Pick<GraphColumns, "x" | "y">): Flatbush | null {
   if (columns.x.length === 0) return null;
   const index = new Flatbush(columns.x.length);
-  for (let i = 0; i < columns.x.length; i++) index.add(columns.x[i], columns.y[i]);
+  for (let i = 0; i < columns.x.length; i++) index.add(nth(columns.x, i), nth(columns.y, i));
   index.finish();
   return index;
 }
 
 function nearest(
-  index: Flatbush | null, x: number, y: number, reach: number, segment: number[], walk: boolean,
+  index: Flatbush | null,
+  x: number,
+  y: number,
+  reach: number,
+  segment: number[],
+  walk: boolean,
   { inside, allowed }: Pick<PickOptions, "inside" | "allowed"> = {},
 ): number | undefined {
-  const filter = (inside || allowed) && ((i: number): boolean =>
-    (!inside || inside.has(segment[i])) && (!allowed || allowed(i, walk)));
+  const filter =
+    (inside || allowed) &&
+    ((i: number): boolean => (!inside || inside.has(nth(segment, i))) && (!allowed || allowed(i, walk)));
   return index?.neighbors(x, y, 1, reach, filter)[0];
 }

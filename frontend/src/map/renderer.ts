@@ -105,9 +105,7 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("moving");
   }
 
-  drawOverview(
-    canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean,
-  ): void {
+  drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void {
     canvas.width = Math.round(size.width * pixelRatio);
     canvas.height = Math.round(size.height * pixelRatio);
     const context = canvas.getContext("2d");
@@ -200,4 +198,3 @@ export class CanvasRenderer implements MapRenderer {
     );
   }
 }
-

@@ -18,7 +18,7 @@ export interface SceneActor {
   problem: boolean;
 }
 
-/** A stream of road users that come in at one place. */
+/** Road users that keep entering at one place. */
 export interface SceneFlow {
   id: string;
   walk: boolean;
@@ -40,7 +40,8 @@ export interface Scene {
   flows: readonly SceneFlow[];
   goals: readonly Place[];
   chosenGoal: Place | null;
-  path: readonly (readonly [number, number])[];
+  /** Points of the route to the goal that is chosen. */
+  route: readonly (readonly [number, number])[];
   hover: Place | null;
   /** What is said beside the place under the pointer. */
   hoverText: string | null;
@@ -55,7 +56,7 @@ export const EMPTY_SCENE: Scene = {
   flows: [],
   goals: [],
   chosenGoal: null,
-  path: [],
+  route: [],
   hover: null,
   hoverText: null,
   hoverCategory: null,
@@ -81,4 +82,4 @@ export interface Mark {
   fresh: boolean;
 }
 
-export type MarkKind = "collision" | "braking" | "lifted" | "met" | "unmet";
+export type MarkKind = "collision" | "braking" | "teleported" | "met" | "unmet";

@@ -1,11 +1,30 @@
 import {
-  CATEGORY_COLOR, EGO, ELIGIBLE, type Palette, PEDESTRIAN_NODE, PROBLEM, RELATION, ROI_BASE,
-  ROI_MEMBER, VEHICLE_NODE,
+  CATEGORY_COLOR,
+  EGO,
+  ELIGIBLE,
+  type Palette,
+  PEDESTRIAN_NODE,
+  PROBLEM,
+  RELATION,
+  ROI_BASE,
+  ROI_MEMBER,
+  VEHICLE_NODE,
 } from "./colors";
+import { nth } from "../lists";
 import { GLYPHS } from "./glyphs";
 import { type Graph, type Place, segmentBounds, strips } from "./graph";
 import {
-  badge, body, dots, drawFlow, drawGoal, drawLane, drawOffset, drawPath, drawWalkEdges, spot, tag,
+  badge,
+  body,
+  dots,
+  drawFlow,
+  drawGoal,
+  drawLane,
+  drawOffset,
+  drawRoute,
+  drawWalkEdges,
+  spot,
+  tag,
 } from "./marks";
 import type { Picker } from "./picking";
 import type { Scene, SceneActor, SegmentStyle } from "./scene";
@@ -14,8 +33,8 @@ import type { Bounds, Category } from "../api/types";
 
 const NODES_FROM = 2.6;
 const EDGES_FROM = 7;
-/** From so many on, everybody is a dot while the whole crowd is in sight. */
-const CROWD = 300;
+/** From so many on, each is a dot while the whole map is in sight. */
+const MANY = 300;
 /** More names than these would lie on top of each other. */
 const FEW = 3;
 /** Least length of the arrow at the pointer, pixels. */
@@ -31,24 +50,31 @@ const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
   problem: { fill: PROBLEM, alpha: 0.6 },
 };
 
-/** What the user has made of the map: region, places, actors, goals and ways. */
+/** What the user has made of the map: region, places, actors, goals and route. */
 export class SceneLayer {
   private readonly segments: Path2D[] = [];
   private readonly bounds: Bounds[] = [];
   private readonly glyphs: Record<Category, Path2D>;
 
-  constructor(private readonly graph: Graph | null, private readonly picker: Picker | null) {
+  constructor(
+    private readonly graph: Graph | null,
+    private readonly picker: Picker | null,
+  ) {
     this.glyphs = Object.fromEntries(
       Object.entries(GLYPHS).map(([name, path]) => [name, new Path2D(path)]),
     ) as Record<Category, Path2D>;
     if (!graph) return;
     this.bounds = segmentBounds(graph.columns);
     this.segments = graph.columns.segments.map(() => new Path2D());
-    for (const { segment, ring } of strips(graph.columns)) addRing(this.segments[segment], ring);
+    for (const { segment, ring } of strips(graph.columns)) addRing(nth(this.segments, segment), ring);
   }
 
   draw(
-    context: CanvasRenderingContext2D, view: View, size: Size, ratio: number, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    ratio: number,
+    palette: Palette,
     scene: Scene,
   ): void {
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -58,7 +84,7 @@ export class SceneLayer {
     if (this.graph && this.picker && view.scale >= NODES_FROM) {
       this.drawGraph(context, view, size, scene, palette);
     }
-    drawPath(context, view, scene);
+    drawRoute(context, view, scene);
     if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const at = (x: number, y: number): [number, number] => [
@@ -68,7 +94,7 @@ export class SceneLayer {
     for (const goal of scene.goals) drawGoal(context, at(goal.x, goal.y), false);
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
-    const plain = scene.actors.length > CROWD && view.scale < NODES_FROM;
+    const plain = scene.actors.length > MANY && view.scale < NODES_FROM;
     const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
     const seen = visible(view, size);
     for (const actor of scene.actors) {
@@ -87,84 +113,110 @@ export class SceneLayer {
     }
   }
 
-  private drawSegments(
-    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene,
-  ): void {
+  private drawSegments(context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene): void {
     const seen = visible(view, size);
     for (const [row, style] of scene.segments) {
-      if (!this.segments[row] || !overlaps(this.bounds[row], seen)) continue;
+      const [path, bounds] = [this.segments[row], this.bounds[row]];
+      if (!path || !bounds || !overlaps(bounds, seen)) continue;
       context.globalAlpha = SEGMENT[style].alpha;
       context.fillStyle = SEGMENT[style].fill;
-      context.fill(this.segments[row]);
+      context.fill(path);
     }
     context.globalAlpha = 1;
-    if (scene.hoverSegment !== null && this.segments[scene.hoverSegment]) {
+    const hovered = scene.hoverSegment === null ? undefined : this.segments[scene.hoverSegment];
+    if (hovered) {
       context.fillStyle = "#ffffff55";
       context.strokeStyle = ROI_BASE;
       context.lineWidth = 1.5 / view.scale;
-      context.fill(this.segments[scene.hoverSegment]);
-      context.stroke(this.segments[scene.hoverSegment]);
+      context.fill(hovered);
+      context.stroke(hovered);
     }
   }
 
   private drawGraph(
-    context: CanvasRenderingContext2D, view: View, size: Size, scene: Scene, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    size: Size,
+    scene: Scene,
+    palette: Palette,
   ): void {
     if (!this.graph || !this.picker) return;
     const { columns } = this.graph;
     const { inside } = scene.nodes;
     const seen = visible(view, size);
     if (scene.nodes.vehicles) {
-      const rows = this.picker.within(...seen, false)
-        .filter((i) => !inside || inside.has(columns.segment[i]));
+      const rows = this.picker
+        .within(...seen, false)
+        .filter((i) => !inside || inside.has(nth(columns.segment, i)));
       if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette);
       this.drawPlaces(context, view, rows, false);
     }
     if (scene.nodes.walks) {
       const { walks } = columns;
-      const rows = this.picker.within(...seen, true)
-        .filter((i) => !inside || inside.has(walks.segment[i]));
+      const rows = this.picker
+        .within(...seen, true)
+        .filter((i) => !inside || inside.has(nth(walks.segment, i)));
       if (view.scale >= EDGES_FROM) drawWalkEdges(context, view, this.graph, new Set(rows));
       this.drawPlaces(context, view, rows, true);
     }
   }
 
-  /** Places in their colour; grey where nobody can start. */
-  private drawPlaces(
-    context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean,
-  ): void {
+  /** Places in their colour; grey where no start is possible. */
+  private drawPlaces(context: CanvasRenderingContext2D, view: View, rows: number[], walk: boolean): void {
     if (!this.graph) return;
     const graph = this.graph;
     const at = walk ? graph.columns.walks : graph.columns;
-    dots(context, view, at, rows.filter((i) => !graph.usable(i, walk)), UNUSABLE);
-    dots(context, view, at, rows.filter((i) => graph.usable(i, walk)), walk ? PEDESTRIAN_NODE : VEHICLE_NODE);
+    dots(
+      context,
+      view,
+      at,
+      rows.filter((i) => !graph.usable(i, walk)),
+      UNUSABLE,
+    );
+    dots(
+      context,
+      view,
+      at,
+      rows.filter((i) => graph.usable(i, walk)),
+      walk ? PEDESTRIAN_NODE : VEHICLE_NODE,
+    );
   }
 
   private drawEdges(
-    context: CanvasRenderingContext2D, view: View, rows: Set<number>, palette: Palette,
+    context: CanvasRenderingContext2D,
+    view: View,
+    rows: Set<number>,
+    palette: Palette,
   ): void {
     if (!this.graph) return;
     const { columns } = this.graph;
     const { source, target, relation } = columns.edges;
-    const paths = RELATION.map(() => new Path2D());
+    const paths = RELATION.map((color, n) => ({
+      path: new Path2D(),
+      color: n === 0 ? palette.successor : color,
+    }));
     for (let e = 0; e < source.length; e++) {
-      if (!rows.has(source[e])) continue;
-      const path = paths[relation[e]];
-      path.moveTo(columns.x[source[e]], columns.y[source[e]]);
-      path.lineTo(columns.x[target[e]], columns.y[target[e]]);
+      if (!rows.has(nth(source, e))) continue;
+      const { path } = nth(paths, nth(relation, e));
+      const [from, to] = [nth(source, e), nth(target, e)];
+      path.moveTo(nth(columns.x, from), nth(columns.y, from));
+      path.lineTo(nth(columns.x, to), nth(columns.y, to));
     }
     context.lineWidth = 1.1 / view.scale;
-    paths.forEach((path, n) => {
-      context.strokeStyle = n === 0 ? palette.successor : RELATION[n];
+    for (const { path, color } of paths) {
+      context.strokeStyle = color;
       context.globalAlpha = 0.75;
       context.stroke(path);
-    });
+    }
     context.globalAlpha = 1;
   }
 
   private drawHover(
-    context: CanvasRenderingContext2D, at: (x: number, y: number) => [number, number], view: View,
-    place: Place, category: Category | null,
+    context: CanvasRenderingContext2D,
+    at: (x: number, y: number) => [number, number],
+    view: View,
+    place: Place,
+    category: Category | null,
   ): void {
     const [x, y] = at(place.x, place.y);
     const color = place.walk ? PEDESTRIAN_NODE : VEHICLE_NODE;
@@ -197,8 +249,12 @@ export class SceneLayer {
   }
 
   private drawActor(
-    context: CanvasRenderingContext2D, [x, y]: [number, number], view: View, actor: SceneActor,
-    palette: Palette, named: boolean,
+    context: CanvasRenderingContext2D,
+    [x, y]: [number, number],
+    view: View,
+    actor: SceneActor,
+    palette: Palette,
+    named: boolean,
   ): void {
     const color = CATEGORY_COLOR[actor.category];
     const near = actor.length * view.scale > 10;
@@ -219,7 +275,7 @@ export class SceneLayer {
 }
 
 function addRing(path: Path2D, ring: Float64Array): void {
-  path.moveTo(ring[0], ring[1]);
-  for (let i = 2; i < ring.length; i += 2) path.lineTo(ring[i], ring[i + 1]);
+  path.moveTo(nth(ring, 0), nth(ring, 1));
+  for (let i = 2; i < ring.length; i += 2) path.lineTo(nth(ring, i), nth(ring, i + 1));
   path.closePath();
 }

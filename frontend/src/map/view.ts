@@ -18,18 +18,12 @@ export interface Size {
 export const MAX_SCALE = 80;
 
 export function toScreen(view: View, size: Size, x: number, y: number): [number, number] {
-  return [
-    (x - view.x) * view.scale + size.width / 2,
-    (view.y - y) * view.scale + size.height / 2,
-  ];
+  return [(x - view.x) * view.scale + size.width / 2, (view.y - y) * view.scale + size.height / 2];
 }
 
 /** Inverse of {@link toScreen}. */
 export function toWorld(view: View, size: Size, sx: number, sy: number): [number, number] {
-  return [
-    (sx - size.width / 2) / view.scale + view.x,
-    view.y - (sy - size.height / 2) / view.scale,
-  ];
+  return [(sx - size.width / 2) / view.scale + view.x, view.y - (sy - size.height / 2) / view.scale];
 }
 
 /** The view that shows all of `bounds` with a margin as a share of the canvas. */
@@ -50,7 +44,12 @@ export function panBy(view: View, dx: number, dy: number): View {
 
 /** Zooms by `factor` and keeps the world point under the screen point where it is. */
 export function zoomAt(
-  view: View, size: Size, factor: number, sx: number, sy: number, minScale: number,
+  view: View,
+  size: Size,
+  factor: number,
+  sx: number,
+  sy: number,
+  minScale: number,
 ): View {
   const scale = Math.min(Math.max(view.scale * factor, minScale), MAX_SCALE);
   const [x, y] = toWorld(view, size, sx, sy);
@@ -61,7 +60,7 @@ export function zoomAt(
   };
 }
 
-/** Keeps the middle of the view on the map, so that nobody gets lost in the void. */
+/** Keeps the middle of the view on the map, so that the map is never lost. */
 export function clampTo(view: View, bounds: Bounds): View {
   const [x0, y0, x1, y1] = bounds;
   return {
@@ -90,11 +89,17 @@ export function scaleBar(scale: number, most: number): number {
 
 /** Makes a canvas draw in metres. */
 export function worldTransform(
-  context: CanvasRenderingContext2D, view: View, size: Size, pixelRatio: number,
+  context: CanvasRenderingContext2D,
+  view: View,
+  size: Size,
+  pixelRatio: number,
 ): void {
   const k = view.scale * pixelRatio;
   context.setTransform(
-    k, 0, 0, -k,
+    k,
+    0,
+    0,
+    -k,
     (size.width / 2) * pixelRatio - view.x * k,
     (size.height / 2) * pixelRatio + view.y * k,
   );

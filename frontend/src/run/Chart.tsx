@@ -1,5 +1,6 @@
 import { type ReactNode, useId } from "react";
 
+import { nth } from "../lists";
 import { thinned, ticks } from "./scale";
 
 export interface Series {
@@ -30,13 +31,15 @@ const ROWS = 24;
 /** A small chart with round axes; the same numbers are a table below it. */
 export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, children }: Props) {
   const id = useId();
+  const color = series[0]?.color;
   const known = [...series.flatMap((one) => one.values), ...(band?.high ?? [])].filter((v) => v !== null);
   const yTicks = ticks(Math.max(0, ...known));
-  const xTicks = ticks(x[x.length - 1] ?? 1, 6).filter((v) => v <= (x[x.length - 1] ?? 1) * 1.001);
-  const [xMost, yMost] = [x[x.length - 1] || 1, yTicks[yTicks.length - 1]];
+  const xTicks = ticks(x.at(-1) ?? 1, 6).filter((v) => v <= (x.at(-1) ?? 1) * 1.001);
+  const [xMost, yMost] = [x.at(-1) || 1, yTicks.at(-1) ?? 1];
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / xMost;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / yMost;
-  const point = (v: number | null | undefined, k: number): string | null => v == null ? null : `${px(x[k]).toFixed(1)} ${py(v).toFixed(1)}`;
+  const point = (v: number | null | undefined, k: number): string | null =>
+    v == null ? null : `${px(nth(x, k)).toFixed(1)} ${py(v).toFixed(1)}`;
   return (
     <figure className="chart" aria-labelledby={id}>
       <figcaption id={id}>{title}</figcaption>
@@ -44,23 +47,61 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
         {yTicks.map((v) => (
           <g key={v}>
             <line className="chart-grid" x1={BOX.left} x2={BOX.right} y1={py(v)} y2={py(v)} />
-            <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">{v.toLocaleString("en")}</text>
+            <text x={BOX.left - 6} y={py(v) + 4} textAnchor="end">
+              {v.toLocaleString("en")}
+            </text>
           </g>
         ))}
-        {xTicks.map((v) => <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">{v.toLocaleString("en")}</text>)}
-        <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">{xLabel}</text>
-        <text x={2} y={12}>{yLabel}</text>
-        {band && <path d={area(band.low.map(point), band.high.map(point))} fill={series[0].color} opacity={0.22} />}
+        {xTicks.map((v) => (
+          <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
+            {v.toLocaleString("en")}
+          </text>
+        ))}
+        <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">
+          {xLabel}
+        </text>
+        <text x={2} y={12}>
+          {yLabel}
+        </text>
+        {band && <path d={area(band.low.map(point), band.high.map(point))} fill={color} opacity={0.22} />}
         {bars
-          ? series[0].values.map((v, k) => v === null || k + 1 >= x.length ? null : (
-            <rect key={k} x={px(x[k]) + 0.7} width={Math.max(0.5, px(x[k + 1]) - px(x[k]) - 1.4)} y={py(v)} height={BOX.bottom - py(v)} fill={series[0].color} />
-          ))
-          : series.map((one) => <path key={one.name} d={path(one.values.map(point))} fill="none" stroke={one.color} strokeWidth={2} strokeLinejoin="round" />)}
+          ? series[0]?.values.map((v, k) =>
+              v === null || k + 1 >= x.length ? null : (
+                <rect
+                  key={k}
+                  x={px(nth(x, k)) + 0.7}
+                  width={Math.max(0.5, px(nth(x, k + 1)) - px(nth(x, k)) - 1.4)}
+                  y={py(v)}
+                  height={BOX.bottom - py(v)}
+                  fill={color}
+                />
+              ),
+            )
+          : series.map((one) => (
+              <path
+                key={one.name}
+                d={path(one.values.map(point))}
+                fill="none"
+                stroke={one.color}
+                strokeWidth={2}
+                strokeLinejoin="round"
+              />
+            ))}
       </svg>
       {(series.length > 1 || band) && (
         <div className="chart-key" aria-hidden="true">
-          {series.map((one) => <span key={one.name}><i style={{ background: one.color }} />{one.name}</span>)}
-          {band && <span><i style={{ background: series[0].color, opacity: 0.35, height: 9 }} />{band.name}</span>}
+          {series.map((one) => (
+            <span key={one.name}>
+              <i style={{ background: one.color }} />
+              {one.name}
+            </span>
+          ))}
+          {band && (
+            <span>
+              <i style={{ background: color, opacity: 0.35, height: 9 }} />
+              {band.name}
+            </span>
+          )}
         </div>
       )}
       <p>{children}</p>
@@ -72,18 +113,43 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
   );
 }
 
-function Numbers({ title, xLabel, yLabel, x, series, bars }: {
-  title: string; xLabel: string; yLabel: string; x: readonly number[]; series: readonly Series[]; bars: boolean;
+function Numbers({
+  title,
+  xLabel,
+  yLabel,
+  x,
+  series,
+  bars,
+}: {
+  title: string;
+  xLabel: string;
+  yLabel: string;
+  x: readonly number[];
+  series: readonly Series[];
+  bars: boolean;
 }) {
-  const rows = x.slice(0, series[0].values.length).map((_, k) => k);
+  const rows = x.slice(0, series[0]?.values.length).map((_, k) => k);
   return (
     <table aria-label={`${title} in numbers`} style={{ width: "100%", fontSize: 12.5, textAlign: "right" }}>
-      <thead><tr><th scope="col">{xLabel}</th>{series.map((one) => <th scope="col" key={one.name}>{series.length > 1 ? one.name : yLabel}</th>)}</tr></thead>
+      <thead>
+        <tr>
+          <th scope="col">{xLabel}</th>
+          {series.map((one) => (
+            <th scope="col" key={one.name}>
+              {series.length > 1 ? one.name : yLabel}
+            </th>
+          ))}
+        </tr>
+      </thead>
       <tbody>
         {(bars ? rows : thinned(rows, ROWS)).map((k) => (
           <tr key={k}>
-            <th scope="row" style={{ fontWeight: 400 }}>{bars ? `${round(x[k])} to ${round(x[k + 1])}` : round(x[k])}</th>
-            {series.map((one) => <td key={one.name}>{one.values[k] == null ? "–" : round(one.values[k])}</td>)}
+            <th scope="row" style={{ fontWeight: 400 }}>
+              {bars ? `${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
+            </th>
+            {series.map((one) => (
+              <td key={one.name}>{said(one.values[k])}</td>
+            ))}
           </tr>
         ))}
       </tbody>
@@ -92,18 +158,21 @@ function Numbers({ title, xLabel, yLabel, x, series, bars }: {
 }
 
 const round = (v: number): string => v.toLocaleString("en", { maximumFractionDigits: 1 });
+const said = (v: number | null | undefined): string => (v == null ? "–" : round(v));
 
 /** Lines through what is known; a gap where nothing is. */
 function path(points: readonly (string | null)[]): string {
-  return points.map((at, k) => at === null ? "" : `${k > 0 && points[k - 1] !== null ? "L" : "M"}${at}`).join("");
+  return points
+    .map((at, k) => (at === null ? "" : `${k > 0 && points[k - 1] !== null ? "L" : "M"}${at}`))
+    .join("");
 }
 
 function area(low: readonly (string | null)[], high: readonly (string | null)[]): string {
   const parts: string[] = [];
   for (let k = 0; k < low.length; k++) {
-    if (low[k] === null || high[k] === null) continue;
+    if (low[k] == null || high[k] == null) continue;
     let end = k;
-    while (end + 1 < low.length && low[end + 1] !== null && high[end + 1] !== null) end += 1;
+    while (low[end + 1] != null && high[end + 1] != null) end += 1;
     parts.push(`M${[...high.slice(k, end + 1), ...low.slice(k, end + 1).reverse()].join("L")}Z`);
     k = end;
   }

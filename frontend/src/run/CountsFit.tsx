@@ -7,13 +7,17 @@ import { count, span } from "../ui/words";
 import { worstFirst } from "./fit";
 import { Scatter } from "./Scatter";
 
-/** More rows nobody reads; all of them are in the tables that can be downloaded. */
+/** Rows of the list; all of them are in the tables that can be downloaded. */
 const LISTED = 200;
 
 /** How well a run meets the counts of its scenario. */
-export function CountsFit({ run, onFit, onShow }: {
+export function CountsFit({
+  run,
+  onFit,
+  onShow,
+}: {
   run: string;
-  /** Told once they are known, and with null when they are out of sight. */
+  /** Called once they are known, and with null when they are out of sight. */
   onFit: (rows: readonly FitRow[] | null) => void;
   onShow: (x: number, y: number) => void;
 }) {
@@ -23,32 +27,73 @@ export function CountsFit({ run, onFit, onShow }: {
     onFit(value?.rows ?? null);
     return () => onFit(null);
   }, [value, onFit]);
-  if (error) return <Alert color="gray" title="Nothing can be said of the counts">{error}</Alert>;
+  if (error)
+    return (
+      <Alert color="gray" title="The counts cannot be compared">
+        {error}
+      </Alert>
+    );
   if (!value) return <Loader aria-label="Counting" />;
   const { rows, met, rmse, contradictions } = value;
   const shown = worstFirst(all ? rows : rows.filter((row) => !row.met));
   return (
     <>
-      <Title order={3} size="h5">{met.toLocaleString("en")} of {count(rows.length, "count")} met ({Math.round((100 * met) / rows.length)} %)</Title>
-      <Text size="sm" mt={4} mb="sm">A count is met if its GEH, the usual measure of how far two numbers of vehicles are apart, is 5 or less.{" "}
-        {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}</Text>
+      <Title order={3} size="h5">
+        {met.toLocaleString("en")} of {count(rows.length, "count")} met (
+        {Math.round((100 * met) / rows.length)} %)
+      </Title>
+      <Text size="sm" mt={4} mb="sm">
+        A count is met if its GEH, the usual measure of how far two numbers of vehicles are apart, is 5 or
+        less. {rmse !== null && <>The mean error is {rmse.toFixed(1)} vehicles (root mean square).</>}
+      </Text>
       <Scatter rows={rows} />
       {contradictions.length > 0 && (
-        <Alert color="gray" title="Counts that cannot be right together" mb="md">
-          <List size="sm">{contradictions.slice(0, 20).map((text) => <List.Item key={text}>{text}</List.Item>)}</List>
+        <Alert color="gray" title="Counts that contradict each other" mb="md">
+          <List size="sm">
+            {contradictions.slice(0, 20).map((text) => (
+              <List.Item key={text}>{text}</List.Item>
+            ))}
+          </List>
         </Alert>
       )}
-      <Title order={3} size="h5">{all ? "All counts" : "Not met"}</Title>
-      {rows.length > met && <Text size="xs" c="dimmed">Choose one to see its place.</Text>}
+      <Title order={3} size="h5">
+        {all ? "All counts" : "Not met"}
+      </Title>
+      {rows.length > met && (
+        <Text size="xs" c="dimmed">
+          Choose one to see its count station.
+        </Text>
+      )}
       {shown.length === 0 && <Text size="sm">Every count is met.</Text>}
       {shown.length > 0 && (
-        <Table mt="xs" verticalSpacing={4} horizontalSpacing={5} fz={13} aria-label={all ? "All counts" : "Counts that are not met"}>
-          <Table.Thead><Table.Tr><Table.Th>Place and time</Table.Th><Table.Th ta="right">Counted</Table.Th><Table.Th ta="right">Simulated</Table.Th><Table.Th ta="right">GEH</Table.Th></Table.Tr></Table.Thead>
-          {shown.slice(0, LISTED).map((row) => <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />)}
+        <Table
+          mt="xs"
+          verticalSpacing={4}
+          horizontalSpacing={5}
+          fz={13}
+          aria-label={all ? "All counts" : "Counts that are not met"}
+        >
+          <Table.Thead>
+            <Table.Tr>
+              <Table.Th>Count station and time</Table.Th>
+              <Table.Th ta="right">Counted</Table.Th>
+              <Table.Th ta="right">Simulated</Table.Th>
+              <Table.Th ta="right">GEH</Table.Th>
+            </Table.Tr>
+          </Table.Thead>
+          {shown.slice(0, LISTED).map((row) => (
+            <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />
+          ))}
         </Table>
       )}
-      {shown.length > LISTED && <Text size="sm" c="dimmed" mt="xs">and {(shown.length - LISTED).toLocaleString("en")} more</Text>}
-      <Button mt="sm" variant="default" size="compact-sm" onClick={() => setAll(!all)}>{all ? "Only those that are not met" : "Show all counts"}</Button>
+      {shown.length > LISTED && (
+        <Text size="sm" c="dimmed" mt="xs">
+          and {(shown.length - LISTED).toLocaleString("en")} more
+        </Text>
+      )}
+      <Button mt="sm" variant="default" size="compact-sm" onClick={() => setAll(!all)}>
+        {all ? "Only those that are not met" : "Show all counts"}
+      </Button>
     </>
   );
 }
@@ -58,13 +103,27 @@ function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => v
   return (
     <Table.Tbody className="fit-row">
       <Table.Tr>
-        <Table.Th scope="row" fw={400}>{x !== null && y !== null
-          ? <button type="button" className="row-button" onClick={() => onShow(x, y)}>{place.replaceAll(">", " > ")}</button>
-          : place.replaceAll(">", " > ")}<div className="fit-time">{span(begin, end)} h</div></Table.Th>
+        <Table.Th scope="row" fw={400}>
+          {x !== null && y !== null ? (
+            <button type="button" className="row-button" onClick={() => onShow(x, y)}>
+              {place.replaceAll(">", " > ")}
+            </button>
+          ) : (
+            place.replaceAll(">", " > ")
+          )}
+          <div className="fit-time">{span(begin, end)}</div>
+        </Table.Th>
         <Table.Td ta="right">{counted.toLocaleString("en")}</Table.Td>
-        <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td><Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
+        <Table.Td ta="right">{modelled.toLocaleString("en")}</Table.Td>
+        <Table.Td ta="right">{geh.toFixed(1)}</Table.Td>
       </Table.Tr>
-      {why && <Table.Tr><Table.Td colSpan={4} c="dimmed" pt={0}>{why}</Table.Td></Table.Tr>}
+      {why && (
+        <Table.Tr>
+          <Table.Td colSpan={4} c="dimmed" pt={0}>
+            {why}
+          </Table.Td>
+        </Table.Tr>
+      )}
     </Table.Tbody>
   );
 }

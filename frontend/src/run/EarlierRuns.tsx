@@ -1,30 +1,67 @@
-import { ActionIcon, Alert, Anchor, Button, Group, Loader, Modal, Table, Text, VisuallyHidden } from "@mantine/core";
+import {
+  ActionIcon,
+  Alert,
+  Anchor,
+  Button,
+  Group,
+  Loader,
+  Modal,
+  Table,
+  Text,
+  VisuallyHidden,
+} from "@mantine/core";
 import { useCallback, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
 import { IconTrash } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
-import { hashOf } from "../ui/route";
+import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { hasEnded, STATE_WORD, when } from "./figures";
 
 /** All runs of a scenario, the newest first: watch, read, remove. */
-export function EarlierRuns({ scenario, current, onRemoved }: {
-  scenario: string; current?: string; onRemoved?: (run: string) => void;
+export function EarlierRuns({
+  scenario,
+  current,
+  onRemoved,
+}: {
+  scenario: string;
+  current?: string;
+  onRemoved?: (run: string) => void;
 }) {
   const { value, error, reload } = useLoaded(useCallback(() => runs.list(scenario), [scenario]));
   const [removing, setRemoving] = useState<string | null>(null);
   const remove = (run: string): void => {
     setRemoving(null);
-    runs.remove(run).then(() => { tell("The run is removed."); reload(); onRemoved?.(run); }, tellError);
+    runs.remove(run).then(() => {
+      tell("The run is removed.");
+      reload();
+      onRemoved?.(run);
+    }, tellError);
   };
-  if (error) return <Alert color="red" title="The runs cannot be shown">{error}</Alert>;
+  if (error)
+    return (
+      <Alert color="red" title="The runs cannot be shown">
+        {error}
+      </Alert>
+    );
   if (!value) return <Loader aria-label="Loading the runs" />;
-  if (value.length === 0) return <Text c="dimmed">This scenario has not been run yet. Start a run in the editor, in its last step.</Text>;
+  if (value.length === 0)
+    return (
+      <Text c="dimmed">This scenario has not been run yet. Start a run in the editor, in its last step.</Text>
+    );
   return (
     <>
       <Table verticalSpacing={6} fz={14} aria-label="Runs of this scenario">
-        <Table.Thead><Table.Tr><Table.Th>Ended</Table.Th><Table.Th>How</Table.Th><Table.Th><VisuallyHidden>Actions</VisuallyHidden></Table.Th></Table.Tr></Table.Thead>
+        <Table.Thead>
+          <Table.Tr>
+            <Table.Th>Ended</Table.Th>
+            <Table.Th>Outcome</Table.Th>
+            <Table.Th>
+              <VisuallyHidden>Actions</VisuallyHidden>
+            </Table.Th>
+          </Table.Tr>
+        </Table.Thead>
         <Table.Tbody>
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>
@@ -32,11 +69,39 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
               <Table.Td>{STATE_WORD[one.state]}</Table.Td>
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
-                  {one.run === current ? <Text size="sm" fw={600}>shown</Text>
-                    : <Anchor size="sm" href={hashOf({ view: "run", scenario, run: one.run })} aria-label={`${watchWord(one)} ${one.run}`}>{one.state === "interrupted" ? "Go on" : "Watch"}</Anchor>}
-                  {hasReport(one) && <Anchor size="sm" href={runs.reportUrl(one.run)} target="_blank" rel="noreferrer" aria-label={`Report of ${one.run}`}>Report</Anchor>}
+                  {one.run === current ? (
+                    <Text size="sm" fw={600}>
+                      shown
+                    </Text>
+                  ) : (
+                    <Anchor
+                      size="sm"
+                      href={hashOf({ view: "run", scenario, run: one.run })}
+                      aria-label={`${watchWord(one)} ${one.run}`}
+                    >
+                      {one.state === "interrupted" ? "Resume" : "Watch"}
+                    </Anchor>
+                  )}
+                  {hasReport(one) && (
+                    <Anchor
+                      size="sm"
+                      href={runs.reportUrl(one.run)}
+                      target="_blank"
+                      rel="noreferrer"
+                      aria-label={`Report of ${one.run}`}
+                    >
+                      Report
+                    </Anchor>
+                  )}
                   {hasEnded(one.state) && (
-                    <ActionIcon variant="subtle" color="gray" aria-label={`Remove ${one.run}`} onClick={() => setRemoving(one.run)}><IconTrash /></ActionIcon>
+                    <ActionIcon
+                      variant="subtle"
+                      color="gray"
+                      aria-label={`Remove ${one.run}`}
+                      onClick={() => setRemoving(one.run)}
+                    >
+                      <IconTrash />
+                    </ActionIcon>
                   )}
                 </Group>
               </Table.Td>
@@ -47,13 +112,22 @@ export function EarlierRuns({ scenario, current, onRemoved }: {
       <Modal opened={removing !== null} onClose={() => setRemoving(null)} centered title="Remove this run?">
         <Text size="sm">Its figures, its recording and its report are deleted. The scenario stays.</Text>
         <Group justify="flex-end" mt="lg">
-          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>Keep it</Button>
-          <Button color="red" onClick={() => { if (removing) remove(removing); }}>Remove</Button>
+          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>
+            Keep it
+          </Button>
+          <Button
+            color="red"
+            onClick={() => {
+              if (removing) remove(removing);
+            }}
+          >
+            Remove
+          </Button>
         </Group>
       </Modal>
     </>
   );
 }
 
-const watchWord = ({ state }: RunInfo): string => state === "interrupted" ? "Go on:" : "Watch";
+const watchWord = ({ state }: RunInfo): string => (state === "interrupted" ? "Resume" : "Watch");
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

@@ -10,7 +10,11 @@ import { fileGroups } from "./files";
 export function Files({ run }: { run: string }) {
   const [open, setOpen] = useState(false);
   return (
-    <details className="words" style={{ marginTop: 18 }} onToggle={(event) => setOpen(event.currentTarget.open)}>
+    <details
+      className="words"
+      style={{ marginTop: 18 }}
+      onToggle={(event) => setOpen(event.currentTarget.open)}
+    >
       <summary>Download the results</summary>
       {open && <Listed run={run} />}
     </details>
@@ -19,15 +23,29 @@ export function Files({ run }: { run: string }) {
 
 function Listed({ run }: { run: string }) {
   const { value, error } = useLoaded(useCallback(() => runs.files(run), [run]));
-  if (error) return <Alert color="gray" title="There are no files of this run">{error}</Alert>;
+  if (error)
+    return (
+      <Alert color="gray" title="There are no files of this run">
+        {error}
+      </Alert>
+    );
   if (!value) return <Loader aria-label="Loading the list of files" />;
   return fileGroups(value).map(({ title, text, files }) => (
     <div key={title}>
-      <Text fw={600} size="sm" mt="sm">{title}</Text>
-      <Text size="xs" c="dimmed">{text}</Text>
+      <Text fw={600} size="sm" mt="sm">
+        {title}
+      </Text>
+      <Text size="xs" c="dimmed">
+        {text}
+      </Text>
       <ul className="files" aria-label={title}>
         {files.map(({ name, size, word }) => (
-          <li key={name}><Anchor underline="always" size="sm" href={runs.fileUrl(run, name)} download>{word}</Anchor><span>{bytes(size)}</span></li>
+          <li key={name}>
+            <Anchor underline="always" size="sm" href={runs.fileUrl(run, name)} download>
+              {word}
+            </Anchor>
+            <span>{bytes(size)}</span>
+          </li>
         ))}
       </ul>
     </div>

@@ -8,18 +8,35 @@ import { markKind, sentence } from "./incidents";
 
 const LISTED = 200;
 
-/** What went wrong on the road, the newest first; a click shows the place. */
-export function IncidentLog({ incidents, categories, over, onShow }: {
-  incidents: readonly Incident[]; categories: ReadonlyMap<string, Category>; over: boolean; onShow: (incident: Incident) => void;
+/** Incidents, the newest first; a click shows where. */
+export function IncidentLog({
+  incidents,
+  categories,
+  over,
+  onShow,
+}: {
+  incidents: readonly Incident[];
+  categories: ReadonlyMap<string, Category>;
+  over: boolean;
+  onShow: (incident: Incident) => void;
 }) {
   if (incidents.length === 0) {
-    return <Text size="sm" c="dimmed">{over ? "Nothing went wrong on the road." : "Nothing has gone wrong so far. Collisions, emergency braking and teleports (removed after waiting too long) appear here."}</Text>;
+    return (
+      <Text size="sm" c="dimmed">
+        {over
+          ? "There were no incidents."
+          : "No incidents so far. Collisions, emergency braking and teleported vehicles " +
+            "(removed after waiting too long) appear here."}
+      </Text>
+    );
   }
   const listed = incidents.slice(-LISTED).reverse();
   return (
     <>
-      <Text size="sm" c="dimmed">Choose one to see where it happened.</Text>
-      <ul className="rows" aria-label="What happened">
+      <Text size="sm" c="dimmed">
+        Choose one to see where it happened.
+      </Text>
+      <ul className="rows" aria-label="Incidents">
         {listed.map((one, n) => (
           <li key={incidents.length - n}>
             <button type="button" onClick={() => onShow(one)}>
@@ -30,7 +47,11 @@ export function IncidentLog({ incidents, categories, over, onShow }: {
           </li>
         ))}
       </ul>
-      {incidents.length > LISTED && <Text size="sm" c="dimmed" mt="xs">{(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.</Text>}
+      {incidents.length > LISTED && (
+        <Text size="sm" c="dimmed" mt="xs">
+          {(incidents.length - LISTED).toLocaleString("en")} earlier ones are in the report.
+        </Text>
+      )}
     </>
   );
 }

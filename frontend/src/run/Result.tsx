@@ -5,20 +5,28 @@ import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { Comparison } from "./Comparison";
 import { keyFigures } from "./figures";
 import { Files } from "./Files";
 import { Interrupted, SliceTable } from "./LongRun";
 
-/** Nobody watches a longer run in real time. */
+/** Longer runs are not watched in real time. */
 const LONG = 3600;
-const TITLE: Record<string, string> = { failed: "The run broke off", stopped: "The run was stopped" };
+const TITLE: Record<string, string> = { failed: "The run failed", stopped: "The run was stopped" };
 
-/** What came of a run, in figures. */
-export function Result({ info, scenario, onBack, onGoOn }: {
-  info: RunInfo; scenario: string; onBack: () => void; onGoOn: () => void;
+/** The result of a run, in figures. */
+export function Result({
+  info,
+  scenario,
+  onBack,
+  onResume,
+}: {
+  info: RunInfo;
+  scenario: string;
+  onBack: () => void;
+  onResume: () => void;
 }) {
   const [busy, setBusy] = useState(false);
   const known = useLoaded(allFigures);
@@ -26,24 +34,57 @@ export function Result({ info, scenario, onBack, onGoOn }: {
     setBusy(true);
     runs.start({ scenario, speed: Number(info.summary?.until) > LONG ? null : 1 }).then(
       ({ run }) => go({ view: "run", scenario, run }),
-      (error: unknown) => { setBusy(false); tellError(error); });
+      (error: unknown) => {
+        setBusy(false);
+        tellError(error);
+      },
+    );
   };
-  if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onGoOn={onGoOn} />;
+  if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onResume={onResume} />;
   const failed = info.state === "failed";
   return (
     <section aria-label="Result of the run">
-      <Title order={2} size="h3">{TITLE[info.state] ?? "The run is finished"}</Title>
+      <Title order={2} size="h3">
+        {TITLE[info.state] ?? "The run is finished"}
+      </Title>
       {failed && <Failure info={info} />}
       {info.summary && !failed && (
         <dl className="run-figures">
-          {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => <div key={name} title={definition}><dt>{label}</dt><dd>{value}</dd></div>)}
+          {keyFigures(info.summary, known.value ?? []).map(({ name, label, definition, value }) => (
+            <div key={name} title={definition}>
+              <dt>{label}</dt>
+              <dd>{value}</dd>
+            </div>
+          ))}
         </dl>
       )}
       <Group mt="md" mb="lg" gap="xs">
         <Button onClick={onBack}>Back to the editor</Button>
-        {info.summary && !failed && <Button variant="default" component="a" href={runs.reportUrl(info.run)} target="_blank" rel="noreferrer">Full report</Button>}
-        {compared(info.summary) && <Button variant="default" component="a" href={carla.comparisonUrl(info.run)} target="_blank" rel="noreferrer">Compared with CARLA</Button>}
-        <Button variant="default" loading={busy} onClick={again}>Run again</Button>
+        {info.summary && !failed && (
+          <Button
+            variant="default"
+            component="a"
+            href={runs.reportUrl(info.run)}
+            target="_blank"
+            rel="noreferrer"
+          >
+            Full report
+          </Button>
+        )}
+        {compared(info.summary) && (
+          <Button
+            variant="default"
+            component="a"
+            href={carla.comparisonUrl(info.run)}
+            target="_blank"
+            rel="noreferrer"
+          >
+            Compared with CARLA
+          </Button>
+        )}
+        <Button variant="default" loading={busy} onClick={again}>
+          Run again
+        </Button>
       </Group>
       {info.summary && !failed && <SliceTable summary={info.summary} />}
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
@@ -58,14 +99,15 @@ function Failure({ info }: { info: RunInfo }) {
   const words = info.error;
   return (
     <>
-      <Alert color="red" mt="sm" title="The simulation could not go on">
-        Your scenario is as it was, and other runs go on. {info.carla
-          ? "See below what is wrong with CARLA, or run it without."
-          : "Try to run it again; if it breaks off at the same time, remove the road users that came last."}
+      <Alert color="red" mt="sm" title="The simulation could not continue">
+        Your scenario is unchanged, and other runs continue.{" "}
+        {info.carla
+          ? "See below what is wrong with CARLA, or run without it."
+          : "Try to run it again; if it fails at the same time, remove the road users that were inserted last."}
       </Alert>
       <details className="words" style={{ marginTop: 12 }}>
-        <summary>What the simulator said</summary>
-        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">It said nothing.</Text>}
+        <summary>Messages of the simulator</summary>
+        {words ? <pre tabIndex={0}>{words}</pre> : <Text size="sm">There are none.</Text>}
       </details>
     </>
   );

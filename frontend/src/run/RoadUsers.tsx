@@ -2,12 +2,13 @@ import { Button, Group, Text, TextInput } from "@mantine/core";
 import { useEffect, useState } from "react";
 
 import type { Category } from "../api/types";
+import { nth } from "../lists";
 import { CategoryGlyph, IconSearch } from "../ui/icons";
 import { CATEGORY_WORD, count, kmh } from "../ui/words";
 import type { Picture } from "./usePicture";
 
 const PAUSE = 1000;
-/** Rows of the list; whoever seeks one of thousands types a part of the name. */
+/** Rows of the list; one of thousands is found by a part of its name. */
 const LISTED = 60;
 const natural = new Intl.Collator("en", { numeric: true });
 
@@ -18,7 +19,7 @@ interface Row {
   speed: number;
 }
 
-/** Everybody on the road now; one of them can be followed. */
+/** All road users on the road now; one of them can be followed. */
 export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boolean }) {
   const [rows, setRows] = useState<Row[]>([]);
   const [search, setSearch] = useState("");
@@ -31,29 +32,65 @@ export function RoadUsers({ picture, wanted }: { picture: Picture; wanted: boole
     return () => clearInterval(timer);
   }, [latest, wanted]);
   const word = search.trim().toLowerCase();
-  const found = rows.filter(({ id, category }) => !word || `${id} ${CATEGORY_WORD[category]}`.toLowerCase().includes(word));
+  const found = rows.filter(
+    ({ id, category }) => !word || `${id} ${CATEGORY_WORD[category]}`.toLowerCase().includes(word),
+  );
   const ego = rows.find((row) => row.ego);
   return (
     <>
       <Group gap="xs">
-        <Button size="xs" disabled={!ego} onClick={() => { if (ego) follow(ego.id); }}>Follow my vehicle</Button>
-        <Button size="xs" variant="default" disabled={followed === null} onClick={() => follow(null)}>Stop following</Button>
+        <Button
+          size="xs"
+          disabled={!ego}
+          onClick={() => {
+            if (ego) follow(ego.id);
+          }}
+        >
+          Follow my vehicle
+        </Button>
+        <Button size="xs" variant="default" disabled={followed === null} onClick={() => follow(null)}>
+          Stop following
+        </Button>
       </Group>
-      <TextInput mt="sm" label="Find a road user" placeholder="Part of the name, or a kind" leftSection={<IconSearch />} value={search}
-        onChange={(event) => setSearch(event.currentTarget.value)} />
-      {rows.length === 0 && <Text size="sm" c="dimmed" mt="sm">Nobody is on the road now.</Text>}
-      {rows.length > 0 && found.length === 0 && <Text size="sm" mt="sm">Nobody on the road is called “{search}”.</Text>}
+      <TextInput
+        mt="sm"
+        label="Find a road user"
+        placeholder="Part of the name, or a kind"
+        leftSection={<IconSearch />}
+        value={search}
+        onChange={(event) => setSearch(event.currentTarget.value)}
+      />
+      {rows.length === 0 && (
+        <Text size="sm" c="dimmed" mt="sm">
+          No road user is on the road now.
+        </Text>
+      )}
+      {rows.length > 0 && found.length === 0 && (
+        <Text size="sm" mt="sm">
+          No road user on the road matches “{search}”.
+        </Text>
+      )}
       <ul className="rows" aria-label="Follow a road user">
         {found.slice(0, LISTED).map((row) => (
           <li key={row.id}>
-            <button type="button" aria-pressed={row.id === followed}
-              onClick={() => follow(row.id === followed ? null : row.id)}>
-              <CategoryGlyph category={row.category} size={20} />{row.id}{row.ego && " (yours)"}<span className="far">{kmh(row.speed)}</span>
+            <button
+              type="button"
+              aria-pressed={row.id === followed}
+              onClick={() => follow(row.id === followed ? null : row.id)}
+            >
+              <CategoryGlyph category={row.category} size={20} />
+              {row.id}
+              {row.ego && " (yours)"}
+              <span className="far">{kmh(row.speed)}</span>
             </button>
           </li>
         ))}
       </ul>
-      {found.length > LISTED && <Text size="sm" c="dimmed" mt="xs">{count(found.length - LISTED, "more road user")}: type a part of the name.</Text>}
+      {found.length > LISTED && (
+        <Text size="sm" c="dimmed" mt="xs">
+          {count(found.length - LISTED, "more road user")}: type a part of the name.
+        </Text>
+      )}
     </>
   );
 }
@@ -63,8 +100,14 @@ function onTheRoad(latest: ReturnType<Picture["latest"]>): Row[] {
   const { frame, crowd } = latest;
   const rows: Row[] = [];
   for (let i = 0; i < frame.count; i++) {
-    const who = crowd.named(frame.rows[6 * i]);
-    if (who) rows.push({ id: who.id, category: who.category, ego: who.ego ?? false, speed: frame.rows[6 * i + 4] });
+    const who = crowd.named(nth(frame.rows, 6 * i));
+    if (who)
+      rows.push({
+        id: who.id,
+        category: who.category,
+        ego: who.ego ?? false,
+        speed: nth(frame.rows, 6 * i + 4),
+      });
   }
   return rows.sort((a, b) => Number(b.ego) - Number(a.ego) || natural.compare(a.id, b.id));
 }

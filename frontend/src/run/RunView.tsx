@@ -7,7 +7,7 @@ import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { CameraPanel } from "../carla/CameraPanel";
 import { MapCanvas, type MapHandle } from "../map/MapCanvas";
-import { go } from "../ui/route";
+import { go } from "../ui/address";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
 import { hasEnded } from "./figures";
@@ -29,16 +29,14 @@ import { usePicture } from "./usePicture";
 import { useReplay } from "./useReplay";
 import { useGround, useRun } from "./useRun";
 
-type Tab = "result" | "charts" | "counts" | "users" | "events" | "runs";
-
-/** Watches one run from above; one that goes on after an interruption is watched anew. */
+/** Watches one run from above; one that is resumed is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
   const [turn, setTurn] = useState(0);
-  return <Watched key={turn} scenario={scenario} run={run} onGoOn={() => setTurn(turn + 1)} />;
+  return <Watched key={turn} scenario={scenario} run={run} onResume={() => setTurn(turn + 1)} />;
 }
 
 /** A run, live or as it was recorded; the scenario itself is not touched. */
-function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onGoOn: () => void }) {
+function Watched({ scenario, run, onResume }: { scenario: string; run: string; onResume: () => void }) {
   const handle = useRef<MapHandle | null>(null);
   const { info, failure, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
@@ -47,7 +45,7 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
   const ended = info !== null && hasEnded(info.state);
   const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
-  // Whoever comes when all is over sees the recording; whoever was there keeps the last picture.
+  // A run that has ended is opened as its recording; one that was watched keeps its last picture.
   const [mode, setMode] = useState<"live" | "replay" | null>(null);
   if (info && mode === null) setMode(ended ? "replay" : "live");
   const replayable = complete && info.state !== "failed" && info.state !== "interrupted";
@@ -55,7 +53,7 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
   const { incidents, add } = useIncidents(run, complete);
   const counts = useCounts(run, replayable);
   const [fit, setFit] = useState<readonly FitRow[] | null>(null);
-  const [tab, setTab] = useState<Tab | null>(null);
+  const [tab, setTab] = useState<string | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
 
   const { map, drawing, loaded } = ground;
@@ -77,76 +75,171 @@ function Watched({ scenario, run, onGoOn }: { scenario: string; run: string; onG
   }, [map, mode, lights, drawing, loaded]);
   useEffect(() => redraw(), [redraw, drawing, loaded]);
 
-  // A fast run may end between two pictures: nobody stays on the road who has arrived.
+  // A fast run may end between two pictures: no road user stays that has arrived.
   const cleared = mode === "live" && ended && info.progress?.running === 0;
-  useEffect(() => { if (cleared) clear(); }, [cleared, clear]);
-  useEffect(() => { if (ground.bounds) handle.current?.show(ground.bounds); }, [ground.bounds]);
+  useEffect(() => {
+    if (cleared) clear();
+  }, [cleared, clear]);
+  useEffect(() => {
+    if (ground.bounds) handle.current?.show(ground.bounds);
+  }, [ground.bounds]);
   const known = player.replay?.crowd ?? crowd;
   const categories = useMemo(
-    () => new Map<string, Category>(known?.everybody().map((one) => [one.id, one.category]) ?? []), [known]);
+    () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
+    [known],
+  );
   const kinds = useMemo(() => new Set(categories.values()), [categories]);
-  const marks = useMemo(() => new Set(fit ? countMarks(fit).map(({ kind }) => kind) : incidents.map(markKind)), [incidents, fit]);
+  const marks = useMemo(
+    () => new Set(fit ? countMarks(fit).map(({ kind }) => kind) : incidents.map(markKind)),
+    [incidents, fit],
+  );
   const time = mode === "replay" ? player.time : ended ? Infinity : now.time;
-  useEffect(() => { handle.current?.setMarks(fit ? countMarks(fit) : marksAt(incidents, time)); }, [incidents, fit, time, drawing, loaded]);
+  useEffect(() => {
+    handle.current?.setMarks(fit ? countMarks(fit) : marksAt(incidents, time));
+  }, [incidents, fit, time, drawing, loaded]);
 
   const back = (): void => go({ view: "editor", scenario });
   const wrong = failure ?? ground.failure;
   if (wrong) {
     return (
       <div className="catalogue">
-        <Title order={1} size="h3" mb="sm">This run cannot be shown</Title>
+        <Title order={1} size="h3" mb="sm">
+          This run cannot be shown
+        </Title>
         <Alert color="red">{wrong}</Alert>
-        <Button mt="md" onClick={back}>Back to the editor</Button>
+        <Button mt="md" onClick={back}>
+          Back to the editor
+        </Button>
       </div>
     );
   }
-  if (!info) return <div className="empty"><Loader aria-label="Loading the run" /></div>;
+  if (!info)
+    return (
+      <div className="empty">
+        <Loader aria-label="Loading the run" />
+      </div>
+    );
   return (
     <div className="run">
       <div className="run-body">
         <div className="run-map">
-          {drawing
-            ? <MapCanvas drawing={drawing} graph={loaded?.graph ?? null} picker={loaded?.picker ?? null} scene={ground.scene} handle={handle}
-                label={mode === "replay" ? "Recording of the run" : "Live view of the run"} onPick={(at) => follow(picture.near(at))}>
-                {info.state === "preparing"
-                  ? <div className="map-hint" role="status"><span className="waiting"><Loader size={16} aria-hidden="true" />{crowd
-                    ? "Getting ready, step 2 of 2: starting the simulation …" : "Getting ready, step 1 of 2: planning everybody’s way …"}</span></div>
-                  : followed && <div className="map-hint" role="status">{now.there ? `Following ${followed}. Click on the empty map to stop.` : `${followed} is not on the road now.`}</div>}
-                <Legend categories={kinds} ego={(known?.egos().length ?? 0) > 0} lights={mode === "live" && (map?.lights.length ?? 0) > 0} lamps={mode === "live"} marks={marks} />
-              </MapCanvas>
-            : <div className="empty"><Loader aria-label="Loading the map" /></div>}
+          {drawing ? (
+            <MapCanvas
+              drawing={drawing}
+              graph={loaded?.graph ?? null}
+              picker={loaded?.picker ?? null}
+              scene={ground.scene}
+              handle={handle}
+              label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
+              onPick={(at) => follow(picture.near(at))}
+            >
+              {info.state === "preparing" ? (
+                <div className="map-hint" role="status">
+                  <span className="waiting">
+                    <Loader size={16} aria-hidden="true" />
+                    {crowd
+                      ? "Preparing, step 2 of 2: starting the simulation …"
+                      : "Preparing, step 1 of 2: planning the routes …"}
+                  </span>
+                </div>
+              ) : (
+                followed && (
+                  <div className="map-hint" role="status">
+                    {now.there
+                      ? `Following ${followed}. Click on the empty map to stop.`
+                      : `${followed} is not on the road now.`}
+                  </div>
+                )
+              )}
+              <Legend
+                categories={kinds}
+                ego={(known?.egos().length ?? 0) > 0}
+                lights={mode === "live" && (map?.lights.length ?? 0) > 0}
+                lamps={mode === "live"}
+                marks={marks}
+              />
+            </MapCanvas>
+          ) : (
+            <div className="empty">
+              <Loader aria-label="Loading the map" />
+            </div>
+          )}
         </div>
         <aside className="run-side" aria-label="About the run">
           {info.carla && mode === "live" && <CameraPanel run={run} over={ended} />}
-          <Tabs className="run-tabs" value={shownTab} onChange={(value) => setTab(value as Tab)} keepMounted={false}>
+          <Tabs className="run-tabs" value={shownTab} onChange={setTab} keepMounted={false}>
             <Tabs.List>
               {ended && <Tabs.Tab value="result">Result</Tabs.Tab>}
               {replayable && <Tabs.Tab value="charts">Charts</Tabs.Tab>}
               {counts > 0 && <Tabs.Tab value="counts">Counts</Tabs.Tab>}
               <Tabs.Tab value="users">Road users</Tabs.Tab>
-              <Tabs.Tab value="events">Events{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}</Tabs.Tab>
+              <Tabs.Tab value="incidents">
+                Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}
+              </Tabs.Tab>
               <Tabs.Tab value="runs">Runs</Tabs.Tab>
             </Tabs.List>
-            <Tabs.Panel value="result" className="run-panel"><Result info={info} scenario={scenario} onBack={back} onGoOn={onGoOn} /></Tabs.Panel>
-            <Tabs.Panel value="charts" className="run-panel"><Plots run={run} /></Tabs.Panel>
-            <Tabs.Panel value="counts" className="run-panel"><CountsFit run={run} onFit={setFit} onShow={(x, y) => { follow(null); handle.current?.centre(x, y); }} /></Tabs.Panel>
-            <Tabs.Panel value="users" className="run-panel">{!ended && <SafeSlices info={info} />}<RoadUsers picture={picture} wanted={shownTab === "users"} /></Tabs.Panel>
-            <Tabs.Panel value="events" className="run-panel">
-              <IncidentLog incidents={incidents} categories={categories} over={ended} onShow={({ x, y, time: at }) => {
-                follow(null);
-                if (mode === "replay") { player.pause(); player.seek(at); }
-                if (x !== undefined && y !== undefined) handle.current?.centre(x, y);
-              }} />
+            <Tabs.Panel value="result" className="run-panel">
+              <Result info={info} scenario={scenario} onBack={back} onResume={onResume} />
+            </Tabs.Panel>
+            <Tabs.Panel value="charts" className="run-panel">
+              <Plots run={run} />
+            </Tabs.Panel>
+            <Tabs.Panel value="counts" className="run-panel">
+              <CountsFit
+                run={run}
+                onFit={setFit}
+                onShow={(x, y) => {
+                  follow(null);
+                  handle.current?.centre(x, y);
+                }}
+              />
+            </Tabs.Panel>
+            <Tabs.Panel value="users" className="run-panel">
+              {!ended && <SafeSlices info={info} />}
+              <RoadUsers picture={picture} wanted={shownTab === "users"} />
+            </Tabs.Panel>
+            <Tabs.Panel value="incidents" className="run-panel">
+              <IncidentLog
+                incidents={incidents}
+                categories={categories}
+                over={ended}
+                onShow={({ x, y, time: at }) => {
+                  follow(null);
+                  if (mode === "replay") {
+                    player.pause();
+                    player.seek(at);
+                  }
+                  if (x !== undefined && y !== undefined) handle.current?.centre(x, y);
+                }}
+              />
             </Tabs.Panel>
             <Tabs.Panel value="runs" className="run-panel">
-              <EarlierRuns scenario={scenario} current={run} onRemoved={(removed) => { if (removed === run) go({ view: "runs", scenario }); }} />
+              <EarlierRuns
+                scenario={scenario}
+                current={run}
+                onRemoved={(removed) => {
+                  if (removed === run) go({ view: "runs", scenario });
+                }}
+              />
             </Tabs.Panel>
           </Tabs>
         </aside>
       </div>
-      {ended && mode !== null
-        ? <ReplayStrip player={player} recorded={replayable} running={now.running} incidents={incidents} onBack={back} onPlay={() => { setMode("replay"); player.play(); }} />
-        : <LiveStrip info={info} now={now} onBack={back} learn={learn} />}
+      {ended && mode !== null ? (
+        <ReplayStrip
+          player={player}
+          recorded={replayable}
+          running={now.running}
+          incidents={incidents}
+          onBack={back}
+          onPlay={() => {
+            setMode("replay");
+            player.play();
+          }}
+        />
+      ) : (
+        <LiveStrip info={info} now={now} onBack={back} learn={learn} />
+      )}
     </div>
   );
 }

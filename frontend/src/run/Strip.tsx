@@ -11,51 +11,104 @@ import type { Now } from "./usePicture";
 import type { Player } from "./useReplay";
 
 const STEP = 0.5;
-/** Simulated seconds from which on it is told how long a run will still take. */
+/** Simulated seconds from which on the remaining time is shown. */
 const LONG = 3600;
 
-/** Steers a run that goes on, and says how far it is. */
-export function LiveStrip({ info, now, onBack, learn }: {
-  info: RunInfo; now: Now; onBack: () => void; learn: (state: RunState, speed?: number | null) => void;
+/** Controls a run, and shows its progress. */
+export function LiveStrip({
+  info,
+  now,
+  onBack,
+  learn,
+}: {
+  info: RunInfo;
+  now: Now;
+  onBack: () => void;
+  learn: (state: RunState, speed?: number | null) => void;
 }) {
   const { run, state } = info;
   const control = (action: Action, speed?: number | null): void => {
-    runs.control(run, action, speed).then((told) => learn(told.state, told.speed), tellError);
+    runs.control(run, action, speed).then((answer) => learn(answer.state, answer.speed), tellError);
   };
   const going = state === "running" || state === "paused";
   const until = info.progress?.until ?? 0;
-  // Told only where it matters; at a chosen pace it takes as long as one has chosen.
+  // Only where it matters; at a chosen speed it takes as long as one has chosen.
   const left = until > LONG && info.speed == null ? info.progress?.time_left : null;
   return (
     <div className="strip" role="region" aria-label="The run">
       <Back onBack={onBack} />
       <Group gap={6} role="group" aria-label="Control the run">
-        {state === "paused"
-          ? <Button leftSection={<IconPlay />} onClick={() => control("resume")}>Go on</Button>
-          : <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>Pause</Button>}
-        {!info.slices && <Button variant="default" leftSection={<IconStep />} disabled={state !== "paused"} onClick={() => control("step")}>One step</Button>}
-        <Button variant="default" leftSection={<IconStop />} disabled={!going && state !== "preparing"} onClick={() => control("stop")}>Stop</Button>
-        {info.slices && <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>Go on later</Button>}
-        <SpeedChoice speeds={SPEEDS} speed={info.speed ?? null} onChange={(speed) => control("speed", speed)} />
+        {state === "paused" ? (
+          <Button leftSection={<IconPlay />} onClick={() => control("resume")}>
+            Resume
+          </Button>
+        ) : (
+          <Button leftSection={<IconPause />} disabled={state !== "running"} onClick={() => control("pause")}>
+            Pause
+          </Button>
+        )}
+        {!info.slices && (
+          <Button
+            variant="default"
+            leftSection={<IconStep />}
+            disabled={state !== "paused"}
+            onClick={() => control("step")}
+          >
+            One step
+          </Button>
+        )}
+        <Button
+          variant="default"
+          leftSection={<IconStop />}
+          disabled={!going && state !== "preparing"}
+          onClick={() => control("stop")}
+        >
+          Stop
+        </Button>
+        {info.slices && (
+          <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>
+            Resume later
+          </Button>
+        )}
+        <SpeedChoice
+          speeds={SPEEDS}
+          speed={info.speed ?? null}
+          onChange={(speed) => control("speed", speed)}
+        />
       </Group>
       <div className="time-line">
-        <Progress value={until ? Math.min(100, (100 * now.time) / until) : 0} aria-label="How much of the run is over" />
-        <Text size="sm" mt={4}>{STATE_WORD[state]}{left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}</Text>
+        <Progress
+          value={until ? Math.min(100, (100 * now.time) / until) : 0}
+          aria-label="Progress of the run"
+        />
+        <Text size="sm" mt={4}>
+          {STATE_WORD[state]}
+          {left != null && state === "running" && `, about ${hoursMinutes(left + 30)} left`}
+        </Text>
       </div>
       <Shown label="Time" value={longClock(now.time, until)} />
-      <Shown label="Times real speed" value={now.pace.toFixed(1)} />
+      <Shown label="Real-time factor" value={now.pace.toFixed(1)} />
       <Shown label="On the road" value={String(now.running)} />
       <Shown label="Arrived" value={String(now.arrived)} />
     </div>
   );
 }
 
-/** Plays a recording: a slider over its time, with what went wrong marked above it. */
-export function ReplayStrip({ player, recorded, running, incidents, onBack, onPlay }: {
+/** Plays a recording: a slider over its time, with incidents marked above it. */
+export function ReplayStrip({
+  player,
+  recorded,
+  running,
+  incidents,
+  onBack,
+  onPlay,
+}: {
   player: Player;
   /** Whether the run left a recording. */
   recorded: boolean;
-  running: number; incidents: readonly Incident[]; onBack: () => void;
+  running: number;
+  incidents: readonly Incident[];
+  onBack: () => void;
   /** Also the first time, when there is nothing to play yet. */
   onPlay: () => void;
 }) {
@@ -65,22 +118,63 @@ export function ReplayStrip({ player, recorded, running, incidents, onBack, onPl
     <div className="strip" role="region" aria-label="The recording">
       <Back onBack={onBack} />
       <Group gap={6} role="group" aria-label="Control the recording">
-        {playing && replay
-          ? <Button leftSection={<IconPause />} onClick={player.pause}>Pause</Button>
-          : <Button leftSection={<IconPlay />} onClick={onPlay} loading={player.loading} disabled={!recorded || player.error !== null}>{replay ? "Play" : "Watch again"}</Button>}
-        <SpeedChoice speeds={REPLAY_SPEEDS} speed={player.speed} onChange={(speed) => player.setSpeed(speed ?? 1)} />
+        {playing && replay ? (
+          <Button leftSection={<IconPause />} onClick={player.pause}>
+            Pause
+          </Button>
+        ) : (
+          <Button
+            leftSection={<IconPlay />}
+            onClick={onPlay}
+            loading={player.loading}
+            disabled={!recorded || player.error !== null}
+          >
+            {replay ? "Play" : "Watch again"}
+          </Button>
+        )}
+        <SpeedChoice
+          speeds={REPLAY_SPEEDS}
+          speed={player.speed}
+          onChange={(speed) => player.setSpeed(speed ?? 1)}
+        />
       </Group>
       {replay ? (
         <div className="scrub">
           <div className="scrub-marks" aria-hidden="true">
-            {end > begin && incidents.slice(0, 200).map((one, n) => (
-              <i key={n} style={{ left: `${(100 * (one.time - begin)) / (end - begin)}%`, background: MARK_COLOR[markKind(one)] }} />
-            ))}
+            {end > begin &&
+              incidents.slice(0, 200).map((one, n) => (
+                <i
+                  key={n}
+                  style={{
+                    left: `${(100 * (one.time - begin)) / (end - begin)}%`,
+                    background: MARK_COLOR[markKind(one)],
+                  }}
+                />
+              ))}
           </div>
-          <input type="range" aria-label="Moment of the run" min={begin} max={end} step={Math.min(STEP, (end - begin) / 2 || STEP)} value={time}
-            aria-valuetext={`${longClock(time, end)} of ${longClock(end, end)}`} onChange={(event) => { player.pause(); player.seek(Number(event.currentTarget.value)); }} />
+          <input
+            type="range"
+            aria-label="Moment of the run"
+            min={begin}
+            max={end}
+            step={Math.min(STEP, (end - begin) / 2 || STEP)}
+            value={time}
+            aria-valuetext={`${longClock(time, end)} of ${longClock(end, end)}`}
+            onChange={(event) => {
+              player.pause();
+              player.seek(Number(event.currentTarget.value));
+            }}
+          />
         </div>
-      ) : <Text size="sm" className="time-line" c="dimmed">{!recorded || player.error ? "There is no recording of this run." : player.loading ? "Fetching the recording …" : "The run is over."}</Text>}
+      ) : (
+        <Text size="sm" className="time-line" c="dimmed">
+          {!recorded || player.error
+            ? "There is no recording of this run."
+            : player.loading
+              ? "Fetching the recording …"
+              : "The run is over."}
+        </Text>
+      )}
       {replay && <Shown label={`of ${longClock(end, end)}`} value={longClock(time, end)} />}
       {replay && <Shown label="On the road" value={String(running)} />}
     </div>
@@ -88,23 +182,44 @@ export function ReplayStrip({ player, recorded, running, incidents, onBack, onPl
 }
 
 function Back({ onBack }: { onBack: () => void }) {
-  return <Button variant="default" leftSection={<IconBack />} onClick={onBack}>Back to the editor</Button>;
+  return (
+    <Button variant="default" leftSection={<IconBack />} onClick={onBack}>
+      Back to the editor
+    </Button>
+  );
 }
 
-function SpeedChoice({ speeds, speed, onChange }: {
-  speeds: Speed[]; speed: number | null; onChange: (speed: number | null) => void;
+function SpeedChoice({
+  speeds,
+  speed,
+  onChange,
+}: {
+  speeds: Speed[];
+  speed: number | null;
+  onChange: (speed: number | null) => void;
 }) {
   const known = speeds.find((one) => one.speed === speed);
   return (
-    <Select aria-label="Speed" w={150} data={speeds.map(({ value, label }) => ({ value, label }))} allowDeselect={false}
-      value={known?.value ?? null} placeholder={speed === null ? undefined : `${speed} ×`}
+    <Select
+      aria-label="Speed"
+      w={150}
+      data={speeds.map(({ value, label }) => ({ value, label }))}
+      allowDeselect={false}
+      value={known?.value ?? null}
+      placeholder={speed === null ? undefined : `${speed} ×`}
       onChange={(value) => {
         const found = speeds.find((one) => one.value === value);
         if (found) onChange(found.speed);
-      }} />
+      }}
+    />
   );
 }
 
 function Shown({ label, value }: { label: string; value: string }) {
-  return <div className="figure"><b>{value}</b><span>{label}</span></div>;
+  return (
+    <div className="figure">
+      <b>{value}</b>
+      <span>{label}</span>
+    </div>
+  );
 }

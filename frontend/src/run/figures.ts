@@ -25,33 +25,52 @@ function get(summary: Summary, { name, part }: FigureInfo): number | null {
 }
 
 function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): string {
-  const text = (n * factor).toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  const text = (n * factor).toLocaleString("en", {
+    minimumFractionDigits: digits,
+    maximumFractionDigits: digits,
+  });
   return unit ? `${text} ${unit}` : text;
 }
 
-const say = (n: number, { display }: FigureInfo): string => display.clock ? longClock(n, n) : plain(n, display);
-const words = ({ name, label, definition }: FigureInfo) =>
-  ({ name, label: label.charAt(0).toUpperCase() + label.slice(1), definition });
+const say = (n: number, { display }: FigureInfo): string =>
+  display.clock ? longClock(n, n) : plain(n, display);
+const words = ({ name, label, definition }: FigureInfo) => ({
+  name,
+  label: label.charAt(0).toUpperCase() + label.slice(1),
+  definition,
+});
 
 /** The key figures of a run; those that the run has not are left out. */
 export function keyFigures(summary: Summary, all: readonly FigureInfo[]): Figure[] {
-  return all.filter((one) => one.on_page).flatMap((one) => {
-    const value = get(summary, one);
-    return value === null ? [] : [{ ...words(one), value: say(value, one) }];
-  });
+  return all
+    .filter((one) => one.on_page)
+    .flatMap((one) => {
+      const value = get(summary, one);
+      return value === null ? [] : [{ ...words(one), value: say(value, one) }];
+    });
 }
 
 /** Key figures of a run beside those of an earlier one; what neither has is left out. */
 export function compared(now: Summary, before: Summary, all: readonly FigureInfo[]): Compared[] {
-  return all.filter((one) => one.on_page).flatMap((one) => {
-    const [a, b] = [get(now, one), get(before, one)];
-    if (a === null && b === null) return [];
-    const difference = a === null || b === null ? "–" : signed(a - b, one);
-    return [{
-      ...words(one), value: a === null ? "–" : say(a, one), before: b === null ? "–" : say(b, one), difference,
-      better: a === null || b === null || difference === SAME || one.better === "neither" ? null : (a > b) === (one.better === "higher"),
-    }];
-  });
+  return all
+    .filter((one) => one.on_page)
+    .flatMap((one) => {
+      const [a, b] = [get(now, one), get(before, one)];
+      if (a === null && b === null) return [];
+      const difference = a === null || b === null ? "–" : signed(a - b, one);
+      return [
+        {
+          ...words(one),
+          value: a === null ? "–" : say(a, one),
+          before: b === null ? "–" : say(b, one),
+          difference,
+          better:
+            a === null || b === null || difference === SAME || one.better === "neither"
+              ? null
+              : a > b === (one.better === "higher"),
+        },
+      ];
+    });
 }
 
 const SAME = "same";
@@ -64,8 +83,14 @@ const ENDED: readonly RunState[] = ["completed", "stopped", "failed", "interrupt
 export const hasEnded = (state: RunState): boolean => ENDED.includes(state);
 
 export const STATE_WORD: Record<RunState, string> = {
-  preparing: "Getting ready", running: "Running", paused: "Paused", finishing: "Writing the results",
-  completed: "Finished", stopped: "Stopped", failed: "Failed", interrupted: "Interrupted",
+  preparing: "Preparing",
+  running: "Running",
+  paused: "Paused",
+  finishing: "Writing the results",
+  completed: "Finished",
+  stopped: "Stopped",
+  failed: "Failed",
+  interrupted: "Interrupted",
 };
 
 export interface Speed {
@@ -76,10 +101,14 @@ export interface Speed {
 
 /** Speeds to choose from; null is as fast as the machine can. */
 export const SPEEDS: Speed[] = [
-  { value: "0.1", label: "0.1 ×", speed: 0.1 }, { value: "0.25", label: "0.25 ×", speed: 0.25 },
-  { value: "0.5", label: "0.5 ×", speed: 0.5 }, { value: "1", label: "Real time", speed: 1 },
-  { value: "2", label: "2 ×", speed: 2 }, { value: "5", label: "5 ×", speed: 5 },
-  { value: "10", label: "10 ×", speed: 10 }, { value: "max", label: "As fast as it can", speed: null },
+  { value: "0.1", label: "0.1 ×", speed: 0.1 },
+  { value: "0.25", label: "0.25 ×", speed: 0.25 },
+  { value: "0.5", label: "0.5 ×", speed: 0.5 },
+  { value: "1", label: "Real time", speed: 1 },
+  { value: "2", label: "2 ×", speed: 2 },
+  { value: "5", label: "5 ×", speed: 5 },
+  { value: "10", label: "10 ×", speed: 10 },
+  { value: "max", label: "As fast as possible", speed: null },
 ];
 /** A recording has no limit but the eye. */
 export const REPLAY_SPEEDS: Speed[] = SPEEDS.filter(({ speed }) => speed !== null);

@@ -1,11 +1,20 @@
 import type { RunFile } from "../api/runs";
 
 const WORD: Record<string, string> = {
-  "report.html": "Full report", "parity.html": "Compared with CARLA", "summary.json": "Key figures", "figures.json": "Figures by place",
-  "actors.json": "What became of each road user", "events.json": "What happened on the road", "plan.json": "What was planned",
-  "scenario.json": "The scenario as it was run", "sumo.log": "What the simulator said", "trajectories.parquet": "Where everybody was",
-  "figures/network.csv": "The whole road network over time", "figures/segments.csv": "Each road over time",
-  "figures/junctions.csv": "Each junction over time", "figures/movements.csv": "Each turn over time",
+  "report.html": "Full report",
+  "parity.html": "Comparison with CARLA",
+  "summary.json": "Key figures",
+  "figures.json": "Figures by road and junction",
+  "actors.json": "Outcome of each road user",
+  "events.json": "Incidents",
+  "plan.json": "Planned trips",
+  "scenario.json": "The scenario as it was run",
+  "sumo.log": "Messages of the simulator",
+  "trajectories.parquet": "Trajectories",
+  "figures/network.csv": "The whole road network over time",
+  "figures/segments.csv": "Each road over time",
+  "figures/junctions.csv": "Each junction over time",
+  "figures/movements.csv": "Each turning movement over time",
 };
 
 interface Group {
@@ -15,10 +24,22 @@ interface Group {
 }
 
 const GROUPS: readonly { title: string; text: string; holds: (name: string) => boolean }[] = [
-  { title: "To read", text: "Open in any browser; they need nothing else.", holds: (name) => name.endsWith(".html") },
+  {
+    title: "To read",
+    text: "Open in any browser; they need nothing else.",
+    holds: (name) => name.endsWith(".html"),
+  },
   { title: "Tables", text: "Open in a spreadsheet.", holds: (name) => name.endsWith(".csv") },
-  { title: "Figures and lists", text: "As data, for programs (JSON).", holds: (name) => name.endsWith(".json") },
-  { title: "Recordings", text: "Large tables, for programs (Parquet).", holds: (name) => name.endsWith(".parquet") },
+  {
+    title: "Figures and lists",
+    text: "As data, for programs (JSON).",
+    holds: (name) => name.endsWith(".json"),
+  },
+  {
+    title: "Recordings",
+    text: "Large tables, for programs (Parquet).",
+    holds: (name) => name.endsWith(".parquet"),
+  },
   { title: "The rest", text: "If something went wrong.", holds: () => true },
 ];
 
@@ -28,6 +49,8 @@ export function fileGroups(files: readonly RunFile[]): Group[] {
   return GROUPS.flatMap(({ title, text, holds }) => {
     const mine = left.filter(({ name }) => holds(name));
     left = left.filter((file) => !mine.includes(file));
-    return mine.length > 0 ? [{ title, text, files: mine.map((file) => ({ ...file, word: WORD[file.name] ?? file.name })) }] : [];
+    return mine.length > 0
+      ? [{ title, text, files: mine.map((file) => ({ ...file, word: WORD[file.name] ?? file.name })) }]
+      : [];
   });
 }

@@ -1,17 +1,17 @@
 import type { FitRow } from "../api/runs";
 import type { Mark } from "../map/scene";
 
-/** Counts at one place, and whether all of them are met. */
-export interface CountPlace {
+/** Counts at one station, and whether all of them are met. */
+export interface CountStation {
   place: string;
   x: number;
   y: number;
   met: boolean;
 }
 
-/** Places of counting that are on the map; met only if each of their counts is. */
-export function countPlaces(rows: readonly FitRow[]): CountPlace[] {
-  const found = new Map<string, CountPlace>();
+/** Count stations that are on the map; met only if each of their counts is. */
+export function countStations(rows: readonly FitRow[]): CountStation[] {
+  const found = new Map<string, CountStation>();
   for (const { place, x, y, met } of rows) {
     if (x === null || y === null) continue;
     const known = found.get(place);
@@ -23,8 +23,9 @@ export function countPlaces(rows: readonly FitRow[]): CountPlace[] {
 
 export const countMarks = (rows: readonly FitRow[]): Mark[] =>
   // Those that are not met last, so that they are drawn on top.
-  countPlaces(rows).sort((a, b) => Number(b.met) - Number(a.met))
+  countStations(rows)
+    .sort((a, b) => Number(b.met) - Number(a.met))
     .map(({ x, y, met }) => ({ x, y, kind: met ? "met" : "unmet", fresh: false }));
 
-/** What is worst comes first. */
+/** The worst first. */
 export const worstFirst = (rows: readonly FitRow[]): FitRow[] => [...rows].sort((a, b) => b.geh - a.geh);

@@ -1,5 +1,6 @@
 import type { LiveActor } from "../api/runs";
 import { CATEGORIES } from "../api/types";
+import { nth } from "../lists";
 import type { Moving } from "../map/scene";
 
 /** A road user as the server introduces it, once. */
@@ -25,11 +26,18 @@ export function decodeFrame(data: ArrayBuffer): Frame {
     throw new Error(`a frame of ${data.byteLength} bytes cannot be read`);
   }
   const all = floats(data);
-  const count = all[2];
+  const count = nth(all, 2);
   if (all.length !== HEADER + ROW * count) {
     throw new Error(`a frame for ${count} road users has ${all.length} numbers`);
   }
-  return { step: all[0], time: all[1], count, pace: all[3], arrived: all[4], rows: all.subarray(HEADER) };
+  return {
+    step: nth(all, 0),
+    time: nth(all, 1),
+    count,
+    pace: nth(all, 3),
+    arrived: nth(all, 4),
+    rows: all.subarray(HEADER),
+  };
 }
 
 const LITTLE = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1;
@@ -51,13 +59,15 @@ export class Crowd {
     for (const actor of actors) this.known.set(actor.index, actor);
   }
 
-  everybody(): Introduced[] {
+  all(): Introduced[] {
     return [...this.known.values()];
   }
 
-  /** Ids of the road users that are marked as the person's own. */
+  /** Ids of the road users that are marked as ego. */
   egos(): string[] {
-    return this.everybody().filter((one) => one.ego).map((one) => one.id);
+    return this.all()
+      .filter((one) => one.ego)
+      .map((one) => one.id);
   }
 
   named(index: number): Introduced | undefined {
@@ -69,7 +79,7 @@ export class Crowd {
     return id === null ? -1 : (this.rowOf.get(id) ?? -1);
   }
 
-  /** The frame as it is drawn; whoever has not been introduced yet is left out. */
+  /** The frame as it is drawn; those not introduced yet are left out. */
   arrange(frame: Frame, ego: string | null, followed: string | null): Moving {
     const pose = new Float64Array(5 * frame.count);
     const category = new Uint8Array(frame.count);
@@ -78,15 +88,15 @@ export class Crowd {
     this.rowOf.clear();
     for (let i = 0; i < frame.count; i++) {
       const at = ROW * i;
-      const who = this.known.get(frame.rows[at]);
+      const who = this.known.get(nth(frame.rows, at));
       if (!who) continue;
-      pose[5 * count] = frame.rows[at + 1] + this.origin[0];
-      pose[5 * count + 1] = frame.rows[at + 2] + this.origin[1];
-      pose[5 * count + 2] = frame.rows[at + 3];
+      pose[5 * count] = nth(frame.rows, at + 1) + this.origin[0];
+      pose[5 * count + 1] = nth(frame.rows, at + 2) + this.origin[1];
+      pose[5 * count + 2] = nth(frame.rows, at + 3);
       pose[5 * count + 3] = who.length;
       pose[5 * count + 4] = who.width;
       category[count] = Math.max(CATEGORIES.indexOf(who.category), 0);
-      flags[count] = frame.rows[at + 5];
+      flags[count] = nth(frame.rows, at + 5);
       this.rowOf.set(who.id, count);
       count += 1;
     }

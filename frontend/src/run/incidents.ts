@@ -9,26 +9,38 @@ const FRESH = 4;
 const DRAWN = 300;
 
 const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
-  collision: "collision", emergency_stop: "braking", teleport_start: "lifted", teleport_end: "lifted",
+  collision: "collision",
+  emergency_stop: "braking",
+  teleport_start: "teleported",
+  teleport_end: "teleported",
 };
 
 export const MARK_WORD: Record<MarkKind, string> = {
-  collision: "Collision", braking: "Emergency braking", lifted: "Teleported",
-  met: "Count met", unmet: "Count not met",
+  collision: "Collision",
+  braking: "Emergency braking",
+  teleported: "Teleported",
+  met: "Count met",
+  unmet: "Count not met",
 };
 
-export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "lifted";
+export const markKind = (incident: Incident): MarkKind => KIND[incident.kind] ?? "teleported";
 
-/** What happened in plain words, with whom. */
+/** An incident in a sentence, with whom. */
 export function sentence(incident: Incident, categories: ReadonlyMap<string, Category>): string {
   const who = named(incident.actor, categories);
   switch (incident.kind) {
     case "collision":
-      return incident.partner ? `${who} collided with ${named(incident.partner, categories)}` : `${who} collided`;
-    case "emergency_stop": return `${who} had to brake as hard as it could`;
-    case "teleport_start": return `${who} was gridlocked and teleported`;
-    case "teleport_end": return `${who} was put back on the road after its teleport`;
-    default: return `${who}: ${incident.kind.replaceAll("_", " ")}`;
+      return incident.partner
+        ? `${who} collided with ${named(incident.partner, categories)}`
+        : `${who} collided`;
+    case "emergency_stop":
+      return `${who} braked in an emergency`;
+    case "teleport_start":
+      return `${who} was gridlocked and teleported`;
+    case "teleport_end":
+      return `${who} was put back on the road after its teleport`;
+    default:
+      return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
 }
 
@@ -37,12 +49,21 @@ function named(id: string, categories: ReadonlyMap<string, Category>): string {
   return !category || id.toLowerCase().startsWith(category) ? id : `${CATEGORY_WORD[category]} ${id}`;
 }
 
-/** What is drawn of it at a time: everything up to then, the newest most visible. */
+/** What is drawn at a time: all incidents up to then, the newest most visible. */
 export function marksAt(incidents: readonly Incident[], time: number): Mark[] {
   return incidents
     .filter((one) => one.time <= time + 1e-6)
     .slice(-DRAWN)
-    .flatMap((one) => one.x === undefined || one.y === undefined ? [] : [{
-      x: one.x, y: one.y, kind: markKind(one), fresh: time - one.time < FRESH,
-    }]);
+    .flatMap((one) =>
+      one.x === undefined || one.y === undefined
+        ? []
+        : [
+            {
+              x: one.x,
+              y: one.y,
+              kind: markKind(one),
+              fresh: time - one.time < FRESH,
+            },
+          ],
+    );
 }

@@ -7,7 +7,13 @@ export interface Lamp {
   color: string;
 }
 
-const COLOR: Record<string, string> = { r: "#ff3b30", y: "#ffc400", u: "#ffc400", g: "#22c55e", G: "#22c55e" };
+const COLOR: Record<string, string> = {
+  r: "#ff3b30",
+  y: "#ffc400",
+  u: "#ffc400",
+  g: "#22c55e",
+  G: "#22c55e",
+};
 const RANK = "GgyurR";
 
 /** Colour of every signal: where one shows several movements, the one that may go most. */

@@ -6,7 +6,7 @@ export interface LiveEvents {
   onLights: (lights: Record<string, string>) => void;
   onState: (state: RunState, speed?: number | null) => void;
   onIncidents: (incidents: Incident[]) => void;
-  /** Everybody who will ever be on the road is known. */
+  /** All that will ever be on the road are known. */
   onIntroduced: (crowd: Crowd) => void;
 }
 
@@ -17,7 +17,10 @@ export class Live {
   private waiting: ArrayBuffer | null = null;
   private pending = 0;
 
-  constructor(run: string, private readonly events: LiveEvents) {
+  constructor(
+    run: string,
+    private readonly events: LiveEvents,
+  ) {
     this.socket = new WebSocket(runs.liveUrl(run));
     this.socket.binaryType = "arraybuffer";
     this.socket.onmessage = (event: MessageEvent<ArrayBuffer | string>) => {
@@ -38,10 +41,14 @@ export class Live {
         this.crowd.origin = message.origin;
         this.crowd.introduce(message.actors);
         return this.events.onIntroduced(this.crowd);
-      case "lights": return this.events.onLights(message.lights);
-      case "events": return this.events.onIncidents(message.events);
-      case "state": return this.events.onState(message.state, message.speed);
-      case "end": return this.events.onState(message.state);
+      case "lights":
+        return this.events.onLights(message.lights);
+      case "events":
+        return this.events.onIncidents(message.events);
+      case "state":
+        return this.events.onState(message.state, message.speed);
+      case "end":
+        return this.events.onState(message.state);
     }
   }
 

@@ -1,4 +1,5 @@
 import type { ReplayColumns } from "../api/runs";
+import { nth } from "../lists";
 import { Crowd, type Frame } from "./frames";
 
 const ROW = 6;
@@ -23,21 +24,38 @@ export class Replay {
     this.crowd.introduce(columns.actors.map((actor, index) => ({ ...actor, index })));
   }
 
-  /** Everybody on the road at a time, as a live frame would say it; `arrived` is not known. */
+  /** All on the road at a time, as a live frame has them; `arrived` is not known. */
   at(time: number): Frame {
     const { times, first, actor, x, y, hdg, speed } = this.columns;
-    if (times.length === 0) return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
+    if (times.length === 0)
+      return { step: 0, time, count: 0, pace: 0, arrived: 0, rows: new Float32Array(0) };
     const i = momentAt(times, time);
-    const count = first[i + 1] - first[i];
+    const count = nth(first, i + 1) - nth(first, i);
     const rows = new Float32Array(ROW * count);
-    const span = i + 1 < times.length ? times[i + 1] - times[i] : 0;
-    const share = span > 0 ? Math.min(1, Math.max(0, (time - times[i]) / span)) : 0;
+    const span = i + 1 < times.length ? nth(times, i + 1) - nth(times, i) : 0;
+    const share = span > 0 ? Math.min(1, Math.max(0, (time - nth(times, i)) / span)) : 0;
     for (let k = 0; k < count; k++) {
-      const a = first[i] + k;
-      const b = this.next[a];
-      let pose: Pose = { x: x[a], y: y[a], hdg: hdg[a], speed: speed[a] };
-      if (b >= 0 && share > 0) pose = between(pose, { x: x[b], y: y[b], hdg: hdg[b], speed: speed[b] }, span, share);
-      rows.set([actor[a], pose.x - this.crowd.origin[0], pose.y - this.crowd.origin[1], pose.hdg, pose.speed, 0], ROW * k);
+      const a = nth(first, i) + k;
+      const b = nth(this.next, a);
+      let pose: Pose = { x: nth(x, a), y: nth(y, a), hdg: nth(hdg, a), speed: nth(speed, a) };
+      if (b >= 0 && share > 0)
+        pose = between(
+          pose,
+          { x: nth(x, b), y: nth(y, b), hdg: nth(hdg, b), speed: nth(speed, b) },
+          span,
+          share,
+        );
+      rows.set(
+        [
+          nth(actor, a),
+          pose.x - this.crowd.origin[0],
+          pose.y - this.crowd.origin[1],
+          pose.hdg,
+          pose.speed,
+          0,
+        ],
+        ROW * k,
+      );
     }
     return { step: i, time, count, pace: 0, arrived: 0, rows };
   }
@@ -52,7 +70,7 @@ interface Pose {
 
 /**
  * Place between two that are `span` seconds apart, along a curve that leaves and arrives with the
- * recorded heading and speed. Whoever was put elsewhere stays until then.
+ * recorded heading and speed. One that was put elsewhere stays until then.
  */
 export function between(a: Pose, b: Pose, span: number, share: number): Pose {
   const far = Math.hypot(b.x - a.x, b.y - a.y);
@@ -74,7 +92,7 @@ export function momentAt(times: readonly number[], time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {
     const middle = (low + high + 1) >> 1;
-    if (times[middle] <= time) low = middle;
+    if (nth(times, middle) <= time) low = middle;
     else high = middle - 1;
   }
   return low;
@@ -84,10 +102,10 @@ function following({ first, actor, actors }: ReplayColumns): Int32Array {
   const next = new Int32Array(actor.length).fill(-1);
   const last = new Int32Array(actors.length).fill(-1);
   for (let i = 0; i + 1 < first.length; i++) {
-    for (let row = first[i]; row < first[i + 1]; row++) {
-      const before = last[actor[row]];
-      if (i > 0 && before >= first[i - 1]) next[before] = row;
-      last[actor[row]] = row;
+    for (let row = nth(first, i); row < nth(first, i + 1); row++) {
+      const before = nth(last, nth(actor, row));
+      if (i > 0 && before >= nth(first, i - 1)) next[before] = row;
+      last[nth(actor, row)] = row;
     }
   }
   return next;

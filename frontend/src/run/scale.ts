@@ -1,3 +1,4 @@
+import { nth } from "../lists";
 /** Round numbers from 0 to at least `most`, about `parts` of them. */
 export function ticks(most: number, parts = 4): number[] {
   const top = most > 0 ? most : 1;
@@ -11,5 +12,5 @@ export function ticks(most: number, parts = 4): number[] {
 /** At most `most` of some rows, evenly spread, the last one among them. */
 export function thinned<T>(rows: readonly T[], most: number): T[] {
   if (rows.length <= most) return [...rows];
-  return Array.from({ length: most }, (_, k) => rows[Math.round((k * (rows.length - 1)) / (most - 1))]);
+  return Array.from({ length: most }, (_, k) => nth(rows, Math.round((k * (rows.length - 1)) / (most - 1))));
 }

@@ -9,8 +9,15 @@ export function useCounts(run: string, over: boolean): number {
     if (!over) return;
     let current = true;
     // A run whose scenario is not kept has none that could be shown.
-    runs.content(run).then((found) => { if (current) setCounts(found.counts); }, () => undefined);
-    return () => { current = false; };
+    runs.content(run).then(
+      (found) => {
+        if (current) setCounts(found.counts);
+      },
+      () => undefined,
+    );
+    return () => {
+      current = false;
+    };
   }, [run, over]);
   return counts;
 }

@@ -1,5 +1,6 @@
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 
+import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
 import type { Crowd, Frame } from "./frames";
@@ -12,7 +13,7 @@ export interface Now {
   pace: number;
   running: number;
   arrived: number;
-  /** Whether whoever is followed is on the road. */
+  /** Whether the one that is followed is on the road. */
   there: boolean;
 }
 
@@ -25,7 +26,7 @@ export interface Picture {
   redraw: () => void;
   clear: () => void;
   follow: (id: string | null) => void;
-  /** Who is near a place, if anybody. */
+  /** The road user near a point. */
   near: (at: Pointed) => string | null;
   /** The newest frame, read when it is needed. */
   latest: () => { frame: Frame; crowd: Crowd } | null;
@@ -38,19 +39,25 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
   const watched = useRef<string | null>(null);
   const pending = useRef(0);
 
-  const show = useCallback((frame: Frame, crowd: Crowd) => {
-    const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
-    last.current = { frame, crowd, moving };
-    handle.current?.setMoving(moving);
-    const row = moving.followed;
-    if (row >= 0) handle.current?.centre(moving.pose[5 * row], moving.pose[5 * row + 1]);
-    pending.current ||= window.setTimeout(() => {
-      pending.current = 0;
-      if (!last.current) return;
-      const { frame: { time, pace, count, arrived }, moving: { followed: row } } = last.current;
-      setNow({ time, pace, running: count, arrived, there: row >= 0 });
-    }, READABLE);
-  }, [handle]);
+  const show = useCallback(
+    (frame: Frame, crowd: Crowd) => {
+      const moving = crowd.arrange(frame, crowd.egos()[0] ?? null, watched.current);
+      last.current = { frame, crowd, moving };
+      handle.current?.setMoving(moving);
+      const row = moving.followed;
+      if (row >= 0) handle.current?.centre(nth(moving.pose, 5 * row), nth(moving.pose, 5 * row + 1));
+      pending.current ||= window.setTimeout(() => {
+        pending.current = 0;
+        if (!last.current) return;
+        const {
+          frame: { time, pace, count, arrived },
+          moving: { followed: row },
+        } = last.current;
+        setNow({ time, pace, running: count, arrived, there: row >= 0 });
+      }, READABLE);
+    },
+    [handle],
+  );
   const redraw = useCallback(() => {
     if (last.current) show(last.current.frame, last.current.crowd);
   }, [show]);
@@ -59,24 +66,30 @@ export function usePicture(handle: RefObject<MapHandle | null>): Picture {
     handle.current?.setMoving(null);
     setNow((old) => ({ ...old, running: 0, there: false }));
   }, [handle]);
-  const follow = useCallback((id: string | null) => {
-    watched.current = id;
-    setFollowed(id);
-    redraw();
-  }, [redraw]);
+  const follow = useCallback(
+    (id: string | null) => {
+      watched.current = id;
+      setFollowed(id);
+      redraw();
+    },
+    [redraw],
+  );
   const near = useCallback((at: Pointed): string | null => {
     if (!last.current) return null;
     const { crowd, moving } = last.current;
     let best: string | null = null;
     let least = Math.max(at.reach, 3);
-    for (const { id } of crowd.everybody()) {
+    for (const { id } of crowd.all()) {
       const row = crowd.row(id);
       if (row < 0) continue;
-      const away = Math.hypot(moving.pose[5 * row] - at.x, moving.pose[5 * row + 1] - at.y);
+      const away = Math.hypot(nth(moving.pose, 5 * row) - at.x, nth(moving.pose, 5 * row + 1) - at.y);
       if (away < least) [best, least] = [id, away];
     }
     return best;
   }, []);
   const latest = useCallback(() => last.current, []);
-  return useMemo(() => ({ now, followed, show, redraw, clear, follow, near, latest }), [now, followed, show, redraw, clear, follow, near, latest]);
+  return useMemo(
+    () => ({ now, followed, show, redraw, clear, follow, near, latest }),
+    [now, followed, show, redraw, clear, follow, near, latest],
+  );
 }

@@ -1,6 +1,7 @@
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { runs } from "../api/runs";
+import { reasonOf } from "../ui/reason";
 import type { Crowd, Frame } from "./frames";
 import { Replay } from "./replay";
 
@@ -39,16 +40,24 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
         setTime(made.begin);
         show(made.at(made.begin), made.crowd);
       },
-      (reason: unknown) => { if (current) setError((reason as Error).message); });
-    return () => { current = false; };
+      (reason: unknown) => {
+        if (current) setError(reasonOf(reason));
+      },
+    );
+    return () => {
+      current = false;
+    };
   }, [run, wanted, show]);
 
-  const seek = useCallback((to: number) => {
-    if (!replay) return;
-    clock.current = Math.min(replay.end, Math.max(replay.begin, to));
-    setTime(clock.current);
-    show(replay.at(clock.current), replay.crowd);
-  }, [replay, show]);
+  const seek = useCallback(
+    (to: number) => {
+      if (!replay) return;
+      clock.current = Math.min(replay.end, Math.max(replay.begin, to));
+      setTime(clock.current);
+      show(replay.at(clock.current), replay.crowd);
+    },
+    [replay, show],
+  );
 
   useEffect(() => {
     if (!playing || !replay) return;
@@ -60,7 +69,10 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
       if (clock.current >= replay.end) setPlaying(false);
       else pending = requestAnimationFrame(tick);
     };
-    pending = requestAnimationFrame((wall) => { before = wall; tick(wall); });
+    pending = requestAnimationFrame((wall) => {
+      before = wall;
+      tick(wall);
+    });
     return () => cancelAnimationFrame(pending);
   }, [playing, replay, speed, seek]);
 
@@ -69,7 +81,19 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
     setPlaying(true);
   }, [replay, seek]);
   const pause = useCallback(() => setPlaying(false), []);
-  return useMemo(() => ({
-    replay, loading: wanted && !replay && !error, error, time, playing, speed, play, pause, seek, setSpeed,
-  }), [replay, wanted, error, time, playing, speed, play, pause, seek]);
+  return useMemo(
+    () => ({
+      replay,
+      loading: wanted && !replay && !error,
+      error,
+      time,
+      playing,
+      speed,
+      play,
+      pause,
+      seek,
+      setSpeed,
+    }),
+    [replay, wanted, error, time, playing, speed, play, pause, seek],
+  );
 }

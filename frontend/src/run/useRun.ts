@@ -7,6 +7,7 @@ import { insideRows, segmentsBounds } from "../editor/scene";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { EMPTY_SCENE, type Scene } from "../map/scene";
+import { reasonOf } from "../ui/reason";
 import { hasEnded } from "./figures";
 
 const POLL = 700;
@@ -16,16 +17,16 @@ const ENOUGH = 20;
 export interface Run {
   info: RunInfo | null;
   failure: string | null;
-  /** What the live picture tells sooner than one asks. */
+  /** What the live picture reports sooner than one asks. */
   learn: (state: RunState, speed?: number | null) => void;
 }
 
-/** How a run stands; asked rarely, as the picture comes by itself. */
+/** The state of a run; asked rarely, as the picture comes by itself. */
 export function useRun(run: string): Run {
   const [info, setInfo] = useState<RunInfo | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const ended = info !== null && hasEnded(info.state);
-  // The live picture may tell of the end before its results, or its reason, are there.
+  // The live picture may report the end before its results, or its reason, are there.
   const complete = ended && (info.summary != null || info.error != null);
   useEffect(() => {
     if (complete) return;
@@ -34,15 +35,26 @@ export function useRun(run: string): Run {
     const ask = (): void => {
       if (ended && left-- <= 0) return;
       runs.info(run).then(
-        (found) => { if (current) setInfo(found); },
-        (error: unknown) => { if (current) setFailure(String((error as Error).message)); });
+        (found) => {
+          if (current) setInfo(found);
+        },
+        (error: unknown) => {
+          if (current) setFailure(reasonOf(error));
+        },
+      );
     };
     ask();
     const timer = setInterval(ask, POLL);
-    return () => { current = false; clearInterval(timer); };
+    return () => {
+      current = false;
+      clearInterval(timer);
+    };
   }, [run, ended, complete]);
-  const learn = useCallback((state: RunState, speed?: number | null) => setInfo((old) =>
-    old && { ...old, state, speed: speed === undefined ? old.speed : speed }), []);
+  const learn = useCallback(
+    (state: RunState, speed?: number | null) =>
+      setInfo((old) => old && { ...old, state, speed: speed === undefined ? old.speed : speed }),
+    [],
+  );
   return { info, failure, learn };
 }
 
@@ -65,17 +77,26 @@ export function useGround(name: string | null, scenario: string): Ground {
   const [failure, setFailure] = useState<string | null>(null);
   useEffect(() => {
     if (!name) return;
-    const fail = (error: unknown): void => setFailure(String((error as Error).message));
+    const fail = (error: unknown): void => setFailure(reasonOf(error));
     // Side by side, for a person waits.
     api.map(name).then(setMap, fail);
     loadDrawing(name).then(setDrawing, fail);
     loadGraph(name).then(setLoaded, fail);
   }, [name]);
   useEffect(() => {
-    api.scenario(scenario).then(({ document }) => setRoi(document.roi), () => setRoi([]));
+    api.scenario(scenario).then(
+      ({ document }) => setRoi(document.roi),
+      () => setRoi([]),
+    );
   }, [scenario]);
-  const inside = useMemo(() => loaded && roi && roi.length > 0 ? insideRows(loaded.graph, roi) : null, [loaded, roi]);
-  const bounds = useMemo(() => loaded && roi ? segmentsBounds(loaded.graph, roi) : null, [loaded, roi]);
-  const scene = useMemo<Scene>(() => ({ ...EMPTY_SCENE, nodes: { vehicles: false, walks: false, inside } }), [inside]);
+  const inside = useMemo(
+    () => (loaded && roi && roi.length > 0 ? insideRows(loaded.graph, roi) : null),
+    [loaded, roi],
+  );
+  const bounds = useMemo(() => (loaded && roi ? segmentsBounds(loaded.graph, roi) : null), [loaded, roi]);
+  const scene = useMemo<Scene>(
+    () => ({ ...EMPTY_SCENE, nodes: { vehicles: false, walks: false, inside } }),
+    [inside],
+  );
   return { map, drawing, loaded, scene, bounds, failure };
 }

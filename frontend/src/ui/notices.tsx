@@ -1,6 +1,8 @@
 import { Alert, CloseButton, Stack } from "@mantine/core";
 import { create } from "zustand";
 
+import { reasonOf } from "./reason";
+
 interface Notice {
   key: number;
   kind: "error" | "info";
@@ -28,7 +30,7 @@ export const useNotices = create<Notices>((set, get) => ({
 
 export const tell = (text: string): void => useNotices.getState().add("info", text);
 export function tellError(error: unknown): void {
-  useNotices.getState().add("error", error instanceof Error ? error.message : String(error));
+  useNotices.getState().add("error", reasonOf(error));
 }
 
 /** What the program has to say, at the foot of the page and read aloud. */
@@ -40,7 +42,13 @@ export function NoticeList() {
         <Alert key={one.key} color={one.kind === "error" ? "red" : "blue"} variant="filled" py="xs" pr="xs">
           <div className="notice">
             <span>{one.text}</span>
-            <CloseButton size="sm" variant="transparent" c="white" aria-label="Close this message" onClick={() => close(one.key)} />
+            <CloseButton
+              size="sm"
+              variant="transparent"
+              c="white"
+              aria-label="Close this message"
+              onClick={() => close(one.key)}
+            />
           </div>
         </Alert>
       ))}

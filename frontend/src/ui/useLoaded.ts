@@ -1,5 +1,7 @@
 import { useCallback, useEffect, useState } from "react";
 
+import { reasonOf } from "./reason";
+
 export interface Loaded<T> {
   value: T | null;
   error: string | null;
@@ -14,10 +16,19 @@ export function useLoaded<T>(load: () => Promise<T>): Loaded<T> {
   useEffect(() => {
     let current = true;
     load().then(
-      (found) => { if (current) { setValue(found); setError(null); } },
-      (reason: unknown) => { if (current) setError(reason instanceof Error ? reason.message : String(reason)); },
+      (found) => {
+        if (current) {
+          setValue(found);
+          setError(null);
+        }
+      },
+      (reason: unknown) => {
+        if (current) setError(reasonOf(reason));
+      },
     );
-    return () => { current = false; };
+    return () => {
+      current = false;
+    };
   }, [load, turn]);
   return { value, error, reload: useCallback(() => setTurn((n) => n + 1), []) };
 }

@@ -1,18 +1,34 @@
 import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types";
 
-/** Words for people: no term of any standard or simulator on the page. */
+/** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
-  car: "Car", van: "Van", truck: "Truck", bus: "Bus", motorcycle: "Motorcycle",
-  bicycle: "Bicycle", pedestrian: "Pedestrian",
+  car: "Car",
+  van: "Van",
+  truck: "Truck",
+  bus: "Bus",
+  motorcycle: "Motorcycle",
+  bicycle: "Bicycle",
+  pedestrian: "Pedestrian",
 };
 
 export const STYLE_WORD: Record<Style, string> = {
-  cautious: "Cautious", normal: "Normal", sporty: "Sporty",
+  cautious: "Cautious",
+  normal: "Normal",
+  sporty: "Sporty",
 };
 
+/** A flow in words, by whether its road users are on foot. */
+export const flowWord = (walks: boolean): string => (walks ? "Pedestrian flow" : "Vehicle flow");
+
 const KIND_WORD: Record<string, string> = {
-  clear: "Clear", cloudy: "Cloudy", wet: "Wet roads", rain_light: "Light rain",
-  rain_medium: "Rain", rain_heavy: "Heavy rain", fog: "Fog", dust: "Dust",
+  clear: "Clear",
+  cloudy: "Cloudy",
+  wet: "Wet roads",
+  rain_light: "Light rain",
+  rain_medium: "Rain",
+  rain_heavy: "Heavy rain",
+  fog: "Fog",
+  dust: "Dust",
 };
 const TIME_WORD = { day: "day", sunset: "sunset", night: "night" } as const;
 
@@ -21,17 +37,26 @@ export const weatherWord = (preset: WeatherPreset): string =>
 export const kindWord = (kind: string): string => KIND_WORD[kind] ?? kind.replaceAll("_", " ");
 
 const PARAMETER_WORD: Record<string, string> = {
-  cloudiness: "Clouds", precipitation: "Rain", precipitation_deposits: "Puddles",
-  wind_intensity: "Wind", sun_azimuth_angle: "Direction of the sun",
-  sun_altitude_angle: "Height of the sun", fog_density: "Fog", fog_distance: "Fog begins after",
-  wetness: "Wetness of the road", dust_storm: "Dust",
+  cloudiness: "Clouds",
+  precipitation: "Rain",
+  precipitation_deposits: "Puddles",
+  wind_intensity: "Wind",
+  sun_azimuth_angle: "Direction of the sun",
+  sun_altitude_angle: "Height of the sun",
+  fog_density: "Fog",
+  fog_distance: "Fog begins after",
+  wetness: "Wetness of the road",
+  dust_storm: "Dust",
 };
 /** Parameters that a person can imagine, in this order; the others only matter to a picture. */
 export const PARAMETERS = Object.entries(PARAMETER_WORD).map(([name, word]) => ({ name, word }));
 
 export const modelWord = (id: string): string =>
-  id.replace(/^(vehicle|walker)\.(pedestrian\.)?/, "").replaceAll(/[._]/g, " ")
-    .replace(/^0/, "Person 0").replace(/\b\w/g, (c) => c.toUpperCase());
+  id
+    .replace(/^(vehicle|walker)\.(pedestrian\.)?/, "")
+    .replaceAll(/[._]/g, " ")
+    .replace(/^0/, "Person 0")
+    .replace(/\b\w/g, (c) => c.toUpperCase());
 
 export function length(metres: number): string {
   if (metres >= 10_000) return `${(metres / 1000).toFixed(0)} km`;
@@ -54,22 +79,30 @@ export function hoursMinutes(seconds: number): string {
   return min === 0 ? `${h} h` : `${h} h ${String(min).padStart(2, "0")} min`;
 }
 
+/** Minutes of the hour, or seconds of the minute, in two digits. */
+const sixtieth = (n: number): string => String(Math.floor(n) % 60).padStart(2, "0");
+
 /** Hours, minutes and seconds of a long run; the tenths of {@link clock} for a short one. */
 export function longClock(seconds: number, longest: number): string {
   if (longest < 3600) return clock(seconds);
-  const s = Math.floor(Math.max(0, seconds));
-  return `${Math.floor(s / 3600)}:${String(Math.floor(s / 60) % 60).padStart(2, "0")}:${String(s % 60).padStart(2, "0")}`;
+  const s = Math.max(0, seconds);
+  return `${Math.floor(s / 3600)}:${sixtieth(s / 60)}:${sixtieth(s)}`;
 }
 
-/** From when to when, as hours and minutes after the start. */
+/** From when to when after the start, in the unit that fits: `0–15 min`, `0:15–10:00 h`. */
 export function span(begin: number, end: number): string {
-  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${String(Math.floor(seconds / 60) % 60).padStart(2, "0")}`;
-  return `${at(begin)}–${at(end)}`;
+  if (begin % 60 !== 0 || end % 60 !== 0) {
+    const at = (seconds: number): string => `${Math.floor(seconds / 60)}:${sixtieth(seconds)}`;
+    return `${at(begin)}–${at(end)} min`;
+  }
+  if (end <= 3600) return `${begin / 60}–${end / 60} min`;
+  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${sixtieth(seconds / 60)}`;
+  return `${at(begin)}–${at(end)} h`;
 }
 
 export function bytes(n: number): string {
-  const unit = n >= 1e9 ? { size: 1e9, word: "GB" } : n >= 1e6 ? { size: 1e6, word: "MB" } : { size: 1e3, word: "kB" };
-  return `${(n / unit.size).toLocaleString("en", { maximumFractionDigits: n >= 10 * unit.size ? 0 : 1 })} ${unit.word}`;
+  const [size, word] = n >= 1e9 ? [1e9, "GB"] : n >= 1e6 ? [1e6, "MB"] : [1e3, "kB"];
+  return `${(n / size).toLocaleString("en", { maximumFractionDigits: n >= 10 * size ? 0 : 1 })} ${word}`;
 }
 
 export const count = (n: number, one: string, many = `${one}s`): string =>

@@ -1,13 +1,13 @@
 import { useSyncExternalStore } from "react";
 
 /** Where in the page one is; kept in the address, so that reload and the back button work. */
-export type Route =
+export type Address =
   | { view: "catalogue" }
   | { view: "editor"; scenario: string }
   | { view: "run"; scenario: string; run: string }
   | { view: "runs"; scenario: string };
 
-export function parseRoute(hash: string): Route {
+export function parseAddress(hash: string): Address {
   const [view, scenario, run] = hash.replace(/^#\/?/, "").split("/").map(decode);
   if (view === "edit" && scenario) return { view: "editor", scenario };
   if (view === "run" && scenario && run) return { view: "run", scenario, run };
@@ -15,18 +15,20 @@ export function parseRoute(hash: string): Route {
   return { view: "catalogue" };
 }
 
-/** Inverse of {@link parseRoute}. */
-export function hashOf(route: Route): string {
+/** Inverse of {@link parseAddress}. */
+export function hashOf(address: Address): string {
   const enc = encodeURIComponent;
-  if (route.view === "editor") return `#/edit/${enc(route.scenario)}`;
-  if (route.view === "run") return `#/run/${enc(route.scenario)}/${enc(route.run)}`;
-  if (route.view === "runs") return `#/runs/${enc(route.scenario)}`;
+  if (address.view === "editor") return `#/edit/${enc(address.scenario)}`;
+  if (address.view === "run") return `#/run/${enc(address.scenario)}/${enc(address.run)}`;
+  if (address.view === "runs") return `#/runs/${enc(address.scenario)}`;
   return "#/";
 }
 
-export const go = (route: Route): void => { location.hash = hashOf(route); };
+export const go = (address: Address): void => {
+  location.hash = hashOf(address);
+};
 
-export function useRoute(): Route {
+export function useAddress(): Address {
   const hash = useSyncExternalStore(
     (changed) => {
       addEventListener("hashchange", changed);
@@ -34,7 +36,7 @@ export function useRoute(): Route {
     },
     () => location.hash,
   );
-  return parseRoute(hash);
+  return parseAddress(hash);
 }
 
 function decode(part: string): string {

@@ -1,0 +1,189 @@
+import { Button, Loader, Text } from "@mantine/core";
+import { useMemo, useState } from "react";
+
+import type { Assets, Edit } from "../api/types";
+import type { PackedDrawing } from "../map/drawing";
+import { count } from "../ui/words";
+import { ActorStep } from "./ActorStep";
+import { useStarter } from "./asked";
+import { profilesOf } from "./DayProfiles";
+import { bringsTraffic, trafficNote } from "./demand";
+import { EnvironmentStep } from "./EnvironmentStep";
+import { MapStep, RegionStep } from "./MapSteps";
+import { actorNote, weatherNote } from "./notes";
+import { RunStep } from "./RunStep";
+import { Steps } from "./Steps";
+import type { EditorStore } from "./store";
+import { TrafficStep } from "./TrafficStep";
+import type { EditorNow } from "./useEditing";
+
+/** The steps, each with its forms. */
+export function EditorSteps({
+  store,
+  now,
+  drawing,
+  assets,
+}: {
+  store: EditorStore;
+  now: EditorNow;
+  drawing: PackedDrawing;
+  assets: Assets | null;
+}) {
+  const {
+    scenario: { name, version },
+    document,
+    problems,
+    graph,
+    region,
+    ones,
+    one,
+    selection,
+    changes,
+    sights,
+    openStep,
+  } = now;
+  const { roi, demand, environment, map } = document;
+  const run = useStarter(name);
+  const [filling, setFilling] = useState(false);
+  const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
+  const selected = useMemo(() => {
+    const chosen = new Set(selection);
+    return ones.filter(({ id }) => chosen.has(id));
+  }, [ones, selection]);
+  const roads = useMemo(() => {
+    const kinds = new Map(graph.columns.segments.map(({ id, kind }) => [id, kind]));
+    return roi.filter((id) => kinds.get(id) !== "junction");
+  }, [graph, roi]);
+  const errors = problems.filter(({ severity }) => severity === "error").length;
+  const lights = drawing.symbols.some(([kind]) => kind.includes("light"));
+
+  const addNeighbours = (): void =>
+    changes.change(
+      region.candidates.map((segment): Edit => ({ kind: "grow_roi", segment })),
+      `Add ${count(region.candidates.length, "segment")}`,
+    );
+  const fill = async (share: number, seed: number): Promise<void> => {
+    setFilling(true);
+    if (await changes.fill(share, seed).finally(() => setFilling(false))) now.select([]);
+  };
+  return (
+    <Steps
+      open={now.step}
+      onOpen={openStep}
+      steps={{
+        map: {
+          title: "Map",
+          done: true,
+          note: map.name,
+          body: <MapStep name={map.name} onShow={() => sights.bounds(drawing.bounds)} />,
+        },
+        region: {
+          title: "Region",
+          done: roi.length > 0,
+          note: roi.length ? count(roi.length, "segment") : "Where does it happen?",
+          body: (
+            <RegionStep
+              segments={roi.length}
+              region={region}
+              onNext={() => openStep("environment")}
+              onAll={addNeighbours}
+              onShow={() => sights.segments(roi)}
+              onBegin={sights.pickMiddle}
+            />
+          ),
+        },
+        environment: {
+          title: "Weather and time",
+          done: roi.length > 0,
+          note: weatherNote(assets, environment.preset),
+          body: assets ? (
+            <>
+              <EnvironmentStep assets={assets} document={document} onEdit={changes.change} />
+              <Button onClick={() => openStep("actors")}>Next: road users</Button>
+            </>
+          ) : (
+            <Loader size="sm" aria-label="Loading the weather" />
+          ),
+        },
+        actors: {
+          title: "Road users",
+          done: ones.length > 0,
+          note: actorNote(document),
+          body:
+            roi.length === 0 ? (
+              <>
+                <Text size="sm">Road users start inside the region. Choose the region first.</Text>
+                <Button onClick={() => openStep("region")}>Choose the region</Button>
+              </>
+            ) : (
+              <>
+                <ActorStep
+                  assets={assets}
+                  graph={graph}
+                  starts={now.starts}
+                  selected={selected}
+                  tool={now.tool}
+                  goals={now.goals}
+                  actors={document.actors.length}
+                  profiles={profiles}
+                  filling={filling}
+                  onTool={now.arm}
+                  onPlaceSomewhere={now.placeSomewhere}
+                  onEdit={changes.change}
+                  onStart={changes.setStart}
+                  onGoal={changes.setGoal}
+                  onRemove={() => changes.remove(selection)}
+                  onSelect={now.select}
+                  onShowGoals={() => {
+                    if (one) sights.goals(one, now.goals ?? []);
+                  }}
+                  onFill={(share, seed) => void fill(share, seed)}
+                />
+                {ones.length > 0 && (
+                  <Button variant="default" onClick={() => openStep("traffic")}>
+                    Next: traffic
+                  </Button>
+                )}
+              </>
+            ),
+        },
+        traffic: {
+          title: "Traffic",
+          done: bringsTraffic(demand),
+          note: trafficNote(demand),
+          body: (
+            <>
+              <TrafficStep
+                store={store}
+                document={document}
+                roads={roads}
+                profiles={profiles}
+                onEdit={changes.change}
+                onShow={sights.segments}
+              />
+              <Button onClick={() => openStep("run")}>Next: run</Button>
+            </>
+          ),
+        },
+        run: {
+          title: "Run",
+          done: false,
+          note: errors ? `${count(errors, "problem")} to solve first` : "Watch it live",
+          body: (
+            <RunStep
+              name={name}
+              version={version}
+              document={document}
+              lights={lights}
+              blocked={errors > 0}
+              busy={run.busy}
+              empty={ones.length === 0 && !bringsTraffic(demand)}
+              onEdit={changes.change}
+              onRun={run.start}
+            />
+          ),
+        },
+      }}
+    />
+  );
+}

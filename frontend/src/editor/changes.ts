@@ -1,0 +1,106 @@
+import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
+import type { Place } from "../map/graph";
+import { count } from "../ui/words";
+import { isFlow, type Moves, type Starts } from "./placing";
+
+/** Volume of a new flow. */
+const PER_HOUR = 300;
+
+export interface Changes {
+  change: (edit: Edit | readonly Edit[], label?: string) => void;
+  place: (category: Category, to: Place) => void;
+  placeFlow: (walks: boolean, to: Place) => void;
+  /** Copies road users so that the first starts at `to`; the others keep their distances. */
+  copy: (ids: readonly string[], to: Place) => void;
+  move: (ids: readonly string[], to: Place) => void;
+  remove: (ids: readonly string[]) => void;
+  setStart: (one: Actor | Flow, spawn: string) => void;
+  setGoal: (one: Actor | Flow, goal: string | null) => void;
+  /** Random road users in the place of all; whether they were placed. */
+  fill: (share: number, seed: number) => Promise<boolean>;
+}
+
+/** What can be done to road users and flows, as edits that the server is asked for. */
+export function changesOf({
+  ones,
+  starts,
+  edit,
+  say,
+}: {
+  ones: readonly (Actor | Flow)[];
+  starts: Starts;
+  edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
+  say: (text: string) => void;
+}): Changes {
+  const change = (asked: Edit | readonly Edit[], label?: string): void => {
+    void edit(asked, label);
+  };
+  const among = (ids: readonly string[]): (Actor | Flow)[] => {
+    const known = new Map(ones.map((one) => [one.id, one]));
+    // In the order of the ids: the first leads.
+    return ids.flatMap((id) => known.get(id) ?? []);
+  };
+  const shifted = (moved: readonly (Actor | Flow)[], to: Place): Moves => {
+    const moves = starts.shifted(moved, to);
+    const left = moved.length - moves.length;
+    if (left > 0)
+      say(
+        `${count(left, "road user")} found no free point there and ${left === 1 ? "was" : "were"} left out.`,
+      );
+    return moves;
+  };
+  return {
+    change,
+    place: (category, to) => change({ kind: "add_actor", category, spawn: to.id }),
+    placeFlow: (walks, to) =>
+      change({
+        kind: "add_flow",
+        spawn: to.id,
+        per_hour: PER_HOUR,
+        mix: walks ? { pedestrian: 1 } : { car: 1 },
+      }),
+    copy: (ids, to) => {
+      const copied = among(ids);
+      const moves = shifted(copied, to);
+      if (moves.length === 0) return;
+      const copies = Object.fromEntries(moves.map(([id, spawn]) => [spawn, id]));
+      change({ kind: "copy_actors", copies }, labelOf("Copy", copied, moves.length));
+    },
+    move: (ids, to) => {
+      const moved = among(ids);
+      const moves = shifted(moved, to);
+      if (moves.length === 0) return;
+      const spawns = new Map(moves);
+      const edits = moved.flatMap((one) => {
+        const spawn = spawns.get(one.id);
+        return spawn ? [startOf(one, spawn)] : [];
+      });
+      change(edits, labelOf("Move", moved, moves.length));
+    },
+    remove: (ids) => {
+      const gone = among(ids);
+      const actors = gone.filter((one) => !isFlow(one)).map((one) => one.id);
+      const edits: Edit[] = gone.filter(isFlow).map((one) => ({ kind: "remove_flow", flow: one.id }));
+      if (actors.length > 0) edits.unshift({ kind: "remove_actors", actors });
+      if (edits.length > 0) change(edits, labelOf("Remove", gone, gone.length));
+    },
+    setStart: (one, spawn) => change(startOf(one, spawn)),
+    setGoal: (one, goal) =>
+      change(
+        isFlow(one) ? { kind: "change_flow", flow: one.id, goal } : { kind: "set_goal", actor: one.id, goal },
+      ),
+    fill: async (share, seed) => {
+      const done = await edit({ kind: "fill_roi", share, seed });
+      if (done)
+        say(`${count(done.document.actors.length, "road user")} placed. Undo restores the previous ones.`);
+      return done !== null;
+    },
+  };
+}
+
+const startOf = (one: Actor | Flow, spawn: string): Edit =>
+  isFlow(one) ? { kind: "change_flow", flow: one.id, spawn } : { kind: "move_actor", actor: one.id, spawn };
+
+/** What undo says of it: one by its name, several by their number. */
+const labelOf = (verb: string, ones: readonly (Actor | Flow)[], number: number): string =>
+  ones.length === 1 ? `${verb} ${ones[0]?.id}` : `${verb} ${number} road users`;

@@ -1,0 +1,98 @@
+import type { Actor, Bounds, Category, Flow } from "../../api/types";
+import type { Graph, Place } from "../../map/graph";
+import type { Pointed } from "../../map/MapCanvas";
+import type { Picker } from "../../map/picking";
+import type { SceneActor, SceneFlow } from "../../map/scene";
+import type { Region } from "../asked";
+import type { Changes } from "../changes";
+import type { Starts } from "../placing";
+import type { Step } from "../scene";
+
+/** What lies under the pointer, as far as the handler in charge cares. */
+export type Hover = { is: "place"; place: Place } | { is: "segment"; row: number };
+
+/** What the pointer does on the map now: one for each step of the editor and for each tool. */
+export interface Handler {
+  /** Whether a click chooses something, so that the pointer is a cross. */
+  readonly aim: boolean;
+  /** Whether points for pedestrians or for vehicles matter; null is both. */
+  readonly walks: boolean | null;
+  /** The kind that is shown at the pointer. */
+  readonly badge: Category | null;
+  under(at: Pointed): Hover | null;
+  /** What to do next, or what lies under the pointer. */
+  hint(hover: Hover | null): string | null;
+  pick(at: Pointed): void;
+  /** Takes what is here along until it is dropped; null if the drag moves the map. */
+  grab(at: Pointed): Carrier | null;
+  /** A rectangle was drawn. */
+  frame(bounds: Bounds): void;
+}
+
+/** Takes something along while the button is held down. */
+export interface Carrier {
+  under(at: Pointed): Hover | null;
+  drop(at: Pointed): void;
+}
+
+/** A handler that uses up starts of the region, on the map or without it. */
+export interface ToolHandler extends Handler {
+  /** Uses the next free start, for those who do not point. */
+  somewhere(): void;
+}
+
+/** Something to be taken into the hand; its handler says what it does on the map. */
+export interface Tool {
+  /** The same for two tools that do the same. */
+  readonly key: string;
+  /** What is said beside the map. */
+  readonly help: string;
+  /** Whether it makes something new, so that nothing stays selected when it is taken. */
+  readonly makes: boolean;
+  handler(editing: Editing): ToolHandler;
+}
+
+/** What handlers know of the editor, and what they may ask of it. */
+export interface Editing {
+  graph: Graph;
+  picker: Picker;
+  roi: readonly string[];
+  region: Region;
+  /** Every road user and flow, and those of them that are drawn. */
+  ones: readonly (Actor | Flow)[];
+  actors: readonly SceneActor[];
+  flows: readonly SceneFlow[];
+  starts: Starts;
+  selection: readonly string[];
+  /** The only one that is selected, and where it can go; null until that is known. */
+  one: Actor | Flow | null;
+  goals: readonly Place[] | null;
+  changes: Changes;
+  select: (ids: readonly string[]) => void;
+  openStep: (step: Step) => void;
+  /** Opens the step of the road users; the map stays where it is. */
+  openActors: () => void;
+  /** Puts the tool back. */
+  done: () => void;
+  say: (text: string) => void;
+}
+
+/** A handler to which the map is only to be looked at; others differ from it where they do something. */
+export const LOOKING: Handler = {
+  aim: false,
+  walks: null,
+  badge: null,
+  under: () => null,
+  hint: () => null,
+  pick: () => undefined,
+  grab: () => null,
+  frame: () => undefined,
+};
+
+/** Whether the one with this id is on foot. */
+export function onFoot({ graph, ones }: Pick<Editing, "graph" | "ones">, id: string | undefined): boolean {
+  const spawn = ones.find((one) => one.id === id)?.spawn;
+  return spawn !== undefined && graph.place(spawn)?.walk === true;
+}
+
+export const placeHover = (place: Place | null): Hover | null => place && { is: "place", place };

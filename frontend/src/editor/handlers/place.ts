@@ -1,0 +1,24 @@
+import type { Category } from "../../api/types";
+import { CATEGORY_WORD } from "../../ui/words";
+import type { Tool } from "./handler";
+import { startHelp, startingHandler, startPrompt } from "./starting";
+
+/** Places one road user of a kind with each click. */
+export function placeTool(category: Category): Tool {
+  const walks = category === "pedestrian";
+  const who = CATEGORY_WORD[category].toLowerCase();
+  return {
+    key: `place ${category}`,
+    help: startHelp(who, walks),
+    makes: true,
+    handler: (editing) =>
+      startingHandler(editing, {
+        walks,
+        badge: category,
+        who,
+        prompt: startPrompt(who, walks),
+        setsGoals: true,
+        apply: (to) => editing.changes.place(category, to),
+      }),
+  };
+}

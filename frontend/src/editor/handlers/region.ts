@@ -1,0 +1,22 @@
+import { type Editing, type Handler, LOOKING } from "./handler";
+import { segmentAt, segmentHover } from "./segments";
+
+/** Lets the region of interest grow and shrink, segment by segment. */
+export const regionHandler = ({ graph, picker, roi, region, changes }: Editing): Handler => ({
+  ...LOOKING,
+  aim: true,
+  under: (at) => segmentHover(picker, at),
+  hint: (hover) => {
+    const segment = hover?.is === "segment" ? graph.segmentId(hover.row) : null;
+    if (segment !== null && region.inside.includes(segment) && !region.removable.includes(segment)) {
+      return "This segment holds the region together and cannot be removed";
+    }
+    return roi.length === 0 ? "Click a road or junction to begin the region" : null;
+  },
+  pick: (at) => {
+    const row = segmentAt(picker, at);
+    if (row === null) return;
+    const segment = graph.segmentId(row);
+    changes.change({ kind: roi.includes(segment) ? "shrink_roi" : "grow_roi", segment });
+  },
+});

@@ -1,0 +1,53 @@
+import type { Bounds } from "../../api/types";
+import type { Place } from "../../map/graph";
+import type { Pointed } from "../../map/MapCanvas";
+import { inFrame, nearestOne } from "../scene";
+import { carrier } from "./carry";
+import { type Editing, type Handler, LOOKING, onFoot } from "./handler";
+
+/** Without a tool: a click selects or sets the goal, a drag takes road users along or draws a frame. */
+export const selectHandler = (editing: Editing): Handler => ({
+  ...LOOKING,
+  walks: editing.one ? onFoot(editing, editing.one.id) : null,
+  pick: (at) => {
+    editing.openActors();
+    const goal = goalAt(editing, at);
+    if (goal) goal.set();
+    else choose(editing, oneAt(editing, at), at.shift);
+  },
+  grab: (at) => {
+    const id = oneAt(editing, at);
+    return id === null ? null : carrier(editing, id);
+  },
+  frame: (bounds) => selectFrame(editing, bounds),
+});
+
+/** Selects all in a rectangle, whatever is in the hand. */
+export function selectFrame({ actors, flows, select, openActors }: Editing, bounds: Bounds): void {
+  openActors();
+  select(inFrame([...actors, ...flows], bounds));
+}
+
+/** Whose body or arrow is pointed at. */
+export function oneAt({ actors, flows }: Editing, { x, y, reach }: Pointed): string | null {
+  return (nearestOne(actors, x, y, reach) ?? nearestOne(flows, x, y, reach))?.id ?? null;
+}
+
+/** The goal that is pointed at, of the one that is selected. */
+export function goalAt(editing: Editing, at: Pointed): { place: Place; set: () => void } | null {
+  const { one, goals, changes } = editing;
+  const place = one && oneAt(editing, at) === null ? nearestOne(goals ?? [], at.x, at.y, at.reach) : null;
+  return one && place && { place, set: () => changes.setGoal(one, place.id) };
+}
+
+/** Selects one, or adds it to the selection, or takes it out again; null is nothing under the pointer. */
+export function choose(
+  { selection, select }: Pick<Editing, "selection" | "select">,
+  id: string | null,
+  more: boolean,
+): void {
+  if (id === null) {
+    if (!more) select([]);
+  } else if (!more) select([id]);
+  else select(selection.includes(id) ? selection.filter((other) => other !== id) : [...selection, id]);
+}

@@ -1,0 +1,69 @@
+import type { Category } from "../../api/types";
+import type { Place } from "../../map/graph";
+import { laneWord } from "../placeWords";
+import { type Editing, type Hover, LOOKING, placeHover, type ToolHandler } from "./handler";
+import { choose, goalAt, oneAt, selectFrame } from "./select";
+
+/** What tools differ in that use up starts of the region. */
+interface Starting {
+  walks: boolean;
+  badge: Category | null;
+  /** Who starts there, for messages: `bus`, `flow`. */
+  who: string;
+  /** Said while nothing is under the pointer. */
+  prompt: string;
+  /** Whether a click on a goal still sets the goal of the one that is selected. */
+  setsGoals: boolean;
+  apply: (to: Place) => void;
+}
+
+/** A click on a free start uses it; a click on a road user selects. */
+export function startingHandler(
+  editing: Editing,
+  { walks, badge, who, prompt, setsGoals, apply }: Starting,
+): ToolHandler {
+  const { graph, starts, ones, roi, say, openStep } = editing;
+  return {
+    ...LOOKING,
+    aim: true,
+    walks,
+    badge,
+    under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walks)),
+    hint: (hover) => (hover?.is === "place" ? whereabouts(editing, hover) : prompt),
+    pick: (at) => {
+      const goal = setsGoals ? goalAt(editing, at) : null;
+      const there = oneAt(editing, at);
+      if (goal) goal.set();
+      else if (there !== null) choose(editing, there, at.shift);
+      else {
+        const to = starts.near(at.x, at.y, at.reach, walks);
+        if (to) apply(to);
+        else if (roi.length === 0) openStep("region");
+        else say(starts.reasonAt(at.x, at.y, at.reach, walks, who));
+      }
+    },
+    frame: (bounds) => selectFrame(editing, bounds),
+    somewhere: () => {
+      const to = starts.first(
+        walks,
+        ones.flatMap((one) => graph.place(one.spawn) ?? []),
+      );
+      if (to) apply(to);
+      else say("No free point is left inside the region.");
+    },
+  };
+}
+
+/** Lane and compass heading of a start. */
+function whereabouts({ graph }: Editing, { place }: Extract<Hover, { is: "place" }>): string {
+  const degrees = Math.round((((90 - (place.hdg * 180) / Math.PI) % 360) + 360) % 360);
+  return `${laneWord(graph, place.id)}${place.walk ? "" : `, heading ${degrees}°`}`;
+}
+
+/** What is said beside the map of a tool that makes something new. */
+export const startHelp = (who: string, walks: boolean): string =>
+  `Now click where the ${who} starts: a ${walks ? "yellow" : "blue"} point on the map. Escape stops placing.`;
+
+/** What is said on the map of a tool that makes something new. */
+export const startPrompt = (who: string, walks: boolean): string =>
+  `Point at the ${walks ? "edge of a road" : "lane"} where the ${who} starts`;

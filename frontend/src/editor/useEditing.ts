@@ -1,0 +1,123 @@
+import { type RefObject, useMemo, useRef, useState } from "react";
+
+import type { Assets, Problem, ScenarioDocument, ScenarioState } from "../api/types";
+import type { LoadedGraph } from "../map/loaded";
+import type { MapHandle } from "../map/MapCanvas";
+import { tell } from "../ui/notices";
+import { useGoals, useRegion } from "./asked";
+import { changesOf } from "./changes";
+import { handlerFor } from "./handlers";
+import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
+import { everyone } from "./placing";
+import { firstStep, ofProblem, type Step } from "./scene";
+import { type Sights, sightsOf } from "./sights";
+import type { EditorStore } from "./store";
+import { useShown } from "./useShown";
+
+/** The state of the editor: what is open, selected and in the hand, and who is in charge of the map. */
+export interface EditorNow extends Editing {
+  scenario: ScenarioState;
+  document: ScenarioDocument;
+  problems: readonly Problem[];
+  step: Step;
+  tool: Tool | null;
+  /** Takes a tool into the hand, or puts it back. */
+  arm: (tool: Tool | null) => void;
+  /** Uses the tool without the map. */
+  placeSomewhere: () => void;
+  handler: Handler;
+  hover: Hover | null;
+  setHover: (hover: Hover | null) => void;
+  /** Rows of the segments of the region. */
+  inside: ReadonlySet<number>;
+  route: readonly (readonly [number, number])[];
+  showProblem: (problem: Problem) => void;
+  sights: Sights;
+  handle: RefObject<MapHandle | null>;
+}
+
+export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Assets | null): EditorNow {
+  const { graph, picker } = loaded;
+  const { scenario, selection, name, edit, select } = store();
+  if (!scenario) throw new Error("the editor is only shown with a scenario");
+  const { document, problems } = scenario;
+  const [step, setStep] = useState<Step>(() => firstStep(document));
+  const [tool, setTool] = useState<Tool | null>(null);
+  const [hover, setHover] = useState<Hover | null>(null);
+  const handle = useRef<MapHandle | null>(null);
+
+  const roiKey = document.roi.join("\n");
+  const region = useRegion(name, roiKey);
+  const ones = useMemo(() => everyone(document), [document]);
+  const one = useMemo(
+    () => (selection.length === 1 ? (ones.find(({ id }) => id === selection[0]) ?? null) : null),
+    [ones, selection],
+  );
+  const { goals, route } = useGoals(name, one, roiKey, graph);
+  const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
+  const sights = useMemo(() => sightsOf(handle, graph), [graph]);
+  const changes = useMemo(() => changesOf({ ones, starts, edit, say: tell }), [ones, starts, edit]);
+
+  const goTo = (next: Step): void => {
+    if (next !== step) setHover(null);
+    setStep(next);
+  };
+  const arm = (next: Tool | null): void => {
+    setTool(next);
+    setHover(null);
+    if (next) goTo("actors");
+    if (next?.makes) select([]);
+  };
+  const editing: Editing = {
+    graph,
+    picker,
+    roi: document.roi,
+    region,
+    ones,
+    actors,
+    flows,
+    starts,
+    selection,
+    one,
+    goals,
+    changes,
+    select,
+    openStep: (next) => {
+      goTo(next);
+      arm(null);
+      if (next === "actors") sights.segments(document.roi);
+    },
+    openActors: () => goTo("actors"),
+    done: () => arm(null),
+    say: tell,
+  };
+  return {
+    ...editing,
+    scenario,
+    document,
+    problems,
+    step,
+    tool,
+    arm,
+    hover,
+    setHover,
+    inside,
+    route,
+    sights,
+    handle,
+    handler: handlerFor(step, tool, editing),
+    placeSomewhere: () => tool?.handler(editing).somewhere(),
+    showProblem: (problem) => {
+      const about = ofProblem(problem, document);
+      if (about) select([about.id]);
+      goTo(about ? "actors" : (stepOf(problem) ?? step));
+      sights.problem(problem, document);
+    },
+  };
+}
+
+/** Where a problem is solved that is not about one road user. */
+function stepOf({ where }: Problem): Step | null {
+  if (where.startsWith("roi")) return "region";
+  return where.startsWith("demand") ? "traffic" : null;
+}

@@ -1,0 +1,293 @@
+import { expect, test } from "vitest";
+
+import type { Actor, Edit, Flow, ScenarioDocument } from "../../src/api/types";
+import { changesOf } from "../../src/editor/changes";
+import { handlerFor } from "../../src/editor/handlers";
+import { copyTool } from "../../src/editor/handlers/copy";
+import { flowTool } from "../../src/editor/handlers/flow";
+import type { Editing, Tool } from "../../src/editor/handlers/handler";
+import { moveTool } from "../../src/editor/handlers/move";
+import { placeTool } from "../../src/editor/handlers/place";
+import { everyone, Starts } from "../../src/editor/placing";
+import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor/scene";
+import type { Pointed } from "../../src/map/MapCanvas";
+import { Picker } from "../../src/map/picking";
+import { actor, flow, graph, place, scenario } from "../example";
+
+/** Everything that a handler has asked of the editor. */
+class Log {
+  edits: (Edit | readonly Edit[])[] = [];
+  labels: (string | undefined)[] = [];
+  said: string[] = [];
+  steps: Step[] = [];
+  selected: (readonly string[])[] = [];
+  done = 0;
+}
+
+const picker = new Picker(graph);
+
+function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = {}): Editing {
+  const ones = everyone(document);
+  const starts = new Starts(graph, picker, insideRows(graph, document.roi), document);
+  const none = new Set<string>();
+  return {
+    graph,
+    picker,
+    roi: document.roi,
+    ones,
+    starts,
+    region: { inside: document.roi, candidates: [], removable: document.roi, current: true },
+    actors: sceneActors(graph, document, null, none, none),
+    flows: sceneFlows(graph, document, none, none),
+    selection: [],
+    one: null,
+    goals: null,
+    changes: changesOf({
+      ones,
+      starts,
+      say: (text) => log.said.push(text),
+      edit: (edit, label) => {
+        log.edits.push(edit);
+        log.labels.push(label);
+        return Promise.resolve(null);
+      },
+    }),
+    select: (ids) => log.selected.push(ids),
+    openStep: (step) => log.steps.push(step),
+    openActors: () => log.steps.push("actors"),
+    done: () => {
+      log.done += 1;
+    },
+    say: (text) => log.said.push(text),
+    ...more,
+  };
+}
+
+const at = (x: number, y: number, shift = false): Pointed => ({ x, y, reach: 0.5, shift });
+/** Centred on its lane, so that it is found where its start is. */
+const car = (id: string, spawn: string): Actor => ({ ...actor(id, spawn), lateral_offset: 0 });
+const [FIRST, SECOND] = ["1.0.-1.0", "1.0.-1.1"];
+
+function using(
+  tool: Tool | null,
+  document: ScenarioDocument,
+  more: Partial<Editing> = {},
+  step: Step = "actors",
+) {
+  const log = new Log();
+  return { log, handler: handlerFor(step, tool, editing(document, log, more)) };
+}
+
+test("in the step of the region a click adds a segment, or takes out one of the region", () => {
+  const { log, handler } = using(null, scenario([], ["a"]), {}, "region");
+  handler.pick(at(2, 0));
+  handler.pick(at(0, 0));
+  handler.pick(at(900, 900));
+  expect(log.edits).toEqual([
+    { kind: "grow_roi", segment: "b" },
+    { kind: "shrink_roi", segment: "a" },
+  ]);
+  expect(handler.aim).toBe(true);
+});
+
+test("a segment that holds the region together says so before it is clicked", () => {
+  const { handler } = using(
+    null,
+    scenario([], ["a", "b", "c"]),
+    {
+      region: { inside: ["a", "b", "c"], candidates: [], removable: ["a", "c"], current: true },
+    },
+    "region",
+  );
+  expect(handler.hint(handler.under(at(2, 0)))).toContain("holds the region together");
+  expect(handler.hint(handler.under(at(4, 0)))).toBeNull();
+});
+
+test("with no region yet the map says how to begin it", () => {
+  const { handler } = using(null, scenario([], []), {}, "region");
+  expect(handler.hint(null)).toBe("Click a road or junction to begin the region");
+});
+
+test("in the step of the traffic the map shows ids for tables and a click changes nothing", () => {
+  const { log, handler } = using(null, scenario([]), {}, "traffic");
+  expect(handler.hint(handler.under(at(2, 0)))).toBe("Id for tables: b");
+  expect(handler.hint(null)).toBeNull();
+  handler.pick(at(2, 0));
+  expect(log).toEqual(new Log());
+});
+
+test("a kind is placed on the nearest free start", () => {
+  const { log, handler } = using(placeTool("bus"), scenario([car("a", FIRST)], ["a", "b"]));
+  handler.pick(at(2, 1));
+  expect(log.edits).toEqual([{ kind: "add_actor", category: "bus", spawn: SECOND }]);
+  expect(handler).toMatchObject({ walks: false, badge: "bus", aim: true });
+});
+
+test("pedestrians are placed on walkways, vehicles on lanes", () => {
+  const { log, handler } = using(placeTool("pedestrian"), scenario([]));
+  handler.pick(at(0, 8.5));
+  expect(log.edits).toEqual([{ kind: "add_actor", category: "pedestrian", spawn: "ped.1.0.3.0" }]);
+  expect(handler.walks).toBe(true);
+});
+
+test("lane and compass heading of the start are said before the click", () => {
+  const { handler } = using(placeTool("car"), scenario([]));
+  expect(handler.hint(null)).toBe("Point at the lane where the car starts");
+  expect(handler.hint(handler.under(at(0, 0)))).toBe("Road 1, right lane 1, heading 90°");
+});
+
+test("a click where nothing can start says why, and without a region leads to it", () => {
+  const outside = using(placeTool("car"), scenario([], ["c"]));
+  outside.handler.pick(at(0, 0));
+  expect(outside.log.said).toEqual(["No car may start here: the grey points cannot be used."]);
+  const without = using(placeTool("car"), scenario([], []));
+  without.handler.pick(at(0, 0));
+  expect(without.log.steps).toEqual(["region"]);
+  expect(without.log.edits).toEqual([]);
+});
+
+test("with a tool in the hand road users can still be selected and goals be set", () => {
+  const one = car("a", FIRST);
+  const more = { selection: ["a"], one, goals: [place(SECOND)] };
+  const placing = using(placeTool("car"), scenario([one], ["a", "b"]), more);
+  placing.handler.pick(at(0, 0));
+  expect(placing.log.selected).toEqual([["a"]]);
+  placing.handler.pick(at(2.1, 0));
+  expect(placing.log.edits).toEqual([{ kind: "set_goal", actor: "a", goal: SECOND }]);
+});
+
+test("a tool is used on the next free start by those who do not point", () => {
+  const log = new Log();
+  placeTool("car")
+    .handler(editing(scenario([car("a", FIRST)], ["a", "b"]), log))
+    .somewhere();
+  expect(log.edits).toEqual([{ kind: "add_actor", category: "car", spawn: SECOND }]);
+  const full = new Log();
+  placeTool("car")
+    .handler(editing(scenario([car("a", FIRST)], ["a"]), full))
+    .somewhere();
+  expect(full.said).toEqual(["No free point is left inside the region."]);
+});
+
+test("a flow has vehicles or pedestrians by where it starts", () => {
+  const vehicles = using(flowTool(false), scenario([]));
+  vehicles.handler.pick(at(0, 0));
+  const pedestrians = using(flowTool(true), scenario([]));
+  pedestrians.handler.pick(at(0, 9));
+  expect([...vehicles.log.edits, ...pedestrians.log.edits]).toEqual([
+    { kind: "add_flow", spawn: FIRST, per_hour: 300, mix: { car: 1 } },
+    { kind: "add_flow", spawn: "ped.1.0.3.0", per_hour: 300, mix: { pedestrian: 1 } },
+  ]);
+  expect(pedestrians.handler.hint(null)).toBe("Point at the edge of a road where the pedestrian flow starts");
+});
+
+test("a copy is made once and does not take goals for places", () => {
+  const one = car("a", FIRST);
+  const { log, handler } = using(copyTool(["a"]), scenario([one], ["a", "b"]), {
+    one,
+    goals: [place(SECOND)],
+  });
+  handler.pick(at(2.1, 0));
+  expect(log.edits).toEqual([{ kind: "copy_actors", copies: { [SECOND]: "a" } }]);
+  expect(log).toMatchObject({ labels: ["Copy a"], done: 1 });
+});
+
+test("of several that are moved those that find no free start are left out, and it is said", () => {
+  const flows = [flow("f", "ped.1.0.3.0")];
+  const free = using(moveTool(["a", "f"]), scenario([car("a", FIRST)], ["a", "b"], flows));
+  free.handler.pick(at(2.1, 0));
+  const [a, f] = [
+    { kind: "move_actor", actor: "a", spawn: SECOND },
+    { kind: "change_flow", flow: "f", spawn: "ped.1.0.3.1" },
+  ];
+  expect(free.log).toMatchObject({ edits: [[a, f]], labels: ["Move 2 road users"], done: 1 });
+  const full = using(
+    moveTool(["a", "f"]),
+    scenario([car("a", FIRST), car("q", "ped.1.0.3.1")], ["a", "b"], flows),
+  );
+  full.handler.pick(at(2.1, 0));
+  expect(full.log).toMatchObject({
+    edits: [[a]],
+    said: ["1 road user found no free point there and was left out."],
+  });
+});
+
+test("without a tool a click selects, with Shift it adds and takes out, and on the empty map it clears", () => {
+  const document = scenario([car("a", FIRST), car("b", SECOND)]);
+  const { log, handler } = using(null, document, { selection: ["a"] });
+  handler.pick(at(2, 0));
+  handler.pick(at(2, 0, true));
+  handler.pick(at(0, 0, true));
+  handler.pick(at(50, 50, true));
+  handler.pick(at(50, 50));
+  expect(log.selected).toEqual([["b"], ["a", "b"], [], []]);
+});
+
+test("a click opens the step of the road users, whatever was open", () => {
+  for (const step of ["map", "environment", "run"] as const) {
+    const { log, handler } = using(null, scenario([]), {}, step);
+    handler.pick(at(50, 50));
+    expect(log.steps).toEqual(["actors"]);
+  }
+});
+
+test("a goal of the selected one is set by a click on it", () => {
+  const source: Flow = flow("f", FIRST);
+  const { log, handler } = using(null, scenario([], ["a"], [source]), {
+    one: source,
+    goals: [place(SECOND)],
+  });
+  handler.pick(at(2.2, 0));
+  expect(log.edits).toEqual([{ kind: "change_flow", flow: "f", goal: SECOND }]);
+});
+
+test("a rectangle selects all road users and flows in it", () => {
+  const { log, handler } = using(null, scenario([car("a", FIRST)], ["a"], [flow("f", SECOND)]));
+  handler.frame([-1, -1, 3, 1]);
+  handler.frame([1, -1, 3, 1]);
+  expect(log.selected).toEqual([["a", "f"], ["f"]]);
+});
+
+test("a drag takes a road user to a free start, and those that are selected with it", () => {
+  const document = scenario([car("a", FIRST), car("p", "ped.1.0.3.0")], ["a", "b"]);
+  const { log, handler } = using(null, document, { selection: ["a", "p"] });
+  expect(handler.grab(at(50, 50))).toBeNull();
+  const carried = handler.grab(at(0, 9));
+  expect(carried?.under(at(2, 9))).toEqual({ is: "place", place: place("ped.1.0.3.1") });
+  carried?.drop(at(2, 9));
+  // The one that was dragged leads: the other keeps its distance to it.
+  expect(log.edits).toEqual([
+    [
+      { kind: "move_actor", actor: "p", spawn: "ped.1.0.3.1" },
+      { kind: "move_actor", actor: "a", spawn: SECOND },
+    ],
+  ]);
+});
+
+test("a road user that is dropped where none can start stays, and the reason is said", () => {
+  const { log, handler } = using(null, scenario([car("a", FIRST)]));
+  handler.grab(at(0, 0))?.drop(at(900, 900));
+  expect(log.edits).toEqual([]);
+  expect(log.said).toHaveLength(1);
+});
+
+test("with a tool in the hand, and where segments are pointed at, a drag moves the map", () => {
+  const document = scenario([car("a", FIRST)]);
+  expect(using(placeTool("car"), document).handler.grab(at(0, 0))).toBeNull();
+  expect(using(null, document, {}, "region").handler.grab(at(0, 0))).toBeNull();
+  expect(using(null, document, {}, "traffic").handler.grab(at(0, 0))).toBeNull();
+});
+
+test("the same tool is known again, and only one that makes something new clears the selection", () => {
+  expect(placeTool("car").key).toBe(placeTool("car").key);
+  const tools = [
+    placeTool("car"),
+    placeTool("bus"),
+    flowTool(false),
+    flowTool(true),
+    copyTool(["a"]),
+    moveTool(["a"]),
+  ];
+  expect(new Set(tools.map(({ key }) => key)).size).toBe(tools.length);
+  expect(tools.map(({ makes }) => makes)).toEqual([true, true, true, true, false, false]);
+});

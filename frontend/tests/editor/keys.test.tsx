@@ -1,0 +1,47 @@
+// @vitest-environment happy-dom
+import { renderHook } from "@testing-library/react";
+import userEvent from "@testing-library/user-event";
+import { afterEach, expect, test, vi } from "vitest";
+
+import { type KeyActions, useKeys } from "../../src/editor/keys";
+
+afterEach(() => {
+  document.body.replaceChildren();
+});
+
+function listening() {
+  const actions = {
+    undo: vi.fn(),
+    redo: vi.fn(),
+    remove: vi.fn(),
+    escape: vi.fn(),
+    sheet: vi.fn(),
+    copy: vi.fn(),
+    move: vi.fn(),
+    selectAll: vi.fn(),
+    tool: vi.fn(),
+  } satisfies KeyActions;
+  const { unmount } = renderHook(() => useKeys(actions));
+  return { actions, unmount, user: userEvent.setup() };
+}
+
+test("shortcuts do what the help says", async () => {
+  const { actions, user, unmount } = listening();
+  await user.keyboard("{Control>}zyac{/Control}{Delete}{Escape}?m19");
+  for (const name of ["undo", "redo", "selectAll", "copy", "remove", "escape", "sheet", "move"] as const) {
+    expect(actions[name], name).toHaveBeenCalledOnce();
+  }
+  expect(actions.tool.mock.calls).toEqual([[0], [8]]);
+  unmount();
+});
+
+test("keys that are typed into a field, or into a dialog, are left to it", async () => {
+  const { actions, user, unmount } = listening();
+  document.body.innerHTML = "<input><div role=dialog aria-modal=true><button>x</button></div>";
+  document.querySelector("input")?.focus();
+  await user.keyboard("1m{Delete}");
+  document.querySelector("button")?.focus();
+  await user.keyboard("{Escape}");
+  for (const act of Object.values(actions)) expect(act).not.toHaveBeenCalled();
+  unmount();
+});
