@@ -14,6 +14,7 @@ from pathlib import Path
 
 from bench.common import shared_maps
 from odscen.app.maps import LoadedMap, load_map
+from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.scenario_document import (
@@ -23,7 +24,6 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
-from odscen.scenario.edits import scenario_edits
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import CountFits, planned_fit
 from odscen.sumo.realize.passages import planned_passages
@@ -64,7 +64,7 @@ def main() -> None:
 
 def known_demand(loaded: LoadedMap) -> Scenario:
     graph = loaded.sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name="known", roi=graph.segments.ids, seed=1)
+    scenario = edits.new_scenario(graph, name="known", roi=graph.segments.ids, seed=1)
     trips = Background.model_validate({"id": "known", "trips": PER_HOUR * HOURS, "mix": MIX})
     return scenario.model_copy(
         update={

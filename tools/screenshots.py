@@ -16,9 +16,9 @@ from playwright.sync_api import Browser, expect
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate, write_scenario
+from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import transitions
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.edits import demand_edits, scenario_edits
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
@@ -73,10 +73,10 @@ def main() -> None:
 def _counted(workspace: Workspace) -> None:
     """Save a scenario with background traffic and counts, some of which contradict each other."""
     graph = load_map(workspace.map(MAP)).sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
-    scenario = demand_edits.set_clock(scenario, clock=7.5 * 3600)
+    scenario = edits.new_scenario(graph, name=COUNTED, roi=graph.segments.ids)
+    scenario = edits.set_clock(scenario, clock=7.5 * 3600)
     mix = {"car": 8, "van": 1, "bicycle": 1}
-    scenario = demand_edits.set_background(
+    scenario = edits.set_background(
         scenario, graph, background="others", per_km=2, profile="weekday", mix=mix
     )
     streams = sorted(
@@ -86,16 +86,16 @@ def _counted(workspace: Workspace) -> None:
         if one.startswith("r")
     )[::3]
     rows = [(f"{one}>{other}", 0, 600, 5 + 7 * n % 30) for n, (one, other) in enumerate(streams)]
-    scenario = demand_edits.set_counts(scenario, graph, counts="survey", rows=rows)
+    scenario = edits.set_counts(scenario, graph, counts="survey", rows=rows)
     _save(workspace, COUNTED, scenario)
 
 
 def _long(workspace: Workspace) -> None:
     """Save a scenario of hours."""
     graph = load_map(workspace.map(SMALL)).sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
-    scenario = scenario_edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
-    scenario = demand_edits.set_background(scenario, graph, background="others", trips=1200)
+    scenario = edits.new_scenario(graph, name=LONG, roi=graph.segments.ids)
+    scenario = edits.set_simulation(scenario, duration=4 * 3600, step_length=1.0)
+    scenario = edits.set_background(scenario, graph, background="others", trips=1200)
     _save(workspace, LONG, scenario)
 
 

@@ -10,8 +10,8 @@ from playwright.sync_api import Locator, expect
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
+from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps
-from odscen.scenario.edits import demand_edits, scenario_edits
 from odscen.workspace.store import Workspace
 from tests.browser.conftest import CROSSING
 from tests.browser.pages import OdscenPage
@@ -26,7 +26,7 @@ def crossing(served: Served, request: pytest.FixtureRequest) -> str:
     workspace = Workspace.open(served.workspace)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
     name = request.node.name.replace("_", "-")[:40]
-    scenario = scenario_edits.new_scenario(graph, name=name, roi=graph.segments.ids)
+    scenario = edits.new_scenario(graph, name=name, roi=graph.segments.ids)
     _write(workspace, name, scenario)
     return name
 
@@ -135,11 +135,9 @@ def test_a_flow_can_have_a_day_profile(user: OdscenPage, crossing: str, served: 
     workspace = Workspace.open(served.workspace)
     loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
-    spawn = (
-        scenario_edits.fill_roi(scenario, graph, loaded.usable, share=0.2, seed=1).actors[0].spawn
-    )
-    _write(workspace, crossing, scenario_edits.add_flow(scenario, graph, spawn=spawn, per_hour=200))
+    scenario = edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
+    spawn = edits.fill_roi(scenario, graph, loaded.usable, share=0.2, seed=1).actors[0].spawn
+    _write(workspace, crossing, edits.add_flow(scenario, graph, spawn=spawn, per_hour=200))
     user.open_editor(crossing)
     user.step("Road users").click()
     user.names.first.click()
@@ -180,12 +178,12 @@ def test_a_long_run_is_forecast_interrupted_and_resumed_to_its_end(
 ) -> None:
     workspace = Workspace.open(served.workspace)
     graph = load_map(workspace.map(CROSSING)).sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
-    scenario = scenario_edits.set_simulation(scenario, duration=2 * HOUR)
+    scenario = edits.new_scenario(graph, name=crossing, roi=graph.segments.ids)
+    scenario = edits.set_simulation(scenario, duration=2 * HOUR)
     _write(
         workspace,
         crossing,
-        demand_edits.set_background(scenario, graph, background="others", trips=500),
+        edits.set_background(scenario, graph, background="others", trips=500),
     )
     user.open_editor(crossing)
     user.step("Run").click()

@@ -14,9 +14,9 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, check_scenario
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
+from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Actor, Flow, Matrix, Part
-from odscen.scenario.edits import demand_edits, scenario_edits
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
@@ -115,12 +115,7 @@ def post_edit(client: TestClient, name: str, version: int, kind: str, /, **argum
 
 
 def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
-    public = {
-        name
-        for module in (scenario_edits, demand_edits)
-        for name, function in inspect.getmembers(module, inspect.isfunction)
-        if not name.startswith("_") and function.__module__ == module.__name__
-    }
+    public = set(edits.__all__)
     kinds = set(EDIT_ENTRIES)
     assert kinds == public - {"new_scenario", "eligible_segments", "removable_segments"}
     assert {kind for kind, _ in ALL} == kinds
@@ -149,14 +144,14 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
 ) -> None:
     loaded = load_map(workspace.map(CROSSING))
     graph = loaded.sumo.graph
-    ours = scenario_edits.new_scenario(graph, name="mine")
+    ours = edits.new_scenario(graph, name="mine")
     state = client.get(f"/api/scenarios/{new}").json()
     for kind, template in ALL:
         arguments = _filled(template, places)
         answer = post_edit(client, new, state["version"], kind, **arguments)
         assert answer.status_code == 200, (kind, answer.text)
         known = {"graph": graph, "lights": loaded.lights, "usable": loaded.usable}
-        function = getattr(scenario_edits, kind, None) or getattr(demand_edits, kind)
+        function = getattr(edits, kind)
         wanted = inspect.signature(function).parameters
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)
         assert answer.json()["version"] == state["version"] + 1
@@ -284,7 +279,7 @@ def test_a_file_that_another_program_changed_is_a_new_version_that_can_be_undone
     client: TestClient, workspace: Workspace, new: str
 ) -> None:
     file = workspace.scenarios / "mine.scenario.json"
-    scenario = scenario_edits.set_seed(loads(file.read_text()), seed=77)
+    scenario = edits.set_seed(loads(file.read_text()), seed=77)
     file.write_text(dumps(scenario))
     state = client.get(f"/api/scenarios/{new}").json()
     assert (state["version"], state["document"]["seed"]) == (2, 77)
@@ -339,7 +334,7 @@ def test_a_way_is_shown_as_it_is_driven_without_a_lane_change_at_its_very_start(
 ) -> None:
     (town,) = (path for path in shipped_maps() if path.stem == "town_5x5")
     graph = load_map(workspace.add_map(town)).sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name="town", roi=graph.segments.ids)
+    scenario = edits.new_scenario(graph, name="town", roi=graph.segments.ids)
     workspace.scenarios.mkdir(exist_ok=True)
     (workspace.scenarios / f"town{SUFFIX}").write_text(dumps(scenario))
     router = Region.of(graph, scenario.roi).router
@@ -379,4 +374,4 @@ def test_goals_ways_and_neighbours_are_those_of_the_graph(
     assert answer.status_code == 404
     roi = client.get(f"/api/scenarios/{sampled}/roi").json()
     assert roi["inside"] == list(scenario.roi)
-    assert roi["candidates"] == list(scenario_edits.eligible_segments(scenario, graph))
+    assert roi["candidates"] == list(edits.eligible_segments(scenario, graph))

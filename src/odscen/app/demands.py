@@ -11,6 +11,7 @@ import polars as pl
 from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.scenario import edits
 from odscen.scenario.demand.day_profiles import DAY
 from odscen.scenario.demand.demand_tables import (
     COLUMNS,
@@ -19,7 +20,6 @@ from odscen.scenario.demand.demand_tables import (
     read_profile,
     read_zones,
 )
-from odscen.scenario.edits import demand_edits, scenario_edits
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
 from odscen.sumo.folder.layout import SCENARIO_FILE
@@ -95,26 +95,24 @@ def import_text(
     if kind == "zones":
         for zone, named in read_zones(text).items():
             with _by_line(scenario, kind, zone, named.lines):
-                scenario = demand_edits.set_zone(scenario, graph, zone=zone, segments=named.values)
+                scenario = edits.set_zone(scenario, graph, zone=zone, segments=named.values)
         return scenario
     if kind == "profile":
         shares = read_profile(text)
         own = name or "profile"
         with _by_line(scenario, kind, own, ()):
-            return demand_edits.set_profile(scenario, graph, profile=own, shares=shares)
+            return edits.set_profile(scenario, graph, profile=own, shares=shares)
     if kind == "counts":
         counted, own = read_counts(text, clock=clock), name or "counts"
         with _by_line(scenario, kind, own, counted.lines):
-            return demand_edits.set_counts(
-                scenario, graph, counts=own, rows=counted.values, **fields
-            )
+            return edits.set_counts(scenario, graph, counts=own, rows=counted.values, **fields)
     slices = read_matrix(text, clock=clock)
     for number, (when, trips) in enumerate(slices.items(), start=1):
         whole = when is None and len(slices) == 1
         own = (name or "trips") + ("" if whole else f"-{number}")
         window = {} if when is None else {"begin": when[0], "end": when[1]}
         with _by_line(scenario, kind, own, trips.lines):
-            scenario = demand_edits.set_matrix(
+            scenario = edits.set_matrix(
                 scenario, graph, matrix=own, trips=trips.values, profile=day, **window, **fields
             )
     return scenario
@@ -125,7 +123,7 @@ def add_background(
 ) -> Scenario:
     """Add background traffic; ``fields`` are those of ``Background``, such as ``per_km``."""
     graph = map_of(workspace, scenario).sumo.graph
-    return demand_edits.set_background(scenario, graph, background=name, **fields)
+    return edits.set_background(scenario, graph, background=name, **fields)
 
 
 def whole_day(
@@ -138,9 +136,7 @@ def whole_day(
 ) -> tuple[Scenario, Load]:
     """Make 24 hours of traffic on a whole map, from midnight on; see :func:`town_day`."""
     loaded = load_map(workspace.map(map_name))
-    scenario = scenario_edits.new_scenario(
-        loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed
-    )
+    scenario = edits.new_scenario(loaded.sumo.graph, name=f"{day} on {map_name}", seed=seed)
     return with_whole_day(loaded, scenario, trips=trips, day=day)
 
 
@@ -160,15 +156,15 @@ def with_whole_day(
         If there is no such day, or no trips are possible.
     """
     graph = loaded.sumo.graph
-    empty = scenario_edits.new_scenario(
+    empty = edits.new_scenario(
         graph, name=scenario.name, roi=graph.segments.ids, seed=scenario.seed
     )
     matrix, load = town_day(empty, loaded.sumo, trips=trips, day=day)
     roi = tuple(dict.fromkeys((*scenario.roi, *empty.roi)))
     scenario = scenario.model_copy(update={"roi": roi})
-    scenario = scenario_edits.set_simulation(scenario, duration=DAY)
-    scenario = demand_edits.set_clock(scenario, clock=0.0)
-    scenario = demand_edits.set_matrix(
+    scenario = edits.set_simulation(scenario, duration=DAY)
+    scenario = edits.set_clock(scenario, clock=0.0)
+    scenario = edits.set_matrix(
         scenario, graph, matrix=day, trips=matrix, profile=day, mix=TOWN_MIX, begin=0.0, end=DAY
     )
     return scenario, load

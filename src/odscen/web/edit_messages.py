@@ -15,9 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hi
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from odscen.scenario.document import scenario_document
-from odscen.scenario.edits import (
-    scenario_edits,  # noqa: F401 - enter their edits
-)
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:

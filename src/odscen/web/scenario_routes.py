@@ -17,7 +17,8 @@ from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.problems import Problem
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.edits.scenario_edits import eligible_segments, new_scenario, removable_segments
+from odscen.scenario.edits import new_scenario
+from odscen.scenario.edits.roi_edits import eligible_segments, removable_segments
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace

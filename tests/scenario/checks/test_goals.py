@@ -3,10 +3,10 @@ import pytest
 
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_index, walk_node_index
+from odscen.scenario import edits
 from odscen.scenario.checks.goals import flow_goals, resolve_goals, with_goals
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.edits import scenario_edits
 from tests.graphs import fork, ring
 
 GRAPH = fork()
@@ -14,9 +14,9 @@ ENDS = {"2.0.-1.29", "3.0.-1.29"}
 
 
 def scenario(*spawns: str, seed: int = 0) -> Scenario:
-    one = scenario_edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"), seed=seed)
+    one = edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"), seed=seed)
     for spawn in spawns:
-        one = scenario_edits.add_actor(one, GRAPH, category="car", spawn=spawn, id="at-" + spawn)
+        one = edits.add_actor(one, GRAPH, category="car", spawn=spawn, id="at-" + spawn)
     return one
 
 
@@ -43,8 +43,8 @@ def test_the_seed_decides() -> None:
 
 
 def test_a_given_goal_is_kept_and_a_pedestrian_walks() -> None:
-    one = scenario_edits.set_goal(scenario("1.0.-1.4"), GRAPH, "at-1.0.-1.4", goal="2.0.-1.29")
-    one = scenario_edits.add_actor(one, GRAPH, category="pedestrian", spawn="ped.1.0.-2.20", id="w")
+    one = edits.set_goal(scenario("1.0.-1.4"), GRAPH, "at-1.0.-1.4", goal="2.0.-1.29")
+    one = edits.add_actor(one, GRAPH, category="pedestrian", spawn="ped.1.0.-2.20", id="w")
     goals = resolve_goals(one, GRAPH)
     assert goals["at-1.0.-1.4"] == node_index(GRAPH, "2.0.-1.29")
     walks = {walk_node_index(GRAPH, name) for name in ("ped.1.0.-2.0", "ped.2.0.-2.29")}
@@ -64,16 +64,16 @@ def test_a_spawn_without_a_goal_is_named() -> None:
 
 def test_a_ring_has_the_farthest_node_as_goal() -> None:
     graph = ring()
-    one = scenario_edits.new_scenario(graph, name="ring", roi=("r1",))
-    one = scenario_edits.add_actor(one, graph, category="car", spawn="1.0.-1.10")
+    one = edits.new_scenario(graph, name="ring", roi=("r1",))
+    one = edits.add_actor(one, graph, category="car", spawn="1.0.-1.10")
     assert resolve_goals(one, graph) == {"car-1": 9}
 
 
 def test_a_flow_has_all_candidates_or_the_goal_given() -> None:
-    one = scenario_edits.add_flow(scenario(), GRAPH, spawn="1.0.-1.0", per_hour=100)
+    one = edits.add_flow(scenario(), GRAPH, spawn="1.0.-1.0", per_hour=100)
     both = flow_goals(one, GRAPH)["flow-1"]
     assert both.tolist() == sorted(node_index(GRAPH, name) for name in ENDS)
-    given = scenario_edits.change_flow(one, GRAPH, "flow-1", goal="3.0.-1.29")
+    given = edits.change_flow(one, GRAPH, "flow-1", goal="3.0.-1.29")
     assert flow_goals(given, GRAPH)["flow-1"].tolist() == [node_index(GRAPH, "3.0.-1.29")]
 
 

@@ -4,20 +4,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
+from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.demand.count_stations import Passing, contradictions, geh
 from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve
 from odscen.scenario.demand.demand_tables import read_counts, read_matrix, read_profile, read_zones
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Background, Counts, Matrix, Scenario
-from odscen.scenario.edits import demand_edits, scenario_edits
 from tests.graphs import fork
 
 GRAPH = fork()
 
 
 def scenario() -> Scenario:
-    return scenario_edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"))
+    return edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"))
 
 
 def codes(one: Scenario) -> list[str]:
@@ -56,12 +56,10 @@ def test_a_run_that_starts_at_noon_gets_the_demand_of_the_afternoon_first() -> N
 
 
 def test_demand_survives_being_written_and_read() -> None:
-    one = demand_edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2", "r3"])
-    one = demand_edits.set_matrix(
-        one, GRAPH, matrix="m", trips=[("r1", "ends", 2.5)], profile="weekday"
-    )
-    one = demand_edits.set_counts(one, GRAPH, counts="c", rows=[("r1>j9", 0, 900, 4)])
-    one = demand_edits.set_background(one, GRAPH, background="b", per_km=4)
+    one = edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2", "r3"])
+    one = edits.set_matrix(one, GRAPH, matrix="m", trips=[("r1", "ends", 2.5)], profile="weekday")
+    one = edits.set_counts(one, GRAPH, counts="c", rows=[("r1>j9", 0, 900, 4)])
+    one = edits.set_background(one, GRAPH, background="b", per_km=4)
     assert loads(dumps(one)) == one
     assert codes(one) == []
     assert dumps(one).count("\n") < 40
@@ -74,30 +72,30 @@ def test_a_scenario_without_demand_is_written_as_before() -> None:
 def test_background_traffic_has_one_amount() -> None:
     with pytest.raises(ValueError, match="one of fill, per_km and trips, not none"):
         Background(id="b")
-    one = demand_edits.set_background(scenario(), GRAPH, background="b", per_km=4)
-    two = demand_edits.set_background(one, GRAPH, background="b", trips=100)
+    one = edits.set_background(scenario(), GRAPH, background="b", per_km=4)
+    two = edits.set_background(one, GRAPH, background="b", trips=100)
     assert (two.demand.background[0].per_km, two.demand.background[0].trips) == (None, 100)
 
 
 def test_an_edit_of_the_same_name_changes_the_part_and_another_adds_one() -> None:
-    one = demand_edits.set_matrix(scenario(), GRAPH, matrix="m", trips=[("r1", "r2", 2)])
-    one = demand_edits.set_matrix(one, GRAPH, matrix="m", profile="weekend")
-    one = demand_edits.set_matrix(one, GRAPH, matrix="n", trips=[("r1", "r3", 2)])
+    one = edits.set_matrix(scenario(), GRAPH, matrix="m", trips=[("r1", "r2", 2)])
+    one = edits.set_matrix(one, GRAPH, matrix="m", profile="weekend")
+    one = edits.set_matrix(one, GRAPH, matrix="n", trips=[("r1", "r3", 2)])
     assert [(m.id, m.profile, m.trips[0][1]) for m in one.demand.matrices] == [
         ("m", "weekend", "r2"),
         ("n", None, "r3"),
     ]
-    left = demand_edits.remove_demand(one, GRAPH, part="m")
+    left = edits.remove_demand(one, GRAPH, part="m")
     assert [m.id for m in left.demand.matrices] == ["n"]
     with pytest.raises(NotFoundError, match="did you mean n"):
-        demand_edits.remove_demand(left, GRAPH, part="nn")
+        edits.remove_demand(left, GRAPH, part="nn")
 
 
 def test_what_is_in_use_cannot_be_removed() -> None:
-    one = demand_edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2"])
-    one = demand_edits.set_matrix(one, GRAPH, matrix="m", trips=[("r1", "ends", 2)])
+    one = edits.set_zone(scenario(), GRAPH, zone="ends", segments=["r2"])
+    one = edits.set_matrix(one, GRAPH, matrix="m", trips=[("r1", "ends", 2)])
     with pytest.raises(ScenarioError, match="'ends' is neither a zone nor a segment"):
-        demand_edits.remove_demand(one, GRAPH, part="ends")
+        edits.remove_demand(one, GRAPH, part="ends")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +110,7 @@ def test_what_is_in_use_cannot_be_removed() -> None:
 )
 def test_a_matrix_that_cannot_be_right_is_refused(change: dict, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        demand_edits.set_matrix(scenario(), GRAPH, matrix="m", **change)
+        edits.set_matrix(scenario(), GRAPH, matrix="m", **change)
 
 
 @pytest.mark.parametrize(
@@ -126,13 +124,13 @@ def test_a_matrix_that_cannot_be_right_is_refused(change: dict, message: str) ->
 )
 def test_counts_that_cannot_be_right_are_refused(rows: list, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        demand_edits.set_counts(scenario(), GRAPH, counts="c", rows=rows)
+        edits.set_counts(scenario(), GRAPH, counts="c", rows=rows)
 
 
 def test_names_are_shared_with_actors_and_flows() -> None:
-    one = scenario_edits.add_actor(scenario(), GRAPH, category="car", spawn="1.0.-1.10", id="rush")
+    one = edits.add_actor(scenario(), GRAPH, category="car", spawn="1.0.-1.10", id="rush")
     with pytest.raises(ScenarioError, match="'rush' is taken"):
-        demand_edits.set_matrix(one, GRAPH, matrix="rush", trips=[("r1", "r2", 1)])
+        edits.set_matrix(one, GRAPH, matrix="rush", trips=[("r1", "r2", 1)])
 
 
 def test_turns_that_add_up_to_more_than_their_flow_are_named() -> None:
@@ -141,7 +139,7 @@ def test_turns_that_add_up_to_more_than_their_flow_are_named() -> None:
     assert [(one.places, one.begin) for one in found] == [(("r1>j9", "r1>j9>r2", "r1>j9>r3"), 0.0)]
     assert "50 were counted at r1>j9" in found[0].message
     assert "add up to 70" in found[0].message
-    one = demand_edits.set_counts(scenario(), GRAPH, counts="survey", rows=survey.rows)
+    one = edits.set_counts(scenario(), GRAPH, counts="survey", rows=survey.rows)
     assert codes(one) == ["counts_contradict"]
 
 

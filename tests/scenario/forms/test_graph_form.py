@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_ids, walk_node_ids
+from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Actor, Flow, MapReference, Scenario
-from odscen.scenario.edits import scenario_edits
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import from_graph, from_graphml, to_graph, to_graphml
 from tests.graphs import SHA256, fork
@@ -56,13 +56,11 @@ def test_document_graph_and_graphml_convert_without_loss(scenario: Scenario) -> 
 
 
 def example() -> Scenario:
-    one = scenario_edits.new_scenario(
-        GRAPH, name="test", roi=("r1", "j9"), description="a\nb <&> \"'"
-    )
-    one = scenario_edits.add_actor(one, GRAPH, category="car", spawn="1.0.-1.20", speed=12.5)
-    one = scenario_edits.add_actor(one, GRAPH, category="bus", spawn="1.0.-1.3", goal="90.0.-1.9")
-    one = scenario_edits.add_actor(one, GRAPH, category="pedestrian", spawn="ped.1.0.-2.3")
-    return scenario_edits.add_flow(one, GRAPH, spawn="1.0.1.0", per_hour=90)
+    one = edits.new_scenario(GRAPH, name="test", roi=("r1", "j9"), description="a\nb <&> \"'")
+    one = edits.add_actor(one, GRAPH, category="car", spawn="1.0.-1.20", speed=12.5)
+    one = edits.add_actor(one, GRAPH, category="bus", spawn="1.0.-1.3", goal="90.0.-1.9")
+    one = edits.add_actor(one, GRAPH, category="pedestrian", spawn="ped.1.0.-2.3")
+    return edits.add_flow(one, GRAPH, spawn="1.0.1.0", per_hour=90)
 
 
 def test_the_graph_is_the_induced_subgraph_with_actors_on_their_nodes() -> None:
@@ -89,7 +87,7 @@ def test_graphml_is_read_by_networkx_and_read_back_after_it_rewrote_it(tmp_path:
 
 
 def test_a_graph_that_a_program_filled_needs_neither_ids_nor_orders() -> None:
-    graph = to_graph(scenario_edits.new_scenario(GRAPH, name="empty", roi=("r1",)), GRAPH)
+    graph = to_graph(edits.new_scenario(GRAPH, name="empty", roi=("r1",)), GRAPH)
     graph.nodes["1.0.-1.9"]["actor_category"] = "van"
     graph.nodes["1.0.-1.3"]["actor_category"] = "car"
     graph.add_edge("1.0.-1.3", "1.0.-1.49", relation="goal")
@@ -137,7 +135,7 @@ def test_broken_graphml_is_refused_with_the_reason(old: str, new: str, reason: s
 
 def test_signals_that_are_all_the_maps_leave_no_attribute() -> None:
     assert "signals" not in to_graph(example(), GRAPH).graph
-    timed = scenario_edits.set_signal_control(example(), control="actuated")
+    timed = edits.set_signal_control(example(), control="actuated")
     assert to_graph(timed, GRAPH).graph["signals"] == '{"control": "actuated"}'
 
 

@@ -24,8 +24,8 @@ from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import node_id
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
+from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Signals
-from odscen.scenario.edits import scenario_edits
 from odscen.sumo.realize.program_files import scenario_lights, signals_xml
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
@@ -180,8 +180,8 @@ def from_one_side() -> Scenario:
     """Cars that turn left from one side, and nobody anywhere else."""
     graph = crossing().sumo.graph
     turn = left_turn()
-    return scenario_edits.add_flow(
-        scenario_edits.new_scenario(graph, name="lights", roi=graph.segments.ids),
+    return edits.add_flow(
+        edits.new_scenario(graph, name="lights", roi=graph.segments.ids),
         graph,
         spawn=node_id(graph, turn.spawn),
         goal=node_id(graph, turn.goal),
@@ -192,7 +192,7 @@ def from_one_side() -> Scenario:
 
 def timed(**fields: Any) -> Scenario:
     lights = scenario_lights(crossing().table.lights)
-    return scenario_edits.set_timing(from_one_side(), lights, JUNCTION, **fields)
+    return edits.set_timing(from_one_side(), lights, JUNCTION, **fields)
 
 
 def states(folder: Path, one: Scenario, *, until: float) -> list[tuple[str, str]]:

@@ -13,10 +13,10 @@ import pytest
 from odscen.base.categories import Category
 from odscen.base.errors import ToolError
 from odscen.results.records.run_records import PlannedActor
+from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.edits import scenario_edits
 from odscen.scenario.edits.demand_edits import set_background, set_counts, set_matrix
 from odscen.scenario.placing.region import Region, place_of
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
@@ -36,8 +36,8 @@ TOWN = "town_5x5"
 
 def empty(name: str, *, duration: float = 3600.0, seed: int = 1) -> Scenario:
     graph = built(name).sumo.graph
-    scenario = scenario_edits.new_scenario(graph, name="demand", roi=graph.segments.ids, seed=seed)
-    return scenario_edits.set_simulation(scenario, duration=duration)
+    scenario = edits.new_scenario(graph, name="demand", roi=graph.segments.ids, seed=seed)
+    return edits.set_simulation(scenario, duration=duration)
 
 
 def arms(name: str) -> list[str]:
@@ -125,7 +125,7 @@ def test_placed_actors_keep_their_place_and_time_among_demand() -> None:
 def test_background_traffic_is_there_from_the_start_and_keeps_coming(tmp_path: Path) -> None:
     graph = built(TOWN).sumo.graph
     scenario = set_background(empty(TOWN, duration=600), graph, background="around", fill=0.05)
-    scenario = scenario_edits.set_simulation(scenario, duration=600, step_length=1.0)
+    scenario = edits.set_simulation(scenario, duration=600, step_length=1.0)
     prepared = prepare(scenario, built(TOWN).sumo, net_file(TOWN, tmp_path))
     first = [a for a in prepared.plan.actors if a.depart == 0]
     run_prepared(prepared, tmp_path / "run")
@@ -213,7 +213,7 @@ def test_a_run_is_counted_as_it_was_planned_where_traffic_is_light(tmp_path: Pat
     for place, _, _, number in rows:
         whole[place] += int(number)
     hour = [(place, 0.0, 3600.0, float(number)) for place, number in whole.items()]
-    scenario = scenario_edits.set_simulation(known, duration=3600, step_length=0.5)
+    scenario = edits.set_simulation(known, duration=3600, step_length=0.5)
     prepared = prepare(scenario, built(CROSSING).sumo, net_file(CROSSING, tmp_path))
     run_prepared(prepared, tmp_path / "run")
     counted = set_counts(scenario, graph, counts="survey", rows=hour)

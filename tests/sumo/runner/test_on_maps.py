@@ -23,7 +23,7 @@ from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import Plan
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
-from odscen.scenario.edits.scenario_edits import add_actor
+from odscen.scenario.edits.actor_edits import add_actor
 from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap, pos_per_metre

@@ -10,7 +10,7 @@ import numpy as np
 
 from odscen.lanegraph.graphs import WalkKind
 from odscen.lanegraph.query import walk_node_id
-from odscen.scenario.edits import scenario_edits
+from odscen.scenario import edits
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
@@ -22,7 +22,7 @@ def travel_times(folder: Path, *, ignores_red: bool) -> np.ndarray:
     """Seconds that each of twenty takes to get over a crosswalk, one after the other."""
     graph = crossing().sumo.graph
     walks = graph.walks
-    scenario = scenario_edits.new_scenario(graph, name="red", roi=graph.segments.ids)
+    scenario = edits.new_scenario(graph, name="red", roi=graph.segments.ids)
     router = Region.of(graph, scenario.roi).walk_router
     over = {
         frozenset((int(walks.source[i]), int(walks.target[i])))
@@ -35,7 +35,7 @@ def travel_times(folder: Path, *, ignores_red: bool) -> np.ndarray:
         path = router.path(spawn, goal).tolist()
         if not any(frozenset(step) in over for step in pairwise(path)):
             continue
-        scenario = scenario_edits.add_actor(
+        scenario = edits.add_actor(
             scenario,
             graph,
             category="pedestrian",

@@ -1,1 +1,75 @@
-"""Every change to a scenario, as pure functions."""
+"""Every change to a scenario, as pure functions from document to document; one file a subject.
+
+Functions that are edits are entered by :func:`~odscen.scenario.edits.edit_registry.edit`; all have
+been when this package is imported.
+"""
+
+from odscen.scenario.edits.actor_edits import (
+    add_actor,
+    change_actor,
+    copy_actors,
+    fill_roi,
+    move_actor,
+    remove_actors,
+    set_ego,
+    set_goal,
+)
+from odscen.scenario.edits.demand_edits import (
+    remove_demand,
+    set_background,
+    set_clock,
+    set_counts,
+    set_matrix,
+    set_profile,
+    set_zone,
+)
+from odscen.scenario.edits.flow_edits import add_flow, change_flow, remove_flow
+from odscen.scenario.edits.roi_edits import (
+    eligible_segments,
+    grow_roi,
+    removable_segments,
+    shrink_roi,
+)
+from odscen.scenario.edits.settings_edits import (
+    clear_timing,
+    new_scenario,
+    rename,
+    set_environment,
+    set_seed,
+    set_signal_control,
+    set_simulation,
+    set_timing,
+)
+
+__all__ = [
+    "add_actor",
+    "add_flow",
+    "change_actor",
+    "change_flow",
+    "clear_timing",
+    "copy_actors",
+    "eligible_segments",
+    "fill_roi",
+    "grow_roi",
+    "move_actor",
+    "new_scenario",
+    "removable_segments",
+    "remove_actors",
+    "remove_demand",
+    "remove_flow",
+    "rename",
+    "set_background",
+    "set_clock",
+    "set_counts",
+    "set_ego",
+    "set_environment",
+    "set_goal",
+    "set_matrix",
+    "set_profile",
+    "set_seed",
+    "set_signal_control",
+    "set_simulation",
+    "set_timing",
+    "set_zone",
+    "shrink_roi",
+]

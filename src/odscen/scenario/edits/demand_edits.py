@@ -1,4 +1,4 @@
-"""Changes to the demand of a scenario, as pure functions like those of the module ``edits``."""
+"""Changes to the demand of a scenario."""
 
 from __future__ import annotations
 

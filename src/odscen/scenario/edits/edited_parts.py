@@ -1,0 +1,97 @@
+"""Parts of a document replaced, and what every edit of road users refuses."""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from odscen.base.errors import NotFoundError
+from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.checks.scenario_checks import duplicate_ids, shared_nodes
+from odscen.scenario.document.problems import Problem, refuse_errors
+from odscen.scenario.document.scenario_document import (
+    Actor,
+    Flow,
+    Part,
+    Scenario,
+)
+from odscen.scenario.document.validation import validated
+from odscen.scenario.placing.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from odscen.lanegraph.graphs import MapGraph
+
+
+PlacedOne = TypeVar("PlacedOne", bound=Actor | Flow)
+DocumentPart = TypeVar("DocumentPart", bound=Part)
+
+
+def with_fields(scenario: Scenario, **changes: Any) -> Scenario:
+    """Copy of a scenario with some fields changed and checked."""
+    return changed_part(scenario, changes)
+
+
+def changed_part(part: DocumentPart, changes: Mapping[str, Any]) -> DocumentPart:
+    """Copy of a part of the document with some fields changed and checked."""
+    fields = {name: getattr(part, name) for name in type(part).model_fields}
+    return validated(type(part), {**fields, **changes})
+
+
+def with_actor(scenario: Scenario, index: int, **changes: Any) -> Scenario:
+    """Copy of a scenario with some fields of its ``index``-th actor changed and checked."""
+    actor = changed_part(scenario.actors[index], changes)
+    return with_fields(scenario, actors=replaced_at(scenario.actors, index, actor))
+
+
+def replaced_at(ones: tuple[PlacedOne, ...], index: int, one: PlacedOne) -> tuple[PlacedOne, ...]:
+    """Copy of a tuple with another element at ``index``."""
+    return (*ones[:index], one, *ones[index + 1 :])
+
+
+def all_placed(scenario: Scenario) -> tuple[Actor | Flow, ...]:
+    """All actors and flows."""
+    return (*scenario.actors, *scenario.flows)
+
+
+def index_of(ones: tuple[PlacedOne, ...], name: str) -> int:
+    """Position of the actor or flow with this id.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
+    ids = [one.id for one in ones]
+    if name not in ids:
+        what = "actor or flow"
+        raise NotFoundError(what, name, ids)
+    return ids.index(name)
+
+
+def free_id(scenario: Scenario, stem: str) -> str:
+    """First of ``stem-1``, ``stem-2``, ... that no actor or flow has."""
+    taken = {one.id for one in all_placed(scenario)}
+    return next(name for k in count(1) if (name := f"{stem}-{k}") not in taken)
+
+
+def with_only_ego(scenario: Scenario, ego: str | None) -> Scenario:
+    """Copy of a scenario in which this actor alone is the ego, or none."""
+    actors = tuple(changed_part(one, {"ego": one.id == ego}) for one in scenario.actors)
+    return with_fields(scenario, actors=actors)
+
+
+def refuse_placement(
+    scenario: Scenario,
+    graph: MapGraph,
+    subject_of: Callable[[Scenario, Region, int], Subject],
+    index: int,
+) -> None:
+    """Raise if the spawn or goal of one actor or flow can never be right."""
+    subject = subject_of(scenario, Region.of(graph, scenario.roi), index)
+    place, problems = spawn_problems(subject)
+    found: list[Problem] = [*problems, *shared_nodes(scenario), *duplicate_ids(scenario)]
+    if place is not None and subject.one.goal is not None:
+        found += goal_problems(subject, place)
+    refuse_errors(found)

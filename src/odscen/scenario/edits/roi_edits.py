@@ -1,0 +1,121 @@
+"""Changes to the region of interest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.base.errors import NotFoundError, ScenarioError
+from odscen.base.ids import SegmentId
+from odscen.lanegraph.query import neighbours, removable
+from odscen.scenario.edits.edit_registry import edit
+from odscen.scenario.edits.edited_parts import (
+    PlacedOne,
+    all_placed,
+    changed_part,
+    with_fields,
+)
+from odscen.scenario.placing.region import Region
+
+if TYPE_CHECKING:
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.scenario_document import (
+        Actor,
+        Flow,
+        Scenario,
+    )
+
+
+def eligible_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, ...]:
+    """Segments that :func:`grow_roi` accepts now: every one for the first, then all neighbours."""
+    if not scenario.roi:
+        return graph.segments.ids
+    return tuple(neighbours(graph.segments, [SegmentId(name) for name in scenario.roi]))
+
+
+def removable_segments(scenario: Scenario, graph: MapGraph) -> tuple[SegmentId, ...]:
+    """Segments without which the region stays in one piece: no other can be taken out."""
+    return removable(graph.segments, scenario.roi)
+
+
+@edit("Add segment {segment}")
+def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
+    """Add a segment to the region of interest (R29).
+
+    Raises
+    ------
+    ScenarioError
+        If the segment is inside already, or touches no segment of the region.
+    NotFoundError
+        If the map has no such segment.
+    """
+    _known_segment(graph, segment)
+    if segment in scenario.roi:
+        msg = f"segment {segment!r} is in the region of interest already"
+        raise ScenarioError(msg)
+    if segment not in eligible_segments(scenario, graph):
+        msg = f"segment {segment!r} does not touch the region of interest; add one between first"
+        raise ScenarioError(msg)
+    return with_fields(scenario, roi=(*scenario.roi, segment))
+
+
+@edit("Remove segment {segment}")
+def shrink_roi(
+    scenario: Scenario, graph: MapGraph, segment: str, *, with_actors: bool = False
+) -> Scenario:
+    """Take a segment out of the region of interest (R29).
+
+    Parameters
+    ----------
+    with_actors
+        Also remove the actors and flows that start in the segment, and open goals that lie in it
+        (they are then drawn). Without, the segment must be free of both.
+
+    Raises
+    ------
+    ScenarioError
+        If the segment is not inside, if the rest would be in several pieces, or if actors or flows
+        use it.
+    """
+    _known_segment(graph, segment)
+    if segment not in scenario.roi:
+        msg = f"segment {segment!r} is not in the region of interest"
+        raise ScenarioError(msg)
+    if segment not in removable_segments(scenario, graph):
+        msg = f"without segment {segment!r} the region of interest would be in several pieces"
+        raise ScenarioError(msg)
+    region = Region.of(graph, [segment])
+    users = [one for one in all_placed(scenario) if _uses(region, one)]
+    if users and not with_actors:
+        names = ", ".join(repr(one.id) for one in users)
+        msg = f"segment {segment!r} is where {names} start or go; remove or move them first"
+        raise ScenarioError(msg)
+    return with_fields(
+        scenario,
+        roi=tuple(name for name in scenario.roi if name != segment),
+        actors=_clear(region, scenario.actors),
+        flows=_clear(region, scenario.flows),
+    )
+
+
+def _known_segment(graph: MapGraph, segment: str) -> None:
+    if segment not in graph.segments.ids:
+        what = "segment"
+        raise NotFoundError(what, segment, graph.segments.ids)
+
+
+def _inside(region: Region, node: str | None) -> bool:
+    place = None if node is None else region.place(node)
+    return place is not None and region.holds(place)
+
+
+def _uses(region: Region, one: Actor | Flow) -> bool:
+    return _inside(region, one.spawn) or _inside(region, one.goal)
+
+
+def _clear(region: Region, ones: tuple[PlacedOne, ...]) -> tuple[PlacedOne, ...]:
+    """Those that do not start in the region, with goals in it opened."""
+    return tuple(
+        changed_part(one, {"goal": None}) if _inside(region, one.goal) else one
+        for one in ones
+        if not _inside(region, one.spawn)
+    )
