@@ -81,7 +81,10 @@ _HOMES = {
     "WorkspaceError": "odscen.base.errors",
     "ToolError": "odscen.base.errors",
 }
-"""Where each public name is at home, and by what name if it is another one; ``tests/test_public_face.py`` holds it against the imports."""
+"""Where each public name is at home, and by what name if it is another one there.
+
+``tests/test_public_face.py`` holds it against the imports above.
+"""
 
 __all__ = [
     "ConflictError",

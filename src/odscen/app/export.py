@@ -58,7 +58,7 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
         If the folder cannot be written.
     """
     from odscen.app.maps import map_of
-    from odscen.app.scenarios import check_scenario, given_scenario
+    from odscen.app.scenarios import check_scenario, given_scenario, scenario_name
     from odscen.interchange.exporter import ExportSource
     from odscen.scenario.document.problems import refuse_errors
 
@@ -70,7 +70,8 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
     loaded = map_of(workspace, document)
-    source = ExportSource(name, document, loaded.sumo, loaded.entry.path("net"), workspace.assets())
+    name, net = scenario_name(scenario), loaded.entry.path("net")
+    source = ExportSource(name, document, loaded.sumo, net, workspace.assets())
     return _write(exporter.files(source), out)
 
 

@@ -34,7 +34,18 @@ _LISTEN = 0.2
 
 
 class WatchedRun:
-    """A run that waits for whoever watches it: an iterator of its steps, see :func:`watch`."""
+    """A run that waits for whoever watches it: an iterator of its steps, see :func:`watch`.
+
+    Parameters
+    ----------
+    checked
+        The run, from :func:`odscen.app.runs.check_run`; it starts at once and waits.
+
+    Raises
+    ------
+    ScenarioError
+        If a spawn or goal is not usable in SUMO.
+    """
 
     def __init__(self, checked: CheckedRun) -> None:
         self._checked = checked

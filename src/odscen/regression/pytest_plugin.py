@@ -93,10 +93,9 @@ class _ScenarioTest(pytest.Item):
 def odscen_run(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[..., Run]:
-    """Return a function that runs a scenario and gives its :class:`Run`.
+    """Return a function that runs a scenario and gives the finished :class:`Run`.
 
-    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``; the result has
-    ``status``, ``summary`` (figures, counts) and ``folder`` (trajectories, events). A run that
+    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``. A run that
     fails or falls short of ``expect`` fails the test.
     """
 
