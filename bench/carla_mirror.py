@@ -113,6 +113,7 @@ def _step(number: int) -> Step:
     return Step(
         time=number * DELTA,
         index=row,
+        ids=row.astype(np.str_),
         x=20.0 * (row % 20) + 2.0 * np.cos(turn),
         y=20.0 * (row // 20) + 2.0 * np.sin(turn),
         z=np.zeros(count),

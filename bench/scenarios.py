@@ -54,7 +54,7 @@ def main() -> None:
                     map_name=entry.name, count=count, seed=1000 * index, config=config
                 ),
             )
-            results = runs.run(workspace, paths, processes=os.cpu_count() or 1)
+            results = runs.run_many(workspace, paths, processes=os.cpu_count() or 1)
             scenarios[entry.name] += len(paths)
             for result in results:
                 if result.status == "failed":

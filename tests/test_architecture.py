@@ -92,8 +92,8 @@ def test_every_room_says_what_it_is_for() -> None:
 
 def test_tests_lie_where_their_rooms_lie() -> None:
     rooms = {path.parent.relative_to(SOURCES) for path in MODULES.values()}
-    others = {"browser", "carla_standin", "maps"}
-    """Tests of the page, of the stand-in for CARLA, and of maps through all rooms."""
+    others = {"browser", "carla_standin", "examples", "maps"}
+    """Tests of the page, the stand-in for CARLA, the examples, and maps through all rooms."""
     strays = [
         path.relative_to(ROOT / "tests").as_posix()
         for path in (ROOT / "tests").rglob("test_*.py")

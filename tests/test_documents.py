@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import operator
 import re
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+import odscen
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md"), ROOT / "maps/README.md"])
@@ -35,6 +38,12 @@ def anchors(text: str) -> set[str]:
 
 def exists(module: str) -> bool:
     """Whether a module, or a name in one, is there: ``odscen.base.frames.sumo_to_xodr``."""
+    if module.split(".")[1] in odscen.__all__:
+        try:
+            operator.attrgetter(module.partition(".")[2])(odscen)
+        except AttributeError:
+            return False
+        return True
     for parts in (module, module.rpartition(".")[0]):
         try:
             spec = find_spec(parts)

@@ -1,3 +1,136 @@
-"""odscen: traffic scenarios on OpenDRIVE maps, run headlessly in SUMO."""
+"""odscen: traffic scenarios on OpenDRIVE maps, run headlessly in SUMO.
 
-__version__ = "0.2.0"
+``import odscen`` gives the public face and costs nothing: each name is imported when it is first
+used. Whatever is not in ``__all__`` may change.
+
+>>> workspace = odscen.Workspace.open()
+>>> workspace.add_map(Path("Town01.xodr"))
+>>> settings = odscen.GenerationSettings(map_name="Town01", seed=7, fill=0.3)
+>>> (path,) = odscen.generate(workspace, settings=settings)
+>>> run = odscen.run(workspace, path, settings=odscen.RunSettings(until=300.0))
+>>> run.figures["mean_delay"]
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from odscen.base.version import __version__ as __version__
+
+if TYPE_CHECKING:
+    from odscen.app.export import export
+    from odscen.app.reports import renew_report
+    from odscen.app.runs import resume, run, run_many
+    from odscen.app.scenarios import check_scenario as check
+    from odscen.app.scenarios import generate, read_scenario, write_scenario
+    from odscen.app.watched_runs import WatchedRun, watch
+    from odscen.base.errors import (
+        ConflictError,
+        InputError,
+        NotFoundError,
+        OdscenError,
+        ScenarioError,
+        ToolError,
+        WorkspaceError,
+    )
+    from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.regression.compare import RunComparison, compare
+    from odscen.results.measures.expectations import parse_expectation
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sampling.generation_settings import GenerationSettings
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.realize.recording import Recording
+    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.sumo.runner.in_step import Step
+    from odscen.workspace.shipped import shipped_maps
+    from odscen.workspace.store import MapEntry, Workspace
+
+_HOMES = {
+    "Workspace": "odscen.workspace.store",
+    "MapEntry": "odscen.workspace.store",
+    "shipped_maps": "odscen.workspace.shipped",
+    "ConversionSettings": "odscen.convert.model.conversion_settings",
+    "Scenario": "odscen.scenario.document.scenario_document",
+    "GenerationSettings": "odscen.scenario.sampling.generation_settings",
+    "Problem": "odscen.scenario.document.problems",
+    "generate": "odscen.app.scenarios",
+    "read_scenario": "odscen.app.scenarios",
+    "write_scenario": "odscen.app.scenarios",
+    "check": "odscen.app.scenarios:check_scenario",
+    "export": "odscen.app.export",
+    "RunSettings": "odscen.sumo.realize.run_settings",
+    "Recording": "odscen.sumo.realize.recording",
+    "parse_expectation": "odscen.results.measures.expectations",
+    "run": "odscen.app.runs",
+    "run_many": "odscen.app.runs",
+    "resume": "odscen.app.runs",
+    "watch": "odscen.app.watched_runs",
+    "WatchedRun": "odscen.app.watched_runs",
+    "Step": "odscen.sumo.runner.in_step",
+    "Run": "odscen.sumo.folder.finished_run",
+    "renew_report": "odscen.app.reports",
+    "compare": "odscen.regression.compare",
+    "RunComparison": "odscen.regression.compare",
+    "OdscenError": "odscen.base.errors",
+    "InputError": "odscen.base.errors",
+    "ScenarioError": "odscen.base.errors",
+    "NotFoundError": "odscen.base.errors",
+    "ConflictError": "odscen.base.errors",
+    "WorkspaceError": "odscen.base.errors",
+    "ToolError": "odscen.base.errors",
+}
+"""Where each public name is at home, and by what name if it is another one there.
+
+``tests/test_public_face.py`` holds it against the imports above.
+"""
+
+__all__ = [
+    "ConflictError",
+    "ConversionSettings",
+    "GenerationSettings",
+    "InputError",
+    "MapEntry",
+    "NotFoundError",
+    "OdscenError",
+    "Problem",
+    "Recording",
+    "Run",
+    "RunComparison",
+    "RunSettings",
+    "Scenario",
+    "ScenarioError",
+    "Step",
+    "ToolError",
+    "WatchedRun",
+    "Workspace",
+    "WorkspaceError",
+    "check",
+    "compare",
+    "export",
+    "generate",
+    "parse_expectation",
+    "read_scenario",
+    "renew_report",
+    "resume",
+    "run",
+    "run_many",
+    "shipped_maps",
+    "watch",
+    "write_scenario",
+]
+
+if not TYPE_CHECKING:  # a type checker knows the names from the imports above, and no others
+
+    def __getattr__(name: str) -> object:
+        if name not in _HOMES:
+            msg = f"module {__name__!r} has no attribute {name!r}"
+            raise AttributeError(msg)
+        module, _, own = _HOMES[name].partition(":")
+        value = getattr(import_module(module), own or name)
+        globals()[name] = value
+        return value
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.runs import carry_out, check_file, check_run, prepare_run, run, run_all
+from odscen.app.runs import carry_out, check_file, check_run, prepare_run, run_all, run_many
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.errors import ScenarioError
 from odscen.results.measures.expectations import parse_expectation
@@ -28,7 +28,7 @@ def test_a_scenario_with_errors_is_refused_and_none_of_the_others_is_run(
 ) -> None:
     file = broken(sampled, tmp_path)
     with pytest.raises(ScenarioError) as refused:
-        run(workspace, [sampled, file], settings=SHORT, out=tmp_path / "runs")
+        run_many(workspace, [sampled, file], settings=SHORT, out=tmp_path / "runs")
     assert refused.value.file == str(file)
     assert not (tmp_path / "runs").exists()
 
@@ -86,7 +86,7 @@ def test_a_checked_scenario_is_run_several_times_without_reports_if_none_are_wan
 def test_scenarios_of_one_name_get_folders_of_their_own(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
-    results = run(workspace, [sampled, sampled], settings=SHORT, out=tmp_path)
+    results = run_many(workspace, [sampled, sampled], settings=SHORT, out=tmp_path)
     name = sampled.name.removesuffix(".scenario.json")
     assert [result.folder.name for result in results] == [name, f"{name}-2"]
     one, other = (result.folder / "trajectories.parquet" for result in results)

@@ -255,7 +255,9 @@ def written(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str
             settings=GenerationSettings(map_name=CROSSING, seed=5, fill=fill),
         )
         for seed in (1, 2):
-            runs.run(workspace, made, out=root / side / str(seed), settings=RunSettings(seed=seed))
+            runs.run_many(
+                workspace, made, out=root / side / str(seed), settings=RunSettings(seed=seed)
+            )
             run = next((root / side / str(seed)).iterdir())
             run.rename(root / side / f"seed-{seed}")
         sides[side] = read_runs(root / side, workspace)

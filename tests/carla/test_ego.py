@@ -17,8 +17,8 @@ from odscen.carla.cosim_options import CosimOptions
 from odscen.lanegraph.query import node_index
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
+from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner.run_jobs import RunResult
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS
 from tests.carla.driver import Driver
@@ -61,7 +61,7 @@ def drive(
     tmp_path: Path,
     *,
     until: float,
-) -> tuple[RunResult, CosimReport, pl.DataFrame, list[dict[str, Any]]]:
+) -> tuple[Run, CosimReport, pl.DataFrame, list[dict[str, Any]]]:
     path = scenario_of(workspace, xodr, actors, tmp_path)
     ego = next(actor for actor in actors if actor.get("ego"))
     with StandIn(xodr, map_name=xodr.stem) as server:

@@ -32,6 +32,7 @@ def step_of(time: float, places: dict[int, tuple[float, float]], *, signals: int
     return Step(
         time=time,
         index=np.array(list(places), dtype=np.int64),
+        ids=np.array(list(places)).astype(np.str_),
         x=np.array([x for x, _ in places.values()]),
         y=np.array([y for _, y in places.values()]),
         z=np.zeros(count),

@@ -55,7 +55,7 @@ def sides(tmp_path_factory):
     other.write_text(json.dumps(changed))
     for side, path in (("a", SCENARIO), ("b", other)):
         for seed in (1, 2, 3):
-            runs.run(store, [path], out=root / side / str(seed), settings=RunSettings(seed=seed))
+            runs.run(store, path, out=root / side / str(seed), settings=RunSettings(seed=seed))
             (root / side / str(seed) / "signal_crossing").rename(root / side / f"seed-{seed}")
     return root / "a", root / "b"
 
@@ -112,9 +112,8 @@ def test_a_page_of_runs_that_are_the_same_says_so(sides):
 def test_a_run_in_slices_has_the_places_of_one_in_one_piece(sides, tmp_path):
     store = Workspace.open(tmp_path / "workspace")
     store.add_map(ROOT / "maps" / "signal_crossing.xodr")
-    (done,) = runs.run(
-        store, [SCENARIO], out=tmp_path, settings=RunSettings(seed=1, slice_length=100.0)
-    )
+    settings = RunSettings(seed=1, slice_length=100.0)
+    done = runs.run(store, SCENARIO, out=tmp_path, settings=settings)
     assert "trajectory_parts" in done.summary["files"]
     sliced, whole = read_runs(done.folder), read_runs(sides[0] / "seed-1")
     assert sliced.places

@@ -7,15 +7,16 @@ A new format is a module in ``odscen/interchange`` with an ``EXPORTER``, and its
 from __future__ import annotations
 
 import shutil
+from contextlib import nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import NotFoundError, WorkspaceError, in_file
 from odscen.interchange import graphml_export, sumo_export
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from odscen.interchange.exporter import ExportFiles
+    from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
 
 EXPORTERS = {
@@ -28,17 +29,19 @@ EXPORTERS = {
 """Every format by its name."""
 
 
-def export(workspace: Workspace, path: Path, out: Path, *, to: str) -> list[Path]:
+def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: str) -> list[Path]:
     """Write a scenario in another format.
 
     Parameters
     ----------
-    path
-        Scenario file.
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file.
     out
         Folder for the files; made if need be.
     to
-        One of :data:`EXPORTERS`.
+        Name of the format, one of :data:`EXPORTERS`: ``sumo``, ``graphml``.
 
     Returns
     -------
@@ -55,21 +58,20 @@ def export(workspace: Workspace, path: Path, out: Path, *, to: str) -> list[Path
         If the folder cannot be written.
     """
     from odscen.app.maps import map_of
-    from odscen.app.scenarios import check_scenario, read_scenario, scenario_name
+    from odscen.app.scenarios import check_scenario, given_scenario, scenario_name
     from odscen.interchange.exporter import ExportSource
     from odscen.scenario.document.problems import refuse_errors
 
     if to not in EXPORTERS:
         what = "format"
         raise NotFoundError(what, to, list(EXPORTERS))
-    exporter, scenario = EXPORTERS[to], read_scenario(path)
+    exporter, document = EXPORTERS[to], given_scenario(scenario)
     if exporter.checked:
-        with in_file(str(path)):
-            refuse_errors(check_scenario(workspace, scenario))
-    loaded = map_of(workspace, scenario)
-    source = ExportSource(
-        scenario_name(path), scenario, loaded.sumo, loaded.entry.path("net"), workspace.assets()
-    )
+        with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
+            refuse_errors(check_scenario(workspace, document))
+    loaded = map_of(workspace, document)
+    name, net = scenario_name(scenario), loaded.entry.path("net")
+    source = ExportSource(name, document, loaded.sumo, net, workspace.assets())
     return _write(exporter.files(source), out)
 
 

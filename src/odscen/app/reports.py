@@ -17,6 +17,7 @@ from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.run_report import render_report
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.recorded import read_conflicts, read_trajectories
 from odscen.sumo.outputs.corridor_traces import corridor_traces
 
@@ -92,7 +93,7 @@ def write_report(
 
 def renew_report(
     workspace: Workspace,
-    run: Path,
+    run: Run | Path,
     *,
     corridor: Sequence[str] = (),
     ends: tuple[str, str] | None = None,
@@ -102,8 +103,10 @@ def renew_report(
 
     Parameters
     ----------
+    workspace
+        Has the map.
     run
-        Its folder, or its name in the workspace.
+        The run, its folder, or its name in the workspace.
     corridor
         Segments along which vehicles are followed; junctions between them may be left out.
     ends
@@ -124,6 +127,8 @@ def renew_report(
     InputError
         If it has not ended, its map is not in the workspace, or one cannot drive so.
     """
+    if isinstance(run, Run):
+        run = run.folder
     folder = run if run.is_dir() else workspace.runs / run
     if not folder.is_dir():
         names = [path.name for path in workspace.runs.glob("*")]

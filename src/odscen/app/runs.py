@@ -1,22 +1,22 @@
 """A scenario is run: checked, prepared, simulated, reported. The only place that does it.
 
 The command line, the page, suites of tests, and CARLA beside or instead of SUMO all go this way:
-:func:`check_run`, then :func:`prepare_run`, then :func:`carry_out`; or :func:`run_all` and
-:func:`run`, which do all of it. What a run is to be like is one
+:func:`check_run`, then :func:`prepare_run`, then :func:`carry_out`; or :func:`run`,
+:func:`run_many` and :func:`run_all`, which do all of it. What a run is to be like is one
 :class:`~odscen.sumo.realize.run_settings.RunSettings` from here down to SUMO's process.
 
->>> from odscen.workspace.store import Workspace
->>> from odscen.app import runs, scenarios
->>> workspace = Workspace.open()
+>>> import odscen
+>>> workspace = odscen.Workspace.open()
 >>> workspace.add_map(Path("Town01.xodr"))
->>> paths = scenarios.generate(workspace)
->>> results = runs.run(workspace, paths, settings=RunSettings(until=300.0))
+>>> paths = odscen.generate(workspace)
+>>> runs = odscen.run_many(workspace, paths, settings=odscen.RunSettings(until=300.0))
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
@@ -28,16 +28,17 @@ from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner import long_runs
 from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_jobs import RunJob, run_many, run_prepared
+from odscen.sumo.runner.run_jobs import RunJob, run_prepared
+from odscen.sumo.runner.run_jobs import run_many as run_jobs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.sumo.runner.run_jobs import PreparedRun, RunResult
+    from odscen.sumo.runner.run_jobs import PreparedRun
     from odscen.sumo.runner.worker_process import Companion, Ended
     from odscen.sumo.worker.protocol import OnProgress, Progress
     from odscen.workspace.asset_catalogue import Assets
@@ -163,7 +164,7 @@ def carry_out(
     ended: Callable[[Path], None] | None = None,
     live: Companion | None = None,
     simulate: Callable[[Path], Ended] | None = None,
-) -> RunResult:
+) -> Run:
     """Simulate what has been prepared, and write its results and its report.
 
     Parameters
@@ -182,7 +183,7 @@ def carry_out(
 
     Returns
     -------
-    RunResult
+    Run
         Of a run that has completed or failed: what goes wrong inside SUMO does not raise.
 
     Raises
@@ -209,9 +210,9 @@ def run_all(
     processes: int = 1,
     reports: bool = True,
     progress: Callable[[RunJob, Progress], None] | None = None,
-    done: Callable[[RunJob, RunResult], None] | None = None,
+    done: Callable[[RunJob, Run], None] | None = None,
     tell: Callable[[str], None] | None = None,
-) -> tuple[RunResult, ...]:
+) -> tuple[Run, ...]:
     """Prepare and carry out several runs.
 
     Parameters
@@ -227,54 +228,125 @@ def run_all(
 
     Returns
     -------
-    tuple of RunResult
+    tuple of Run
         In the order of ``runs``.
     """
     jobs = [_job(run, report=reports) for run in runs]
-    return run_many(jobs, processes=processes, progress=progress, done=done, tell=tell)
+    return run_jobs(jobs, processes=processes, progress=progress, done=done, tell=tell)
+
+
+def check_given(
+    workspace: Workspace,
+    scenario: Scenario | Path,
+    *,
+    name: str | None = None,
+    out: Path | None = None,
+    settings: RunSettings = AS_DESIGNED,
+) -> CheckedRun:
+    """Check a scenario, or its file; parameters and errors of :func:`check_run`, `check_file`."""
+    if isinstance(scenario, Path):
+        return check_file(workspace, scenario, name=name, out=out, settings=settings)
+    name = name or scenario_name(scenario)
+    return check_run(workspace, scenario, name=name, out=out, settings=settings)
 
 
 def run(
     workspace: Workspace,
-    paths: Sequence[Path],
+    scenario: Scenario | Path,
+    *,
+    settings: RunSettings = AS_DESIGNED,
+    name: str | None = None,
+    out: Path | None = None,
+    progress: OnProgress | None = None,
+) -> Run:
+    """Check a scenario, run it in SUMO in a process of its own, and write its report.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file.
+    settings
+        How it is run.
+    name
+        Of the run's folder; the scenario's if not given. A finished run of that name is replaced.
+    out
+        Folder that gets the run's folder; the workspace's ``runs`` if not given.
+    progress
+        Called in this thread, a few times a second.
+
+    Returns
+    -------
+    Run
+        Completed or failed: what goes wrong inside SUMO does not raise, see ``status``.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario has errors.
+    InputError
+        If the file cannot be read.
+    NotFoundError
+        If the workspace does not have its map.
+    ConflictError
+        If a run that has not ended is in the folder.
+    WorkspaceError
+        If the folder cannot be written, or the disk cannot hold the run.
+    """
+    checked = check_given(workspace, scenario, name=name, out=out, settings=settings)
+    return carry_out(checked, prepare_run(checked), progress=progress)
+
+
+def run_many(
+    workspace: Workspace,
+    scenarios: Sequence[Scenario | Path],
     *,
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
     processes: int = 1,
     progress: Callable[[RunJob, Progress], None] | None = None,
-    done: Callable[[RunJob, RunResult], None] | None = None,
+    done: Callable[[RunJob, Run], None] | None = None,
     tell: Callable[[str], None] | None = None,
-) -> tuple[RunResult, ...]:
-    """Check scenarios, run them in SUMO, and write their reports.
+) -> tuple[Run, ...]:
+    """Check scenarios, run them in SUMO, several at a time, and write their reports.
 
     Parameters
     ----------
-    paths
-        Scenario files, see :func:`odscen.app.scenarios.scenario_files`.
+    workspace
+        Has the maps.
+    scenarios
+        Scenarios, or their files.
     settings
-        How they are run.
+        How each is run.
     out
         Folder that gets one folder per scenario; the workspace's ``runs`` if not given.
-    processes, progress, done, tell
-        See :func:`run_all`.
+    processes
+        How many run at a time.
+    progress, done
+        Called from the threads that wait for the runs, ``done`` in the order in which they end.
+    tell
+        Called with what the user should know before a long run.
 
     Returns
     -------
-    tuple of RunResult
-        In the order of ``paths``.
+    tuple of Run
+        In the order of ``scenarios``; each completed or failed, see ``status``.
 
     Raises
     ------
     ScenarioError
         If a scenario has errors; none is run then.
+    NotFoundError
+        If the workspace does not have a map.
+    WorkspaceError
+        If a folder cannot be written, or the disk cannot hold a run.
     """
     names: set[str] = set()
-    runs = [
-        check_file(
-            workspace, path, name=_own_name(scenario_name(path), names), out=out, settings=settings
-        )
-        for path in paths
-    ]
+    runs = []
+    for scenario in scenarios:
+        own = _own_name(scenario_name(scenario), names)
+        runs.append(check_given(workspace, scenario, name=own, out=out, settings=settings))
     return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
 
 
@@ -286,19 +358,28 @@ def resume(
     progress: OnProgress | None = None,
     tell: Callable[[str], None] | None = None,
     live: Companion | None = None,
-) -> RunResult:
+) -> Run:
     """Resume an interrupted run and write its report.
 
     Parameters
     ----------
+    workspace
+        Has the map.
     run
         Its folder, or its name in the workspace.
     time_limit
         Wall seconds after which it is interrupted again.
+    progress
+        Called in this thread, a few times a second.
     tell
         Called with where it goes on, and what is damaged.
     live
         Makes it a run that can be watched and steered.
+
+    Returns
+    -------
+    Run
+        With the same results as if it had not been interrupted.
 
     Raises
     ------

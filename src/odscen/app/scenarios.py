@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.app.maps import load_map, map_of
@@ -13,10 +14,10 @@ from odscen.scenario.document.sampling_config import SamplingConfig, loads_confi
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
+from odscen.workspace.store import plain_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
-    from pathlib import Path
 
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
@@ -28,6 +29,16 @@ SUFFIX = ".scenario.json"
 
 def read_scenario(path: Path) -> Scenario:
     """Read a scenario, as JSON document or in its graph form.
+
+    Parameters
+    ----------
+    path
+        Its file.
+
+    Returns
+    -------
+    Scenario
+        The document.
 
     Raises
     ------
@@ -45,6 +56,13 @@ def read_scenario(path: Path) -> Scenario:
 
 def write_scenario(scenario: Scenario, path: Path) -> Path:
     """Write a scenario, as JSON document.
+
+    Parameters
+    ----------
+    scenario
+        The document.
+    path
+        File to write; its folder is made if need be.
 
     Returns
     -------
@@ -85,23 +103,45 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def scenario_name(path: Path) -> str:
-    """Name of a scenario and of its run folder: the file's name without its ending."""
-    name = path.name
+def scenario_name(scenario: Scenario | Path) -> str:
+    """Name of a scenario's run folder: the file's name without its ending, or the scenario's."""
+    if not isinstance(scenario, Path):
+        return plain_name(scenario.name) or "scenario"
+    name = scenario.name
     for ending in (SUFFIX, ".json", ".graphml"):
         if name.endswith(ending):
             return name.removesuffix(ending)
     return name
 
 
-def check_scenario(workspace: Workspace, scenario: Scenario) -> tuple[Problem, ...]:
+def given_scenario(scenario: Scenario | Path) -> Scenario:
+    """Return a scenario, read if it is given as a file; errors of :func:`read_scenario`."""
+    return read_scenario(scenario) if isinstance(scenario, Path) else scenario
+
+
+def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Problem, ...]:
     """Find every problem of a scenario on its map; :mod:`odscen.scenario.checks` has the rules.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file.
+
+    Returns
+    -------
+    tuple of Problem
+        Errors, with which it cannot run, and warnings; empty if all is well.
 
     Raises
     ------
     NotFoundError
         If the workspace has no such map.
+    InputError
+        If the file cannot be read, or the map of that name has other content.
     """
+    scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
     return check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
 
@@ -135,6 +175,8 @@ def generate(
 
     Parameters
     ----------
+    workspace
+        Has the maps.
     settings
         Which scenarios.
     out

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from odscen.carla.camera import Camera
     from odscen.carla.cosim_options import CosimOptions
     from odscen.results.records.run_records import Plan
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.in_step import Step
-    from odscen.sumo.runner.run_jobs import RunResult
     from odscen.sumo.worker.protocol import EgoPose, OnProgress
     from odscen.workspace.store import Workspace
 
@@ -91,7 +91,7 @@ def cosim(
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
     progress: OnProgress | None = None,
-) -> tuple[RunResult, CosimReport]:
+) -> tuple[Run, CosimReport]:
     """Run a scenario in SUMO and show it on a CARLA server.
 
     The run folder is that of :func:`odscen.app.runs.run`, whatever happens to the server: if that

@@ -256,6 +256,7 @@ def between(last: Step, step: Step, share: float) -> Step:
     return Step(
         time=last.time + share * (step.time - last.time),
         index=step.index[new],
+        ids=step.ids[new],
         x=last.x[old] + part * dx,
         y=last.y[old] + part * dy,
         z=last.z[old] + part * (step.z[new] - last.z[old]),

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from odscen.app.runs import CheckedRun
     from odscen.carla.native_worker import Told
     from odscen.results.records.run_records import Plan
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.sumo.runner.run_jobs import RunResult
     from odscen.sumo.worker.protocol import OnProgress
     from odscen.workspace.store import Workspace
 
@@ -92,7 +92,7 @@ def run_native(
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
     progress: OnProgress | None = None,
-) -> tuple[RunResult, NativeReport]:
+) -> tuple[Run, NativeReport]:
     """Let CARLA's Traffic Manager and walkers run a scenario.
 
     Ctrl-C ends it between two ticks, and what it did so far is kept.

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from odscen import __version__
 from odscen.base.errors import OdscenError
+from odscen.base.version import __version__
 from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim

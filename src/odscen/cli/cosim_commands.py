@@ -15,8 +15,8 @@ from odscen.results.records.outcomes import RunStatus
 if TYPE_CHECKING:
     from odscen.carla.cosim import CosimReport
     from odscen.carla.native_run import NativeOptions
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.sumo.runner.run_jobs import RunResult
     from odscen.sumo.worker.protocol import Progress
 
 
@@ -193,7 +193,7 @@ def _run_native(
     raise typer.Exit(INTERRUPTED if report.interrupted and not failed else result.exit_code)
 
 
-def _exit_code(result: RunResult, report: CosimReport) -> int:
+def _exit_code(result: Run, report: CosimReport) -> int:
     from odscen.carla.cosim import INTERRUPTED
 
     if result.status is RunStatus.FAILED or report.error or report.left_behind:
@@ -201,7 +201,7 @@ def _exit_code(result: RunResult, report: CosimReport) -> int:
     return INTERRUPTED if report.interrupted else result.exit_code
 
 
-def _show(result: RunResult, report: CosimReport, *, as_json: bool) -> None:
+def _show(result: Run, report: CosimReport, *, as_json: bool) -> None:
     if as_json:
         print_json({**result.to_dict(), "carla": asdict(report)})
     else:

@@ -33,9 +33,9 @@ def demo(
         settings = GenerationSettings(map_name=DEMO_MAP, seed=seed, fill=DEMO_FILL, roi_segments=60)
         paths = scenarios.generate(store, settings=settings, progress=step)
     log(f"Scenario: {paths[0]}")
-    results = runs.run(store, paths)
+    result = runs.run(store, paths[0])
     if as_json:
-        print_json(results[0].to_dict())
+        print_json(result.to_dict())
     else:
-        show_results(results, as_json=False, several=False)
-    raise typer.Exit(results[0].exit_code)
+        show_results([result], as_json=False, several=False)
+    raise typer.Exit(result.exit_code)

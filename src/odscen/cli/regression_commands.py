@@ -96,13 +96,13 @@ def compare(
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
     from odscen.base.text_files import write_text
-    from odscen.regression.compare import compare_runs, read_runs
+    from odscen.regression.compare import compare as compare_sides
     from odscen.regression.comparison_page import comparison_page
     from odscen.workspace.store import Workspace
 
     # The page draws the map, if the workspace has it.
     store = None if html is None else Workspace.open(workspace)
-    result = compare_runs(read_runs(run_a, store), read_runs(run_b, store))
+    result = compare_sides(run_a, run_b, workspace=store)
     if html is not None:
         write_text(html, comparison_page(result))
     if as_json:

@@ -17,8 +17,9 @@ from odscen.results.records.outcomes import RunStatus
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import SliceLength
-    from odscen.sumo.runner.run_jobs import RunJob, RunResult
+    from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
 
 
@@ -147,7 +148,7 @@ def run(
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
     with _hint(out or store.runs), progress("running") as step:
-        results = runs.run(
+        results = runs.run_many(
             store,
             paths,
             settings=settings,
@@ -187,7 +188,7 @@ def resume(
     raise typer.Exit(result.exit_code)
 
 
-def show_results(results: Sequence[RunResult], *, as_json: bool, several: bool) -> None:
+def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> None:
     """Print finished runs: a table for people, JSON for scripts."""
     if as_json:
         runs = [result.to_dict() for result in results]

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from odscen import __version__
 from odscen.base.errors import InputError, in_file
 from odscen.base.text_files import write_text
+from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
 from odscen.results.records.run_records import json_with_rows
 

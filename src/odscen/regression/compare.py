@@ -16,6 +16,7 @@ from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.report.place_shapes import place_shapes
 from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.layout import FIGURES_FOLDER, SUMMARY_FILE
 
 if TYPE_CHECKING:
@@ -97,7 +98,21 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class RunComparison:
-    """The comparison: figures of the run, then the places that differ most."""
+    """The comparison of two sides A and B.
+
+    Attributes
+    ----------
+    a, b
+        The runs of both sides.
+    rows
+        One for each figure of the runs and of each place: ``key`` says which, ``difference`` has
+        the means ``a`` and ``b``, ``difference`` (B minus A) and the bounds ``low`` and ``high``
+        of its 95 % interval, all in the unit of the figure; ``words`` says it in a line.
+    places
+        Rows of the places that differ most.
+    notes
+        What limits the comparison, in words.
+    """
 
     a: RunSet
     b: RunSet
@@ -132,6 +147,34 @@ def _row(row: Row) -> dict[str, Any]:
     found = asdict(row.difference)
     found |= {"relative": row.difference.relative, "clear": row.difference.clear}
     return {**key, "unit": row.key.entry.unit, **found}
+
+
+def compare(a: Run | Path, b: Run | Path, *, workspace: Workspace | None = None) -> RunComparison:
+    """Compare runs: every figure of both sides, with 95 % intervals where there are several seeds.
+
+    Parameters
+    ----------
+    a, b
+        A run, its folder, or a folder of runs of one scenario with different seeds.
+    workspace
+        To draw the map on the page of the comparison, if it has it.
+
+    Returns
+    -------
+    RunComparison
+        Differences are B minus A, in the unit of each figure.
+
+    Raises
+    ------
+    InputError
+        If there is no run, one has failed, or two of one side have the same seed.
+
+    Notes
+    -----
+    Runs of the same seeds are compared in pairs; intervals are Student's t.
+    """
+    one, other = (side.folder if isinstance(side, Run) else side for side in (a, b))
+    return compare_runs(read_runs(one, workspace), read_runs(other, workspace))
 
 
 def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:

@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from odscen.regression.suite import Case, Suite
     from odscen.regression.verdict import BaselineVerdict
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import RunJob, RunResult
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
     from odscen.workspace.store import MapEntry, Workspace
 
@@ -169,7 +170,7 @@ def run_suite(
                 runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
         follow = _Follow(len(runs), progress)
 
-        def done(job: RunJob, result: RunResult) -> None:
+        def done(job: RunJob, result: Run) -> None:
             case, seed = jobs[job.name]
             case.runs[seed] = _seed_result(case, seed, result)
             if out is None:
@@ -255,7 +256,7 @@ def _settings(case: Case, suite: Suite) -> RunSettings:
     )
 
 
-def _seed_result(loaded: _Loaded, seed: int, result: RunResult) -> SeedResult:
+def _seed_result(loaded: _Loaded, seed: int, result: Run) -> SeedResult:
     summary = result.summary
     missed = [
         f"seed {seed}: expected {verdict.expectation}, but it is "

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
-    from odscen.sumo.runner.run_jobs import RunResult
 
 _SUFFIX = ".scenario.json"
 
@@ -92,11 +92,10 @@ class _ScenarioTest(pytest.Item):
 @pytest.fixture
 def odscen_run(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[..., RunResult]:
-    """Return a function that runs a scenario and gives its :class:`RunResult`.
+) -> Callable[..., Run]:
+    """Return a function that runs a scenario and gives the finished :class:`Run`.
 
-    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``; the result has
-    ``status``, ``summary`` (figures, counts) and ``folder`` (trajectories, events). A run that
+    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``. A run that
     fails or falls short of ``expect`` fails the test.
     """
 
@@ -107,7 +106,7 @@ def odscen_run(
         until: float | None = None,
         expect: Sequence[str] = (),
         workspace: Path | None = None,
-    ) -> RunResult:
+    ) -> Run:
         settings = _settings(seed=seed, until=until, expect=expect)
         folder = tmp_path_factory.mktemp("odscen")
         result = _run(request.config, folder, scenario, settings, workspace=workspace)
@@ -136,7 +135,7 @@ def _run(
     settings: RunSettings,
     *,
     workspace: Path | None = None,
-) -> RunResult:
+) -> Run:
     from pathlib import Path
 
     from odscen.app import runs
@@ -144,11 +143,10 @@ def _run(
 
     named = workspace or config.getoption("--odscen-workspace")
     store = Workspace.open(Path(named) if named else None)
-    (result,) = runs.run(store, [Path(scenario)], settings=settings, out=out)
-    return result
+    return runs.run(store, Path(scenario), settings=settings, out=out)
 
 
-def _shortcomings(result: RunResult) -> list[str]:
+def _shortcomings(result: Run) -> list[str]:
     from odscen.results.records.outcomes import RunStatus
 
     if result.status is RunStatus.FAILED:

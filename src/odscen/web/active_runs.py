@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from odscen.app.runs import CheckedRun
     from odscen.carla.client import Address
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.runner.run_jobs import RunResult
+    from odscen.sumo.folder.finished_run import Run
     from odscen.web.run_messages import GoOn, NewRun, RunControl
     from odscen.workspace.store import Workspace
 
@@ -364,7 +364,7 @@ def _settings(wish: NewRun) -> RunSettings:
     )
 
 
-def _end_of(result: RunResult, active: Active) -> tuple[RunState, str | None]:
+def _end_of(result: Run, active: Active) -> tuple[RunState, str | None]:
     """How a run has ended, and why, if it has not ended as planned."""
     if result.status == "completed":
         return ("stopped" if result.summary["stopped"] else "completed"), None

@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from odscen import __version__
+from odscen.base.version import __version__
 from odscen.carla.client import Address
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web import (

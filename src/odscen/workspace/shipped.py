@@ -13,6 +13,11 @@ def shipped_maps() -> list[Path]:
 
     An installed package holds them inside; a checkout has them in ``maps/``.
 
+    Returns
+    -------
+    list of Path
+        For :meth:`~odscen.workspace.store.Workspace.add_map`.
+
     Raises
     ------
     WorkspaceError

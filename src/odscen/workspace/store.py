@@ -24,6 +24,8 @@ from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.workspace.asset_catalogue import assets_in
 
 if TYPE_CHECKING:
+    import networkx as nx
+
     from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.drawing.map_drawing import MapDrawing
@@ -55,13 +57,27 @@ def check_name(name: str, *, what: str = "map") -> str:
 
 def name_from_file(path: Path) -> str:
     """Map name for a file: its stem, with everything unusual replaced by ``_``."""
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", path.stem).strip("._-")
-    return name[:64] or "map"
+    return plain_name(path.stem) or "map"
+
+
+def plain_name(text: str) -> str:
+    """Text as it can name a folder everywhere, perhaps empty: the unusual replaced by ``_``."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapEntry:
-    """One map of the catalogue: its folder, and lazy access to what was built."""
+    """One map of the catalogue: its folder, and lazy access to what was built.
+
+    Attributes
+    ----------
+    name
+        In the catalogue.
+    folder
+        With all files.
+    info
+        As in ``map.json``: hash, settings, statistics, names of the files, import report.
+    """
 
     name: str
     folder: Path
@@ -99,6 +115,21 @@ class MapEntry:
 
         return from_npz_bytes(self.path("graph_npz").read_bytes())
 
+    def networkx(self) -> tuple[nx.MultiDiGraph, nx.Graph]:
+        """Lane graph and pedestrian graph, see :func:`odscen.lanegraph.networkx_form.to_networkx`.
+
+        Returns
+        -------
+        tuple
+            The lane graph: nodes are named ``road.section.lane.index`` and have ``x``, ``y``,
+            ``z`` (m, OpenDRIVE frame), ``hdg`` (rad), ``width`` (m), ``speed_limit`` (m/s),
+            ``segment``; edges have ``relation`` (successor, left, right) and ``length`` (m). Then
+            the pedestrian graph, undirected.
+        """
+        from odscen.lanegraph.networkx_form import to_networkx
+
+        return to_networkx(self.graph())
+
     def lane_table(self) -> LaneTable:
         """The table between OpenDRIVE lanes and SUMO lanes."""
         return table_from_json(self.path("lane_table").read_bytes())
@@ -130,7 +161,19 @@ class MapEntry:
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``assets/``."""
+    """A folder with ``maps/``, ``scenarios/`` and ``runs/``, perhaps ``assets/``.
+
+    Attributes
+    ----------
+    root
+        The folder.
+
+    Examples
+    --------
+    >>> workspace = Workspace.open(Path("my-workspace"))
+    >>> workspace.add_map(Path("Town01.xodr")).name
+    'Town01'
+    """
 
     root: Path
 

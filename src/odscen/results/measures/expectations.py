@@ -60,7 +60,18 @@ class ExpectationVerdict:
 
 
 def parse_expectation(text: str) -> Expectation:
-    """Read one expectation.
+    """Read one expectation, for ``expectations`` of the settings of a run.
+
+    Parameters
+    ----------
+    text
+        ``NAME OP NUMBER [UNIT]``, for example ``arrived >= 95 %`` or ``mean_delay <= 40 s``; SI
+        without a unit. The table of figures in docs/runs.md has the names.
+
+    Returns
+    -------
+    Expectation
+        To be held against the summary of a run.
 
     Raises
     ------

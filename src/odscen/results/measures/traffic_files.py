@@ -12,10 +12,12 @@ from odscen.results.measures.table_columns import COLUMNS
 from odscen.results.records.run_records import rounded
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     import polars as pl
 
+    from odscen.results.by_place.traffic import TableName
     from odscen.results.measures.figure import RunData
 
 FIGURES_FORMAT = "odscen-figures"
@@ -37,17 +39,30 @@ def read_tables(folder: Path) -> TrafficFigures | None:
 
     if not all((folder / f"{name}.csv").is_file() for name in TABLES):
         return None
-    types: dict[str, type[pl.DataType]] = {
-        column.name: pl.Int64 if column.whole else pl.Float64 for column in COLUMNS
-    }
     tables = {}
     for name in TABLES:
         file = folder / f"{name}.csv"
         names = pl.scan_csv(file).collect_schema().names()
-        # Whatever else a table has, such as ids and levels, is text.
-        schema = {column: types.get(column, pl.String) for column in names}
-        tables[name] = pl.read_csv(file, schema=schema)
+        tables[name] = pl.read_csv(file, schema=_schema(names))
     return TrafficFigures(**tables)
+
+
+def places_from_json(text: str, table: TableName) -> pl.DataFrame:
+    """One table of :func:`figures_json`: a row for each place, over the whole run."""
+    import polars as pl
+
+    rows = json.loads(text)[table]
+    return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
+
+
+def _schema(names: Iterable[str]) -> dict[str, type[pl.DataType]]:
+    import polars as pl
+
+    types: dict[str, type[pl.DataType]] = {
+        column.name: pl.Int64 if column.whole else pl.Float64 for column in COLUMNS
+    }
+    # Whatever else a table has, such as ids and levels, is text.
+    return {name: types.get(name, pl.String) for name in names}
 
 
 def figures_json(data: RunData, figures: TrafficFigures) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.base.frames import SumoPose, sumo_to_xodr
+from odscen.results.records.body_centres import body_centres
 
 if TYPE_CHECKING:
     import polars as pl
@@ -32,36 +32,13 @@ def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) ->
     """
     import polars as pl
 
-    columns = trajectories.columns
-    prefix = next((p for p in ("vehicle_", "person_", "") if f"{p}x" in columns), None)
-    clock = next((name for name in ("timestep_time", "time") if name in columns), None)
-    if prefix is None or clock is None:
-        return _columns(
-            np.zeros(0), np.zeros(1, np.int64), np.zeros(0, np.int64), *[np.zeros(0)] * 4
-        )
-    index = {actor.id: row for row, actor in enumerate(plan.actors)}
-    names = {"id": f"{prefix}id", "x": f"{prefix}x", "y": f"{prefix}y"}
-    names |= {"angle": f"{prefix}angle", "speed": f"{prefix}speed", "time": clock}
-    rows = (
-        trajectories.select(pl.col(old).alias(new) for new, old in names.items())
-        .filter(pl.col("id").is_in(list(index)) & pl.all_horizontal(pl.col("x", "y").is_finite()))
-        .sort("time", maintain_order=True)
-    )
-    times, number = np.unique(rows["time"].to_numpy().astype(np.float64), return_inverse=True)
+    rows = body_centres(trajectories, plan)
+    times, number = np.unique(rows["time"].to_numpy(), return_inverse=True)
     kept = number % every == 0
     rows, number, times = rows.filter(pl.Series(kept)), number[kept] // every, times[::every]
-    actor = np.array([index[name] for name in rows["id"].to_list()], dtype=np.int64)
-    length = np.array([one.length for one in plan.actors], dtype=np.float64)
-    x, y, angle, speed = (
-        rows[name].to_numpy().astype(np.float64) for name in ("x", "y", "angle", "speed")
-    )
-    pose = sumo_to_xodr(
-        SumoPose(x, y, 0.0, angle), length=length[actor], net_offset=plan.net_offset
-    )
+    actor, x, y, hdg, speed = (rows[name].to_numpy() for name in ("row", "x", "y", "hdg", "speed"))
     first = np.searchsorted(number, np.arange(len(times) + 1))
-    return _columns(
-        times, first, actor, np.asarray(pose.x), np.asarray(pose.y), np.asarray(pose.hdg), speed
-    )
+    return _columns(times, first, actor, x, y, hdg, speed)
 
 
 def _columns(

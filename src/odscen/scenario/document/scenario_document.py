@@ -8,11 +8,14 @@ Rules that need the graph live in :mod:`odscen.scenario.checks.scenario_checks`,
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
 from odscen.base.categories import Category
+
+if TYPE_CHECKING:
+    from pydantic.config import JsonDict
 
 FORMAT: Final = "odscen-scenario"
 VERSION: Final = 1
@@ -238,8 +241,44 @@ class Simulation(Part):
     step_length: Annotated[float, Field(gt=0, le=1)] = 0.5
 
 
+def _first_paragraph(schema: JsonDict) -> None:
+    """Leave what is for readers of Python out of the published schema."""
+    schema["description"] = str(schema["description"]).partition("\n\n")[0]
+
+
 class Scenario(Part):
-    """The whole document."""
+    """The whole document.
+
+    It is frozen: ``scenario.model_copy(update={"seed": 3})`` gives another one. Nodes and segments
+    are named as in the lane graph of the map; docs/scenario-format.md describes every part.
+
+    Attributes
+    ----------
+    format, version
+        Which document it is.
+    name, description
+        For people.
+    map
+        Name and SHA-256 of the map, and metres between the nodes of its lane graph.
+    seed
+        Random seed of whatever is drawn in a run, 0 to 2^31 - 1.
+    roi
+        Region of interest: ids of segments.
+    environment
+        Weather, and time of day.
+    actors
+        Vehicles and pedestrians, with ``spawn``, ``goal``, ``depart`` (s) and ``speed`` (m/s).
+    flows
+        Road users that keep coming, per hour.
+    demand
+        Traffic from matrices, day profiles, counts and background.
+    signals
+        How traffic lights are run.
+    simulation
+        Duration and step length, s.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_first_paragraph)
 
     format: Literal["odscen-scenario"] = FORMAT
     version: Literal[1] = VERSION

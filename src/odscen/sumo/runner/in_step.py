@@ -34,8 +34,11 @@ class Step:
         Simulated seconds at which the step began, as in the recorded trajectories.
     index
         Row of the plan, each at most once.
+    ids
+        Id of each road user, as in the scenario; ``<flow>.<k>`` of those that a flow made.
     x, y, z, hdg, pitch
-        Metres and radians; z is the ground below the centre, pitch its slope, positive uphill.
+        Metres and radians, ``hdg`` counter-clockwise from +x; z is the ground below the centre,
+        pitch its slope, positive uphill.
     speed
         m/s.
     signals
@@ -50,6 +53,7 @@ class Step:
 
     time: float
     index: NDArray[np.int64]
+    ids: NDArray[np.str_]
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     z: NDArray[np.float64]
@@ -91,6 +95,7 @@ class InStep:
         self._ground = ground
         self._on_step = on_step
         self._placed = placed
+        self._ids = np.array([actor.id for actor in plan.actors], dtype=np.str_)
         self._lengths = np.array([actor.length for actor in plan.actors])
         self._z = np.array([actor.z for actor in plan.actors])
         self._walks = np.array([actor.category == Category.PEDESTRIAN for actor in plan.actors])
@@ -167,6 +172,7 @@ class InStep:
         return Step(
             time=state.time,
             index=index,
+            ids=self._ids[index],
             x=x,
             y=y,
             z=z,

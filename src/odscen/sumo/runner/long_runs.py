@@ -25,11 +25,11 @@ from odscen.sumo.folder.checkpoint import (
     survey,
     write_whole,
 )
+from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.run_status import locked, read_status, write_status
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
-    RunResult,
     found_files,
     make_summary,
     write_run_folder,
@@ -55,7 +55,7 @@ def run_long(
     progress: OnProgress | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
-) -> RunResult:
+) -> Run:
     """Run in slices in a new folder ``out``, which is there while it goes on.
 
     Parameters as in :func:`odscen.sumo.runner.run_jobs.run_prepared`.
@@ -82,7 +82,7 @@ def resume(
     time_limit: float | None = None,
     finish: Finish | None = None,
     live: Companion | None = None,
-) -> RunResult:
+) -> Run:
     """Go on with an interrupted run from its last complete slice.
 
     Parameters
@@ -157,7 +157,7 @@ def _go_on(
     progress: OnProgress | None,
     finish: Finish | None,
     live: Companion | None,
-) -> RunResult:
+) -> Run:
     limit = prepared.settings.time_limit
     ended = run_worker(folder, progress=progress, time_limit=limit, live=live, keep=(lock,))
     clear_parts(folder)  # a torn one takes room that what follows may need
@@ -175,7 +175,7 @@ def _go_on(
     write_whole(folder / layout.SUMMARY_FILE, summary_to_json(summary))
     if ended.done is not None:
         _clear(folder)
-    return RunResult(folder, summary)
+    return Run(folder, summary)
 
 
 def _slices(folder: Path) -> dict[str, Any]:

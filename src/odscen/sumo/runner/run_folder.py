@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from odscen import __version__
+from odscen.base.version import __version__
 from odscen.results.by_place.traffic import TABLES
 from odscen.results.measures.expectations import evaluate
 from odscen.results.measures.figure import SummaryPart
@@ -76,36 +76,6 @@ class PreparedRun:
     about: Mapping[str, Any] = field(default_factory=dict)
     expected: Forecast | None = None
     places: LanePlaces | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class RunResult:
-    """A finished run: its folder, and ``summary`` as in ``summary.json``."""
-
-    folder: Path
-    summary: Mapping[str, Any]
-
-    @property
-    def status(self) -> RunStatus:
-        """``completed`` if the simulation ended by itself, whatever became of the actors."""
-        return RunStatus(self.summary["status"])
-
-    @property
-    def expectations_met(self) -> bool:
-        """Whether every expectation has passed; true if there is none."""
-        return all(verdict["passed"] for verdict in self.summary["expectations"])
-
-    @property
-    def exit_code(self) -> int:
-        """0 completed, 1 completed with failed expectations, 3 failed."""
-        if self.status is RunStatus.FAILED:
-            return 3
-        return 0 if self.expectations_met else 1
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the summary with the folder and absolute paths of its files."""
-        files = {name: str(self.folder / file) for name, file in self.summary["files"].items()}
-        return {**self.summary, "folder": str(self.folder), "files": files}
 
 
 def write_run_folder(prepared: PreparedRun, folder: Path) -> None:

@@ -16,11 +16,11 @@ from odscen.base.atomic_folders import new_folder
 from odscen.base.errors import WorkspaceError
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.forecast import refuse_without_room
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
-    RunResult,
     drop_torn_records,
     found_files,
     make_summary,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.sumo.runner.worker_process import Companion, Ended
     from odscen.sumo.worker.protocol import OnProgress, Progress
 
-__all__ = ["PreparedRun", "RunJob", "RunResult", "run_many", "run_prepared", "write_sumo_files"]
+__all__ = ["PreparedRun", "RunJob", "run_many", "run_prepared", "write_sumo_files"]
 
 
 def run_prepared(
@@ -50,7 +50,7 @@ def run_prepared(
     live: Companion | None = None,
     tell: Callable[[str], None] | None = None,
     simulate: Callable[[Path], Ended] | None = None,
-) -> RunResult:
+) -> Run:
     """Run in a new folder ``out``; whatever was there is replaced.
 
     A run in slices is there while it goes on, see :mod:`odscen.sumo.runner.long_runs`.
@@ -101,7 +101,7 @@ def run_prepared(
     except OSError as error:
         msg = f"run folder {out}: {error.strerror or error} ({error.filename or ''})"
         raise WorkspaceError(msg) from error
-    return RunResult(out, summary)
+    return Run(out, summary)
 
 
 _LISTEN = 0.2
@@ -130,9 +130,9 @@ def run_many(
     *,
     processes: int = 1,
     progress: Callable[[RunJob, Progress], None] | None = None,
-    done: Callable[[RunJob, RunResult], None] | None = None,
+    done: Callable[[RunJob, Run], None] | None = None,
     tell: Callable[[str], None] | None = None,
-) -> tuple[RunResult, ...]:
+) -> tuple[Run, ...]:
     """Run several scenarios, ``processes`` at a time; results in the order of ``jobs``.
 
     ``progress`` and ``done`` are called from the threads that wait for the processes, ``done`` in
@@ -141,7 +141,7 @@ def run_many(
     """
     stopping = threading.Event()
 
-    def one(job: RunJob) -> RunResult:
+    def one(job: RunJob) -> Run:
         def follow(message: Progress) -> None:
             if stopping.is_set():  # ends this worker process too
                 raise _StoppedError
@@ -165,7 +165,7 @@ def run_many(
             raise
 
 
-def _wait(futures: Sequence[Future[RunResult]]) -> None:
+def _wait(futures: Sequence[Future[Run]]) -> None:
     """Wait until all have ended, or raise what the first of them raises.
 
     Polars has system calls go on after Ctrl-C (https://github.com/pola-rs/polars/issues/21739): a

@@ -1,0 +1,194 @@
+"""A run watched step by step, from the caller's own loop.
+
+SUMO runs in its own process as always, and a thread of ours follows it: it hands each step to the
+caller and waits there until the next one is asked for, so that nothing piles up.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from odscen.app.runs import carry_out, check_given, prepare_run
+from odscen.base.errors import ConflictError
+from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.sumo.runner.elevation import ElevationLookup
+from odscen.sumo.runner.in_step import InStep
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from odscen.app.runs import CheckedRun
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.sumo.runner.in_step import Step
+    from odscen.workspace.store import Workspace
+
+_LISTEN = 0.2
+"""Wall seconds after which a wait looks for Ctrl-C, see ``run_jobs``."""
+
+
+class WatchedRun:
+    """A run that waits for whoever watches it: an iterator of its steps, see :func:`watch`.
+
+    Parameters
+    ----------
+    checked
+        The run, from :func:`odscen.app.runs.check_run`; it starts at once and waits.
+
+    Raises
+    ------
+    ScenarioError
+        If a spawn or goal is not usable in SUMO.
+    """
+
+    def __init__(self, checked: CheckedRun) -> None:
+        self._checked = checked
+        self._prepared = prepare_run(checked)
+        ground = ElevationLookup(checked.map.sumo.graph, checked.entry.lane_table())
+        self._in_step = InStep(self._prepared.plan, ground, self._hand_over)
+        self._steps: queue.SimpleQueue[Step | None] = queue.SimpleQueue()
+        self._wanted = threading.Semaphore(0)
+        self._closing = self._over = False
+        self._run: Run | None = None
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._follow, name="odscen-watch", daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Iterator[Step]:
+        return self
+
+    def __next__(self) -> Step:
+        """Let SUMO make its next step."""
+        if self._over:
+            raise StopIteration
+        self._wanted.release()
+        step = self._next()
+        if step is None:
+            self._over = True
+            self._refuse_error()
+            raise StopIteration
+        return step
+
+    @property
+    def run(self) -> Run:
+        """The finished run, as :func:`odscen.app.runs.run` gives it.
+
+        Raises
+        ------
+        ConflictError
+            If it has not ended.
+        """
+        if self._run is None:
+            msg = "the run has not ended; it ends with its last step, or with the block of watch"
+            raise ConflictError(msg)
+        return self._run
+
+    def close(self) -> None:
+        """Stop after the present step, and wait until results and report are written.
+
+        Raises
+        ------
+        WorkspaceError
+            If they could not be.
+        """
+        self._closing = True
+        self._wanted.release()
+        while self._thread.is_alive():
+            self._thread.join(_LISTEN)
+        if not self._over:
+            self._over = True
+            self._refuse_error()
+
+    def _next(self) -> Step | None:
+        while True:
+            try:
+                return self._steps.get(timeout=_LISTEN)
+            except queue.Empty:
+                continue
+
+    def _refuse_error(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+    def _hand_over(self, step: Step) -> None:
+        self._wanted.acquire()
+        if self._closing:
+            self._in_step.stop()
+        else:
+            self._steps.put(step)
+
+    def _follow(self) -> None:
+        try:
+            self._run = carry_out(self._checked, self._prepared, live=self._in_step)
+        except BaseException as error:  # raised again where the steps are asked for
+            self._error = error
+        finally:
+            self._steps.put(None)
+
+
+@contextmanager
+def watch(
+    workspace: Workspace,
+    scenario: Scenario | Path,
+    *,
+    settings: RunSettings = AS_DESIGNED,
+    name: str | None = None,
+    out: Path | None = None,
+) -> Iterator[WatchedRun]:
+    """Run a scenario and see every step of it; SUMO waits for the loop.
+
+    Leaving the block early, by ``break`` or by an error, stops the run; what happened until then is
+    written like the results of any run.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario, or its file.
+    settings
+        How it is run; always in one piece.
+    name
+        Of the run's folder; the scenario's if not given.
+    out
+        Folder that gets the run's folder; the workspace's ``runs`` if not given.
+
+    Yields
+    ------
+    WatchedRun
+        Iterate over it for the steps, each a :class:`~odscen.sumo.runner.in_step.Step`: ``time``
+        (s) and arrays of shape ``(N,)`` of the road users under way, ``ids``, ``x``, ``y``, ``z``
+        (m), ``hdg``, ``pitch`` (rad) of body centres in the OpenDRIVE frame, ``speed`` (m/s). When
+        the block has ended, ``run`` is the finished run.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario has errors.
+    NotFoundError
+        If the workspace does not have its map.
+    ConflictError
+        If a run that has not ended is in the folder.
+    WorkspaceError
+        If the folder cannot be written, or the disk cannot hold the run.
+
+    Examples
+    --------
+    >>> with watch(workspace, scenario) as steps:
+    ...     for step in steps:
+    ...         if step.time > 60 and (step.speed < 0.1).all():
+    ...             break
+    >>> steps.run.status
+    """
+    settings = replace(settings, slice_length=None)
+    watched = WatchedRun(check_given(workspace, scenario, name=name, out=out, settings=settings))
+    try:
+        yield watched
+    finally:
+        watched.close()

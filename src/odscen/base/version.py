@@ -1,0 +1,3 @@
+"""Version of odscen: here alone, and hatchling reads it here."""
+
+__version__ = "0.2.0"

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from odscen.app.runs import run
+from odscen.app.scenarios import read_scenario
+from odscen.app.watched_runs import watch
+from odscen.base.errors import ConflictError, ScenarioError
+from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+
+SETTINGS = RunSettings(until=20.0)
+
+
+@pytest.fixture(scope="module")
+def plain(workspace: Workspace, sampled: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return run(workspace, sampled, settings=SETTINGS, out=tmp_path_factory.mktemp("plain"))
+
+
+def watchers() -> list[threading.Thread]:
+    return [one for one in threading.enumerate() if one.name == "odscen-watch"]
+
+
+def test_a_watched_run_has_the_bytes_of_one_that_is_not(
+    workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
+) -> None:
+    with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+        times = [step.time for step in steps]
+    assert times == [0.5 * number for number in range(40)]
+    for name in ("trajectories.parquet", "events.json", "actors.json", "figures.json"):
+        assert (steps.run.folder / name).read_bytes() == (plain.folder / name).read_bytes()
+    assert steps.run.report is not None
+    assert watchers() == []
+
+
+def test_steps_are_where_the_trajectories_are(
+    workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
+) -> None:
+    recorded = plain.trajectories()
+    with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+        for step in steps:
+            count = len(step.ids)
+            for values in (step.x, step.y, step.z, step.hdg, step.pitch, step.speed, step.index):
+                assert values.shape == (count,)
+            rows = recorded.filter(pl.col("time") == step.time).sort("id")
+            order = np.argsort(step.ids)
+            assert rows["id"].to_list() == step.ids[order].tolist()
+            x, y, speed = (rows[name].to_numpy() for name in ("x", "y", "speed"))
+            assert np.hypot(x - step.x[order], y - step.y[order]).max(initial=0.0) < 0.01
+            assert np.abs(speed - step.speed[order]).max(initial=0.0) < 1e-4
+
+
+def test_leaving_the_loop_stops_the_run_and_keeps_what_happened(
+    workspace: Workspace, sampled: Path, tmp_path: Path, plain: Run
+) -> None:
+    with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+        for step in steps:
+            if step.time >= 5.0:
+                break
+        with pytest.raises(ConflictError, match="has not ended"):
+            _ = steps.run
+    summary = steps.run.summary
+    assert (summary["status"], summary["stopped"]) == ("completed", True)
+    assert 5.0 <= summary["sim_seconds"] <= 7.0
+    early = steps.run.trajectories().filter(pl.col("time") <= 5.0)
+    assert early.equals(plain.trajectories().filter(pl.col("time") <= 5.0))
+    assert watchers() == []
+
+
+def test_an_error_in_the_loop_comes_out_and_leaves_no_process(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    seen = []
+
+    def look() -> None:
+        with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+            seen.append(steps)
+            for step in steps:
+                _ = 1 / (step.time < 3.0)
+
+    with pytest.raises(ZeroDivisionError):
+        look()
+    assert seen[0].run.summary["stopped"] is True
+    assert watchers() == []
+
+
+def test_a_run_that_nobody_looks_at_is_stopped_too(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    with watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps:
+        pass
+    assert steps.run.summary["sim_seconds"] <= 2.0
+    assert list(steps) == []
+
+
+def test_what_keeps_a_run_from_starting_is_raised_before_any_step(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    scenario = read_scenario(sampled)
+    twice = scenario.model_copy(update={"actors": (*scenario.actors, scenario.actors[0])})
+    with pytest.raises(ScenarioError), watch(workspace, twice, out=tmp_path):
+        pytest.fail("it has started")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_run_in_the_folder_is_refused_to_whoever_asks_for_steps(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    name = sampled.name.removesuffix(".scenario.json")
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "status.json").write_text('{"format": "odscen-status", "time": 3}')
+    with (
+        pytest.raises(ConflictError, match="has not ended"),
+        watch(workspace, sampled, settings=SETTINGS, out=tmp_path) as steps,
+    ):
+        list(steps)
+    assert watchers() == []
