@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic.config import JsonDict
 
 from odscen.base.categories import Category
 
@@ -238,7 +239,7 @@ class Simulation(Part):
     step_length: Annotated[float, Field(gt=0, le=1)] = 0.5
 
 
-def _first_paragraph(schema: dict[str, object]) -> None:
+def _first_paragraph(schema: JsonDict) -> None:
     """Leave what is for readers of Python out of the published schema."""
     schema["description"] = str(schema["description"]).partition("\n\n")[0]
 
