@@ -8,12 +8,14 @@ Rules that need the graph live in :mod:`odscen.scenario.checks.scenario_checks`,
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
-from pydantic.config import JsonDict
 
 from odscen.base.categories import Category
+
+if TYPE_CHECKING:
+    from pydantic.config import JsonDict
 
 FORMAT: Final = "odscen-scenario"
 VERSION: Final = 1
