@@ -134,7 +134,7 @@ def test_carla_drives_a_scenario_into_a_run_folder(options: Any, sample: Sample)
     assert Path(told["files"]["report"]).is_file()
     assert told["figures"]["mean_travel_time"] > 0.0
     assert told["figures"]["mean_delay"] is None, "only SUMO measures what was lost"
-    assert not [note for note in told["carla"]["notes"] if "left its way" in note]
+    assert not [note for note in told["carla"]["notes"] if "left its route" in note]
 
 
 def test_vehicles_go_the_way_of_the_plan_and_stop_at_its_end(

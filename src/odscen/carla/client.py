@@ -104,7 +104,7 @@ def answering(address: Address) -> Iterator[None]:
             problem = f"the CARLA server at {address} refused"
             raise CarlaError(problem, output=str(error)) from error
         if not address.listens():
-            problem = f"the CARLA server at {address} is gone: nobody listens there any more"
+            problem = f"the CARLA server at {address} is gone: no server listens there any more"
             raise CarlaError(problem) from error
         problem = (
             f"the CARLA server at {address} has not answered for {address.timeout:g} s: it may "

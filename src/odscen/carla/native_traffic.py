@@ -307,7 +307,9 @@ class Traffic:
         one.at += nearest
         if distance[nearest] > STRAYED and not one.strayed:
             one.strayed = True
-            happened.notes.append(f"{one.plan.id}: left its way {_left(one):.0f} m before its goal")
+            happened.notes.append(
+                f"{one.plan.id}: left its route {_left(one):.0f} m before its goal"
+            )
         return math.hypot(way[-1, 0] - float(pose.x), way[-1, 1] - float(pose.y))
 
     def _vanished(self, one: _Underway, time: float, happened: Happened) -> bool:

@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from odscen.workspace.asset_catalogue import Assets
 
 NO_NAVIGATION = (
-    "the world has no navigation mesh: pedestrians are led along their ways and do not look "
+    "the world has no navigation mesh: pedestrians are led along their routes and do not look "
     "around them"
 )
 
 ROAD_ENDS = (
-    "{} vehicles were taken away by the Traffic Manager {:.0f} to {:.0f} m before their goals, "
+    "the Traffic Manager removed {} vehicles {:.0f} to {:.0f} m before their goals, "
     "where it saw the road end; they count as arrived"
 )
 

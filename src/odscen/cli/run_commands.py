@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def _hint(folder: Path) -> Iterator[None]:
-    """Tell whoever interrupts long runs how to go on with them."""
+    """Say how to resume long runs when they are interrupted."""
     from odscen.sumo.runner.long_runs import interrupted
 
     before = set(interrupted(folder))
@@ -32,7 +32,7 @@ def _hint(folder: Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         for name in sorted(set(interrupted(folder)) - before):
-            log(f"{name} is interrupted; to go on with it: odscen resume {folder / name}")
+            log(f"{name} is interrupted; to resume it: odscen resume {folder / name}")
         raise
 
 
@@ -168,7 +168,7 @@ def resume(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Go on with an interrupted long run; it ends as if it had not been interrupted.
+    """Resume an interrupted long run; it ends as if it had not been interrupted.
 
     Exit codes as of ``run``.
     """

@@ -191,7 +191,9 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
     mask = np.isin(graph.lanes.segment, segment_rows(graph.segments, names))
     path = _shortest(graph, names[0], names[-1], mask)
     if path is None or list(_passed(graph, path)) != names:
-        msg = f"one cannot drive along {', '.join(names)} in this order; --from and --to find a way"
+        msg = (
+            f"one cannot drive along {', '.join(names)} in this order; --from and --to find a route"
+        )
         raise InputError(msg)
     return _measured(graph, names, path)
 

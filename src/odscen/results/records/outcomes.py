@@ -1,6 +1,6 @@
 """What can become of a run, an actor and a place on the road, and why: with words for each.
 
-A member's value is what stands in the files of a run; its ``label`` is what people read.
+A member's value is written into the files of a run; its ``label`` is what people read.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from enum import StrEnum
 
 
 class RunStatus(StrEnum):
-    """How a run ended; one that somebody has stopped early is ``completed``, too."""
+    """How a run ended; one that a user has stopped early is ``completed``, too."""
 
     COMPLETED = "completed"
     FAILED = "failed"
@@ -41,8 +41,8 @@ _STATUS_LABELS = {
 class IncidentKind(StrEnum):
     """What can go wrong with traffic at a place.
 
-    ``jam``: vehicles stand there for minutes; ``moved_on``: SUMO has teleported a vehicle, that is
-    taken it out and put it back further on; ``kept_out``: planned, but not inserted.
+    ``jam``: vehicles are stopped there for minutes; ``moved_on``: SUMO has teleported a vehicle,
+    that is removed it and put it back further on; ``kept_out``: planned, but not inserted.
     """
 
     JAM = "jam"

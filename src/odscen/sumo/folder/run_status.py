@@ -96,7 +96,7 @@ def _take(descriptor: int, run: Path, patience: float) -> None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             if time.monotonic() >= end:
-                msg = f"run {run.name!r} is going on in another process"
+                msg = f"run {run.name!r} is running in another process"
                 raise ConflictError(msg) from None
             time.sleep(0.05)
         else:

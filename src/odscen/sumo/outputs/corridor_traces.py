@@ -51,11 +51,11 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
     row_of = {places.lanes[row]: row for row in np.unique(places.lane[nodes]).tolist()}
     table = pl.scan_parquet(files)
     if "vehicle_lane" not in table.collect_schema().names():
-        return "The trajectories do not say on which lane anybody was, so there is no diagram."
+        return "The trajectories do not say on which lanes vehicles were, so there is no diagram."
     on_way = table.filter(pl.col("vehicle_lane").is_in(list(row_of)))
     window = _busiest(on_way)
     if window is None:
-        return "Nobody drove along this corridor."
+        return "No vehicle drove along this corridor."
     begin, end = window
     rows = (
         on_way.filter(pl.col("timestep_time").is_between(begin, end))

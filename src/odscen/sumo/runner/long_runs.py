@@ -112,7 +112,7 @@ def resume(
             for problem in problems:
                 tell(problem)
             begin = read_checkpoint(folder, number).time if number else 0.0
-            tell(f"going on at {begin:g} s, after slice {number}" if number else "begins anew")
+            tell(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
         return _go_on(prepared, folder, lock, progress, finish, live)
 
@@ -129,7 +129,7 @@ def refuse_interrupted(out: Path) -> None:
     if status is not None:
         msg = (
             f"run {out.name!r} has not ended (it is at {status.get('time', 0):g} s); "
-            f"odscen resume {out} goes on with it; delete the folder to begin anew"
+            f"odscen resume {out} resumes it; delete the folder to begin anew"
         )
         raise ConflictError(msg)
 
@@ -167,7 +167,7 @@ def _go_on(
         kept = summary["slices"]["time"]
         summary["error"] = (
             f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
-            f"to go on from there: odscen resume {folder}"
+            f"to resume there: odscen resume {folder}"
         )
     elif finish is not None:
         finish(folder, summary)

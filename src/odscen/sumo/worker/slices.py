@@ -140,7 +140,7 @@ class _RunningSlice:
         if self._before is None:
             return
         if abs(session.time - self._before.time) > 1e-6:
-            msg = f"SUMO goes on at {session.time:g} s instead of {self._before.time:g} s"
+            msg = f"SUMO resumes at {session.time:g} s instead of {self._before.time:g} s"
             raise SimulationError(msg)
         missing = [name for name in self._before.present if not session.knows(name)]
         stepper.recorder.lose(session.time, missing)
