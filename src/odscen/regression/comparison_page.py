@@ -284,7 +284,7 @@ def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:
     )
     explained = (
         "each dot is one interval of one run: density and flow of the network. If the dots of one "
-        "side lie higher at the same density, its network has a higher capacity; if they reach "
+        "side lie higher at the same density, its network serves a higher flow; if they reach "
         "further to the right, it is more congested."
     )
     return report_section(

@@ -85,9 +85,7 @@ def test_the_diagram_has_a_dot_for_each_interval_with_traffic_and_names_the_most
     section = diagram_section(figures.network)
     assert str(section).count("<circle") == 4
     # 150 vehicles over 310 m of lane in a quarter of an hour on 310 m of lanes: 600 an hour.
-    assert "The flow was highest from 0:45 to 1:00 h: 600 vehicles an hour per lane" in words(
-        section
-    )
+    assert "The flow was highest from 0:45 to 1:00 h: 600 veh/h per lane" in words(section)
 
 
 def test_a_run_of_one_interval_has_no_course():

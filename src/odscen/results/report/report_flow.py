@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TIMES = 6
 """Parts of the run that have a colour of their own."""
 
-FLOW, DENSITY, SPEED = "vehicles an hour, per lane", "vehicles per km of lane", "speed, km/h"
+FLOW, DENSITY, SPEED = "flow, veh/h per lane", "density, veh/km per lane", "speed, km/h"
 
 
 def column(table: pl.DataFrame, name: str) -> FloatArray:
@@ -92,7 +92,7 @@ def diagram_section(network: pl.DataFrame) -> Markup | None:
     most = element(
         "p",
         f"The flow was highest from {stretch(top['begin'], top['end'])}: {number(top['flow'], 0)} "
-        f"vehicles an hour per lane, at {number(top['density'], 1)} per km and "
+        f"veh/h per lane, at {number(top['density'], 1)} veh/km and "
         f"{number(top['speed'] * 3.6, 0)} km/h on average.",
     )
     explained = (
@@ -125,6 +125,6 @@ def _by_time(busy: pl.DataFrame) -> list[Dots]:
 
 def _title(row: Mapping[str, float]) -> str:
     return (
-        f"{stretch(row['begin'], row['end'])}: {number(row['flow'], 0)} vehicles an hour, "
-        f"{number(row['density'], 1)} per km"
+        f"{stretch(row['begin'], row['end'])}: {number(row['flow'], 0)} veh/h, "
+        f"{number(row['density'], 1)} veh/km"
     )
