@@ -5,7 +5,7 @@ raises a plain ``RuntimeError`` for everything. So :func:`connect` first waits f
 compares releases.
 
 ``carla`` is an optional package (extra ``carla``), for CPython 3.11 and 3.12; it is imported when
-somebody connects.
+a client connects.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def import_carla() -> Any:
 
 
 def _await_port(address: Address) -> None:
-    """Wait until somebody listens: a client that is made too early is dead for ever."""
+    """Wait until a server listens: a client that is made too early is dead for ever."""
     deadline = time.monotonic() + address.timeout
     while True:
         try:
