@@ -222,7 +222,7 @@ def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob,
 
 
 def _words(name: str, message: Progress) -> str:
-    told = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
+    line = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
     if message.time_left is None:
-        return told
-    return f"{told}, about {clock(message.time_left + 59)} h left"
+        return line
+    return f"{line}, about {clock(message.time_left + 59)} h left"

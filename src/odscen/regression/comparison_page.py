@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 STEPS = (0.05, 0.15, 0.3)
 """Limits between the colours of the map, as shares of the value in A."""
 
-TOLD = 0.01
+REPORTED = 0.01
 """Share of the value in A from which a clear difference is in the summary."""
 
 LEAST_VEHICLES = 10.0
@@ -79,7 +79,7 @@ def _summary_section(figures: Sequence[Row]) -> Markup:
 
 def _counts(row: Row) -> bool:
     """Whether a clear difference is large enough for the summary."""
-    return abs(row.difference.relative or 1.0) >= TOLD
+    return abs(row.difference.relative or 1.0) >= REPORTED
 
 
 def _sentence(row: Row) -> str:

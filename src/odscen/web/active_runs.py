@@ -155,7 +155,7 @@ class Runs:
             self._refuse_more()
             active = Active(run, scenario, Live(Pace(speed=wish.speed)), plan=plan)
             self._active[run] = active
-        active.future = self._pool.submit(self._run, active, lambda: self._go_on(active))
+        active.future = self._pool.submit(self._run, active, lambda: self._resume_run(active))
 
     def forecast(self, scenario: Scenario, wish: NewRun) -> RunForecast:
         """What a run will need; takes as long as getting it ready.
@@ -313,7 +313,7 @@ class Runs:
 
         return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
 
-    def _go_on(self, active: Active) -> tuple[RunState, str | None]:
+    def _resume_run(self, active: Active) -> tuple[RunState, str | None]:
         folder = self._workspace.runs / active.id
         return _end_of(resume(self._workspace, folder, live=active.live), active)
 

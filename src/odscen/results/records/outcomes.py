@@ -66,7 +66,7 @@ class StopReason(StrEnum):
     """Why vehicles are stopped for minutes, or are not inserted, as far as it shows."""
 
     CIRCLE = "vehicles wait for each other in a circle"
-    NO_WAY_ON = "its lane does not lead on along its way"
+    NO_CONNECTION = "its lane does not lead on along its way"
     WRONG_LANE = "it did not get to the lane that its way needs"
     RED = "a red light"
     PEOPLE = "people on a crossing"
@@ -83,7 +83,7 @@ class StopReason(StrEnum):
 
 _REASON_LABELS = {
     StopReason.CIRCLE: "gridlock: vehicles wait for each other in a circle",
-    StopReason.NO_WAY_ON: "its lane does not continue along its route",
+    StopReason.NO_CONNECTION: "its lane does not continue along its route",
     StopReason.WRONG_LANE: "it did not reach the lane that its route needs",
     StopReason.RED: "red light",
     StopReason.PEOPLE: "pedestrians on a crossing",

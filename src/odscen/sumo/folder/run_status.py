@@ -79,7 +79,7 @@ def locked(run: Path, *, patience: float = PATIENCE) -> Iterator[int]:
     Raises
     ------
     ConflictError
-        If somebody else holds it.
+        If another process holds it.
     """
     descriptor = os.open(run / layout.LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
     try:

@@ -136,7 +136,7 @@ class _RunningSlice:
         return arguments
 
     def _compare(self, session: Session, stepper: Stepper) -> None:
-        """Say who has not come back; nobody has ever been seen to be lost, but we look."""
+        """Say who has not come back; none has ever been seen to be lost, but we look."""
         if self._before is None:
             return
         if abs(session.time - self._before.time) > 1e-6:
@@ -146,8 +146,8 @@ class _RunningSlice:
         stepper.recorder.lose(session.time, missing)
 
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
-        nobody = not more and session.expected() == 0
-        return now >= self._plan.until or nobody or stepper.stopped
+        empty = not more and session.expected() == 0
+        return now >= self._plan.until or empty or stepper.stopped
 
 
 @contextmanager
