@@ -27,7 +27,7 @@ from odscen.scenario.document.scenario_document import (
 from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import CountFits, planned_fit
 from odscen.sumo.realize.passages import planned_passages
-from odscen.sumo.realize.realization import everybody
+from odscen.sumo.realize.realization import all_road_users
 from odscen.workspace.store import Workspace
 
 HOURS = 3
@@ -77,7 +77,7 @@ def known_demand(loaded: LoadedMap) -> Scenario:
 def counted(known: Scenario, loaded: LoadedMap) -> Counts:
     """Turns and streams at every junction; those that nobody uses are not counted."""
     region = Region.of(loaded.sumo.graph, known.roi)
-    users, _ = everybody(known, loaded.sumo, region, until=known.simulation.duration)
+    users, _ = all_road_users(known, loaded.sumo, region, until=known.simulation.duration)
     places = sorted(_places(loaded))
     slices = [(k * SLICE, (k + 1) * SLICE) for k in range(int(HOURS * 3600 / SLICE))]
     seen = [Observation("known", place, *when, 0.0) for place in places for when in slices]

@@ -273,8 +273,8 @@ def test_the_pages_that_are_files(
     user, inspector = visit("about:blank")
     user.page.goto(written[view].as_uri())
     wanted = {
-        "report": ("Level of service", "How much the network carries", "Emissions and fuel"),
-        "comparison": ("In short", "Where it changed most", "How much flows"),
+        "report": ("Level of service", "Macroscopic fundamental diagram", "Emissions and fuel"),
+        "comparison": ("Summary", "Largest changes by place", "Macroscopic fundamental diagram"),
     }
     for heading in wanted[view]:
         expect(user.page.get_by_role("heading", name=heading)).to_be_visible()

@@ -233,7 +233,7 @@ def tick_until_death(stand_in: StandIn) -> None:
 
 def test_a_server_that_dies_is_told() -> None:
     with StandIn(CROSSING) as stand_in:
-        with pytest.raises(CarlaError, match="is gone: nobody listens"):
+        with pytest.raises(CarlaError, match="is gone: no server listens"):
             tick_until_death(stand_in)
         assert stand_in.has_died()
 

@@ -157,7 +157,7 @@ def test_a_server_that_dies_ends_the_run_with_what_sumo_did(start: Start) -> Non
         run = start(server, "--timeout", 2)
         code, told, words = run.wait()
         assert code == 3
-        assert "is gone: nobody listens there any more" in told["carla"]["error"]
+        assert "is gone: no server listens there any more" in told["carla"]["error"]
         assert "Traceback" not in words
         assert recorded(run)
 

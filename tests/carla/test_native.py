@@ -50,7 +50,7 @@ def test_everybody_begins_where_and_ends_where_the_plan_says(planned: Any, sampl
         wanted = plan.actors[actor.row]
         assert (actor.at.x, actor.at.y, actor.at.hdg) == (wanted.x, wanted.y, wanted.hdg)
         assert actor.depart == wanted.depart
-        steps = np.diff(actor.way[:, :2], axis=0)
+        steps = np.diff(actor.route[:, :2], axis=0)
         assert np.sum(np.hypot(*steps.T)) == pytest.approx(wanted.route_length)
         limit = np.inf if wanted.speed is None else wanted.speed
         assert actor.speed.max() <= limit + 1e-9
@@ -134,7 +134,7 @@ def test_carla_drives_a_scenario_into_a_run_folder(options: Any, sample: Sample)
     assert Path(told["files"]["report"]).is_file()
     assert told["figures"]["mean_travel_time"] > 0.0
     assert told["figures"]["mean_delay"] is None, "only SUMO measures what was lost"
-    assert not [note for note in told["carla"]["notes"] if "left its way" in note]
+    assert not [note for note in told["carla"]["notes"] if "left its route" in note]
 
 
 def test_vehicles_go_the_way_of_the_plan_and_stop_at_its_end(
@@ -144,7 +144,7 @@ def test_vehicles_go_the_way_of_the_plan_and_stop_at_its_end(
     path = sample(TOWN, seed=3, fill=0.1)
     scenario = read_scenario(path)
     cars = [a for a in planned(path)[2] if a.category == "car" and len(a.path) >= 3]
-    chosen = max(cars, key=lambda car: len(car.way))
+    chosen = max(cars, key=lambda car: len(car.route))
     actors = tuple(actor for actor in scenario.actors if actor.id == chosen.id)
     alone = tmp_path / "alone.scenario.json"
     alone.write_text(dumps(scenario.model_copy(update={"actors": actors, "flows": ()})))
@@ -154,7 +154,7 @@ def test_vehicles_go_the_way_of_the_plan_and_stop_at_its_end(
     table = pl.read_parquet(told["files"]["trajectories"]).select("vehicle_x", "vehicle_y")
     plan, _, [car] = planned(alone)
     places = table.to_numpy() - np.array(plan.net_offset)
-    gaps = [math.dist(place, point) for place in places for point in [_nearest(car.way, place)]]
+    gaps = [math.dist(place, point) for place in places for point in [_nearest(car.route, place)]]
     # Front against centre is half a length; a turn and a change of lane cut corners.
     assert max(gaps) < 6.0
 

@@ -84,7 +84,7 @@ def test_a_long_run_that_is_interrupted_says_how_to_go_on_and_does(workspace, tm
     assert "has not ended" in again.err
     resumed = odscen("resume", folder, "--json", *w)
     assert resumed.code == 0, resumed.err
-    assert "going on at" in resumed.err
+    assert "resumes at" in resumed.err
     assert resumed.json["status"] == "completed"
     alone = odscen(*command, "--out", tmp_path / "alone", *w)
     assert alone.code == 0

@@ -8,7 +8,7 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.base.errors import NotFoundError
-from odscen.results.by_place.corridors import busiest_corridor, corridor_along, way_between
+from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.traffic_files import read_tables
@@ -137,6 +137,6 @@ def renew_report(
     summary = read_summary(folder)
     loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
     graph = loaded.sumo.graph
-    segments = way_between(graph, *ends) if ends is not None else corridor
+    segments = path_between(graph, *ends) if ends is not None else corridor
     along = corridor_along(graph, segments) if segments else None
     return write_report(folder, summary, loaded=loaded, corridor=along, out=out)

@@ -1,4 +1,4 @@
-"""Which blueprint of the server's library stands for which road user."""
+"""Which blueprint of the server's library represents which road user."""
 
 from __future__ import annotations
 

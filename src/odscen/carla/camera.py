@@ -163,7 +163,7 @@ def open_camera(
 def watch_from_above(
     server: Server, view: View, wish: Wish, on_picture: Callable[[bytes], None] | None
 ) -> Iterator[Camera]:
-    """Put a camera up whose pictures are written as wished, and told of as JPEG.
+    """Put a camera up whose pictures are written as wished, and reported as JPEG.
 
     Raises
     ------

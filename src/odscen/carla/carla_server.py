@@ -63,7 +63,7 @@ class Server:
     MissingDependencyError
         If the package ``carla`` is not installed.
     CarlaError
-        If nobody answers, or another release does.
+        If no server answers, or another release does.
     """
 
     def __init__(self, address: Address) -> None:
@@ -127,7 +127,7 @@ class Server:
         return True
 
     def _destroy_own(self) -> None:
-        if self._unsure:  # an answer was lost: something may be there that nobody told us of
+        if self._unsure:  # an answer was lost: something may be there that was not reported
             with suppress(RuntimeError):  # a tick that is not shown
                 self._world.tick(self.address.timeout)
             for actor in self._world.get_actors():
@@ -311,7 +311,7 @@ class Server:
         return min(found, default=None)
 
     def spawn_free(self, blueprint: str, role_name: str, at: ActorPlace) -> int:
-        """Make a vehicle that has physics and that somebody else is to drive.
+        """Make a vehicle that has physics and that another program is to drive.
 
         Raises
         ------

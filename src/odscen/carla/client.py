@@ -5,7 +5,7 @@ raises a plain ``RuntimeError`` for everything. So :func:`connect` first waits f
 compares releases.
 
 ``carla`` is an optional package (extra ``carla``), for CPython 3.11 and 3.12; it is imported when
-somebody connects.
+a client connects.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def answering(address: Address) -> Iterator[None]:
             problem = f"the CARLA server at {address} refused"
             raise CarlaError(problem, output=str(error)) from error
         if not address.listens():
-            problem = f"the CARLA server at {address} is gone: nobody listens there any more"
+            problem = f"the CARLA server at {address} is gone: no server listens there any more"
             raise CarlaError(problem) from error
         problem = (
             f"the CARLA server at {address} has not answered for {address.timeout:g} s: it may "
@@ -134,7 +134,7 @@ def import_carla() -> Any:
 
 
 def _await_port(address: Address) -> None:
-    """Wait until somebody listens: a client that is made too early is dead for ever."""
+    """Wait until a server listens: a client that is made too early is dead for ever."""
     deadline = time.monotonic() + address.timeout
     while True:
         try:

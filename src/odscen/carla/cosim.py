@@ -57,7 +57,7 @@ class CosimReport:
         How many signals of the map are joined to a light of the server, and ids of those that the
         server has no light for.
     sizes
-        Metres by which the length of a blueprint differs from the road user it stands for.
+        Metres by which the length of a blueprint differs from the road user it represents.
     interruptions
         How often the stream of the server's states was cut and came back.
     own_ms
@@ -279,19 +279,19 @@ def interrupts() -> Iterator[threading.Event]:
 
     Everything is still given back then. Outside the main thread nothing can be caught.
     """
-    told = threading.Event()
+    stopping = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield told
+        yield stopping
         return
 
     def tell(number: int, _frame: object) -> None:
-        if told.is_set() and number == signal.SIGINT:
+        if stopping.is_set() and number == signal.SIGINT:
             raise KeyboardInterrupt
-        told.set()
+        stopping.set()
 
     kept = {number: signal.signal(number, tell) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield told
+        yield stopping
     finally:
         for number, handler in kept.items():
             signal.signal(number, handler)

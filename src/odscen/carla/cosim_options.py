@@ -36,7 +36,7 @@ class CosimOptions:
     nearby
         Who is shown.
     external_ego
-        Whether the ego is driven in CARLA, by whoever owns the actor with the role ``hero``.
+        Whether the ego is driven in CARLA, by the owner of the actor with the role ``hero``.
     load_map
         Whether the server may be told to load the scenario's map.
     parity

@@ -1,4 +1,4 @@
-"""The ego that somebody else drives in CARLA: SUMO's ego is put where that one is."""
+"""The ego that another program drives in CARLA: SUMO's ego is put where that one is."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ExternalEgo:
     def take(cls, server: Server, plan: Plan, row: int, blueprint: str) -> Self:
         """Take the hero that is there; make one at the ego's spawn if there is none.
 
-        One that we make has physics and nobody at the wheel: whoever is to drive it finds it by
+        One that we make has physics and no driver: the program that is to drive it finds it by
         its role. It is taken away at the end; one that was there stays.
         """
         hero = server.find_role(HERO)
@@ -54,7 +54,7 @@ class ExternalEgo:
         return cls(server, plan, row, hero, server.shape(hero).centre[0])
 
     def driven(self, step: Step) -> SumoPlace | None:
-        """Where the hero is now, SUMO's way; ``None`` while SUMO's ego is not on the road."""
+        """Where the hero is now, as SUMO has it; ``None`` while SUMO's ego is not on the road."""
         if self.row not in step.index:
             return None
         at = self._server.place(self._hero)

@@ -1,7 +1,7 @@
 """What to do in a tick so that a server shows a step of SUMO's: pure planning, no server needed.
 
-A :class:`Mirror` knows which actor on the server stands for which road user. Each tick it turns
-where everybody is into a :class:`~odscen.carla.batch.Batch`, and is told what came of it.
+A :class:`Mirror` knows which actor on the server represents which road user. Each tick it turns
+where road users are into a :class:`~odscen.carla.batch.Batch`, and learns what came of it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LIFTS = (0.0, 0.3, 1.0)
 PAUSE = 10
 """Ticks between two more tries, once all lifts were refused."""
 JUMP = 12.0
-"""Metres that somebody moves in a step more than driving takes: a teleport, shown as one."""
+"""Metres that a road user moves in a step more than driving takes: a teleport, shown as one."""
 
 POSITION, LOW_BEAM, BRAKE, RIGHT, LEFT, FOG, SIREN = 1, 2, 8, 16, 32, 128, 512
 """Bits of CARLA's ``VehicleLightState``; the siren's light is its ``Special1``."""
@@ -48,7 +48,7 @@ class Refusal:
 
 
 class Mirror:
-    """Who stands for whom.
+    """Which actor represents which road user.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class Mirror:
 
 
 def between(last: Step, step: Step, share: float) -> Step:
-    """Everybody who is in both steps, so much of the way from one to the other.
+    """All who are in both steps, so much of the way from one to the other.
 
     Headings turn the short way. Who has jumped stays where it was until the step is complete.
     """

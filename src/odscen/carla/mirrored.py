@@ -36,7 +36,7 @@ class MirroredPlan:
     ego
         Who is driven in CARLA.
     sizes
-        Metres by which the length of a blueprint differs from the road user it stands for.
+        Metres by which the length of a blueprint differs from the road user it represents.
     """
 
     mirror: Mirror
@@ -47,7 +47,7 @@ class MirroredPlan:
 
     @classmethod
     def on(cls, server: Server, run: CheckedRun, plan: Plan, options: CosimOptions) -> MirroredPlan:
-        """Choose bodies, under the scenario's sky; nobody is spawned yet.
+        """Choose bodies, under the scenario's sky; none is spawned yet.
 
         Raises
         ------

@@ -1,6 +1,6 @@
-"""Native mode as a plan: who CARLA's own traffic is to drive, which way and how fast.
+"""Native mode as a plan: who CARLA's own traffic is to drive, which route and how fast.
 
-Pure. The Traffic Manager asks for a way only where roads fork: of the branches of a junction it
+Pure. The Traffic Manager asks for a route only where roads fork: of the branches of a junction it
 takes the one that ends on the road of the next point of its path. So the path given to it holds one
 point a little beyond each junction, on the lane that the junction leads to; changes of lane in
 between are commanded one by one.
@@ -48,14 +48,14 @@ class NativeActor:
         Ground below the body's centre at departure, lateral offset included.
     height
         Of the body.
-    way
+    route
         Shape ``(N, 3)``: from spawn to goal.
     speed
-        Shape ``(N,)``: wanted at each point of the way.
+        Shape ``(N,)``: wanted at each point of the route.
     path
         Shape ``(K, 3)``: points for the Traffic Manager; empty where it has no choice.
     changes
-        Points of the way at which a change of lane begins, and whether it is to the right.
+        Points of the route at which a change of lane begins, and whether it is to the right.
     offset
         Metres to the left of the lane's centre.
     gap
@@ -70,7 +70,7 @@ class NativeActor:
     depart: float
     at: XodrPose
     height: float
-    way: FloatArray
+    route: FloatArray
     speed: FloatArray
     path: FloatArray
     changes: tuple[tuple[int, bool], ...] = ()
@@ -84,7 +84,7 @@ class NativeActor:
 
 
 def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[NativeActor, ...]:
-    """Everybody in the plan that has a way, in the plan's order.
+    """Every road user in the plan that has a route, in the plan's order.
 
     Parameters
     ----------
@@ -110,11 +110,11 @@ def _walker(
     row: int, user: RoadUser, planned: PlannedActor, graph: MapGraph, nodes: Int32Array
 ) -> NativeActor:
     walks = graph.walks
-    way = np.column_stack([walks.x[nodes], walks.y[nodes], walks.z[nodes]])
+    route = np.column_stack([walks.x[nodes], walks.y[nodes], walks.z[nodes]])
     usual = KINDS[Category.PEDESTRIAN].max_speed * planned.speed_factor
-    speed = np.full(len(way), usual if user.speed is None else user.speed)
+    speed = np.full(len(route), usual if user.speed is None else user.speed)
     pose = XodrPose(planned.x, planned.y, planned.z, planned.hdg)
-    return _actor(row, user, pose, way, speed)
+    return _actor(row, user, pose, route, speed)
 
 
 def _driver(
@@ -139,7 +139,7 @@ def _actor(
     row: int,
     user: RoadUser,
     at: XodrPose,
-    way: FloatArray,
+    route: FloatArray,
     speed: FloatArray,
     *,
     path: FloatArray | None = None,
@@ -154,7 +154,7 @@ def _actor(
         depart=user.depart,
         at=at,
         height=DEFAULT_BODY[user.category].height,
-        way=way,
+        route=route,
         speed=speed,
         path=np.empty((0, 3)) if path is None else path,
         changes=changes,
@@ -190,7 +190,7 @@ def _changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...
 
 
 def _marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
-    """Indices of the nodes a little beyond each junction that the way leaves."""
+    """Indices of the nodes a little beyond each junction that the route leaves."""
     inside = np.array([lanes.lanes.junctions[row] is not None for row in lanes.lane[nodes]])
     turns = {k for k, _ in _changes(lanes, nodes)}
     marks = []

@@ -1,7 +1,7 @@
 """A scenario driven by CARLA alone, from the document to a run folder like that of ``odscen run``.
 
 The folder has the same files, so that reports, replays and scripts work on it. Two things are not
-SUMO's: nobody is teleported, and collisions are not recorded.
+SUMO's: no vehicle is teleported, and collisions are not recorded.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ class _Follower:
         self._own: tuple[int, ...] = ()
 
     def run(self, interrupted: threading.Event) -> Ended:
-        """Run the worker to its end, whatever that is; what it told until then is written."""
+        """Run the worker to its end, whatever that is; what it reported until then is written."""
         start = time.perf_counter()
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
@@ -216,22 +216,22 @@ class _Follower:
         asked = False
         while True:
             try:
-                told: Told = pipe.recv()
+                message: Told = pipe.recv()
             except (EOFError, ConnectionResetError):
                 return last
             if interrupted.is_set() and not asked:
                 asked = True
                 with suppress(OSError):  # it has just ended
                     pipe.send("stop")
-            if isinstance(told, Done | Failed):
-                last = told
-            elif isinstance(told, Note):
-                self._notes.append(told.words)
-            elif isinstance(told, Shot):
+            if isinstance(message, Done | Failed):
+                last = message
+            elif isinstance(message, Note):
+                self._notes.append(message.words)
+            elif isinstance(message, Shot):
                 if self._on_picture is not None:
-                    self._on_picture(told.jpeg)
+                    self._on_picture(message.jpeg)
             else:
-                self._take(told)
+                self._take(message)
 
     def _take(self, tick: Tick) -> None:
         self._own = tick.own

@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from odscen.carla.native_plan import NativeActor
 
 ARRIVED = 2.5
-"""Metres from the goal at which somebody has arrived."""
+"""Metres from the goal at which a road user has arrived."""
 END_OF_ROAD = 40.0
-"""Metres of way left within which the Traffic Manager may take a vehicle away: a road that ends."""
+"""Metres of route left within which the Traffic Manager may remove a vehicle: a road that ends."""
 STRAYED = 15.0
-"""Metres from its way at which a vehicle has taken another."""
+"""Metres from its route at which a vehicle has taken another."""
 RETRY_SECONDS = 0.5
-"""Simulated seconds between two tries to spawn somebody."""
+"""Simulated seconds between two tries to spawn a road user."""
 _SEARCH = 30
-"""Points of its way that somebody may pass in one tick, at most."""
+"""Points of its route that a road user may pass in one tick, at most."""
 _TURN_AHEAD = 2
 """Points before a change of lane at which it is commanded."""
 
@@ -46,7 +46,7 @@ COLUMNS = 7
 
 @dataclass(slots=True, eq=False)
 class _Underway:
-    """Somebody on the road: its actor on the server, and how far along its way it is."""
+    """A road user on the road: its actor on the server, and how far along its route it is."""
 
     plan: NativeActor
     number: int
@@ -75,7 +75,7 @@ class Happened:
 
 
 class Traffic:
-    """Everybody of a scenario, driven by the Traffic Manager and CARLA's walkers.
+    """All road users of a scenario, driven by the Traffic Manager and CARLA's walkers.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Traffic:
     Attributes
     ----------
     has_navigation
-        Whether the world has a navigation mesh; without one walkers are led along their ways.
+        Whether the world has a navigation mesh; without one walkers are led along their routes.
     road_ends
         Metres to the goal of each vehicle that the Traffic Manager took away where a road ends,
         which it does as soon as it sees the end. They count as arrived.
@@ -142,7 +142,7 @@ class Traffic:
         return self._server.own
 
     def refusals(self) -> dict[str, str]:
-        """Why the server would not take somebody, by id; of those who never came."""
+        """Why the server refused a road user, by id; of those that were not spawned."""
         return {
             actor.id: self._tries[actor.row].reason
             for actor in self._waiting
@@ -163,7 +163,7 @@ class Traffic:
         return happened
 
     def rows(self, delta: float) -> np.ndarray:
-        """Everybody on the road after a tick of ``delta`` seconds, shape ``(N, 7)``.
+        """All on the road after a tick of ``delta`` seconds, shape ``(N, 7)``.
 
         Columns: row of the plan, x, y, z, hdg, pitch, speed; origins of the actors in the OpenDRIVE
         frame, metres, radians, m/s.
@@ -185,7 +185,7 @@ class Traffic:
         return np.array(rows, dtype="<f8").reshape(-1, COLUMNS)
 
     def close(self) -> None:
-        """Let go of everybody and end the Traffic Manager, which must not outlive the server."""
+        """Let go of all and end the Traffic Manager, which must not outlive the server."""
         for one in self._underway.values():
             self._let_go(one)
         self._destroy(list(self._underway.values()))
@@ -242,7 +242,7 @@ class Traffic:
         )
 
     def _hand_over(self, one: _Underway) -> None:
-        """Give somebody who has just come to CARLA's drivers or walkers."""
+        """Give a road user that has just come to CARLA's drivers or walkers."""
         one.handle = self._server.world.get_actor(one.number)
         plan = one.plan
         if plan.person:
@@ -264,7 +264,7 @@ class Traffic:
         self._set_speed(one)
 
     def _start_controller(self, one: _Underway) -> None:
-        """Let CARLA's walker AI find the way; on its own mesh, which is not the scenario's."""
+        """Let CARLA's walker AI find the route; on its own mesh, which is not the scenario's."""
         world, carla = self._server.world, self._server.package
         blueprint = world.get_blueprint_library().find(CONTROLLER)
         command = carla.command.SpawnActor(blueprint, carla.Transform(), one.number)
@@ -274,7 +274,7 @@ class Traffic:
         self._server.tick()
         one.controller = world.get_actor(controller)
         one.controller.start()
-        one.controller.go_to_location(self._location(one.plan.way[-1]))
+        one.controller.go_to_location(self._location(one.plan.route[-1]))
         one.controller.set_max_speed(float(one.plan.speed[0]))
 
     # ------------------------------------------------------------------------------- under way
@@ -299,19 +299,21 @@ class Traffic:
         self._destroy(gone)
 
     def _advance(self, one: _Underway, pose: XodrPose, happened: Happened) -> float:
-        """Move on to the nearest point of the way; metres from here to the goal, straight."""
-        way = one.plan.way
-        ahead = way[one.at : one.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
+        """Move on to the nearest point of the route; metres from here to the goal, straight."""
+        route = one.plan.route
+        ahead = route[one.at : one.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
         distance = np.hypot(ahead[:, 0], ahead[:, 1])
         nearest = int(np.argmin(distance))
         one.at += nearest
         if distance[nearest] > STRAYED and not one.strayed:
             one.strayed = True
-            happened.notes.append(f"{one.plan.id}: left its way {_left(one):.0f} m before its goal")
-        return math.hypot(way[-1, 0] - float(pose.x), way[-1, 1] - float(pose.y))
+            happened.notes.append(
+                f"{one.plan.id}: left its route {_left(one):.0f} m before its goal"
+            )
+        return math.hypot(route[-1, 0] - float(pose.x), route[-1, 1] - float(pose.y))
 
     def _vanished(self, one: _Underway, time: float, happened: Happened) -> bool:
-        """Say what became of somebody whom the server has no longer; false if it is yet to come."""
+        """Report the outcome of one that the server has no longer; false if it is yet to come."""
         if time - one.since < 2 * RETRY_SECONDS and one.at == 0:
             return False
         left = _left(one)
@@ -337,7 +339,7 @@ class Traffic:
             one.turned += 1
 
     def _lead_walkers(self) -> None:
-        """Without a navigation mesh: everybody on foot walks to the next point of its way."""
+        """Without a navigation mesh: every pedestrian walks to the next point of its route."""
         commands = []
         carla, snapshot = self._server.package, self._server.world.get_snapshot()
         for one in self._underway.values():
@@ -347,7 +349,7 @@ class Traffic:
             if state is None:
                 continue
             pose = _pose(state)
-            target = one.plan.way[min(one.at + 1, len(one.plan.way) - 1)]
+            target = one.plan.route[min(one.at + 1, len(one.plan.route) - 1)]
             dx, dy = float(target[0] - pose.x), float(target[1] - pose.y)
             norm = math.hypot(dx, dy) or 1.0
             speed = float(one.plan.speed[one.at])
@@ -380,8 +382,8 @@ def _arrival(one: _Underway, time: float) -> Event:
 
 
 def _left(one: _Underway) -> float:
-    """Metres of way from the last known point to the goal."""
-    rest = np.diff(one.plan.way[one.at :, :2], axis=0)
+    """Metres of route from the last known point to the goal."""
+    rest = np.diff(one.plan.route[one.at :, :2], axis=0)
     return float(np.sum(np.hypot(rest[:, 0], rest[:, 1])))
 
 

@@ -1,6 +1,6 @@
 """The process in which CARLA's Traffic Manager lives, for it may end its process at any time.
 
-What happens is told tick by tick over a pipe: whatever becomes of this process, the one that
+What happens is reported tick by tick over a pipe: whatever becomes of this process, the one that
 started it has all until then.
 """
 
@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from odscen.workspace.asset_catalogue import Assets
 
 NO_NAVIGATION = (
-    "the world has no navigation mesh: pedestrians are led along their ways and do not look "
+    "the world has no navigation mesh: pedestrians are led along their routes and do not look "
     "around them"
 )
 
 ROAD_ENDS = (
-    "{} vehicles were taken away by the Traffic Manager {:.0f} to {:.0f} m before their goals, "
+    "the Traffic Manager removed {} vehicles {:.0f} to {:.0f} m before their goals, "
     "where it saw the road end; they count as arrived"
 )
 
@@ -62,7 +62,7 @@ class NativeJob:
     view
         Where a camera begins.
     watched
-        Whether pictures are also to be told of, as JPEG.
+        Whether pictures are also to be reported, as JPEG.
     """
 
     address: Address
@@ -119,15 +119,15 @@ def work(job: NativeJob, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sending = threading.Lock()
 
-    def tell(told: Told) -> None:
+    def tell(message: Told) -> None:
         with sending:
-            pipe.send(told)
+            pipe.send(message)
 
     def asked() -> bool:
         """Whether this is to end. Takes what was said: unread, it would cut off our last words."""
         if not pipe.poll():
             return False
-        with suppress(EOFError):  # whoever listened is gone
+        with suppress(EOFError):  # the listener is gone
             pipe.recv()
         return True
 
@@ -138,7 +138,7 @@ def work(job: NativeJob, pipe: Connection) -> None:
             tell(Failed(str(error)))
         except RuntimeError as error:  # the client's own, met outside of our door
             tell(Failed(f"the CARLA server at {job.address}: {error}"))
-        except OSError:  # nobody listens any more
+        except OSError:  # no one listens any more
             pass
         sys.stdout.flush()
     pipe.close()

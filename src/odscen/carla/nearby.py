@@ -1,4 +1,4 @@
-"""Who is shown of much traffic: whoever is near the ego, and no more than so many."""
+"""What is shown of much traffic: all that is near the ego, and no more than so many."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 HYSTERESIS = 1.15
-"""Whoever has come within the radius stays until this many times as far away."""
+"""A road user that has come within the radius stays until this many times as far away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Nearby:
         Parameters
         ----------
         x, y
-            Of everybody.
+            Of all road users.
         shown
             Who is shown now.
         centre

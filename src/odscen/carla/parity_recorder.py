@@ -1,7 +1,7 @@
 """What both worlds show after each step, taken down side by side.
 
-CARLA's side is read from the newest state that the server has streamed, not from what it was told:
-so a lost command, a vehicle that physics has moved, or a light that somebody else switches shows.
+CARLA's side is read from the newest state that the server has streamed, not from what it was sent:
+so a lost command, a vehicle that physics has moved, or a light that another program switches shows.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class StateRecorder:
     Parameters
     ----------
     blueprints, shapes
-        What stands for each road user of the plan, and the boxes of these: places are compared at
+        What represents each road user of the plan, and the boxes of these: places are compared at
         the centre of the body, which is not an actor's origin.
     """
 
@@ -106,7 +106,7 @@ class StateRecorder:
     def _centre(
         self, snapshot: Any, row: int, actor: int | None
     ) -> tuple[float, float, float, float]:
-        """Ground below the body's centre, OpenDRIVE frame, and heading; NaN for nobody."""
+        """Ground below the body's centre, OpenDRIVE frame, and heading; NaN for none."""
         state = None if actor is None else snapshot.find(actor)
         if state is None:
             return _NOWHERE

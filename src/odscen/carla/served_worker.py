@@ -93,7 +93,7 @@ def run(job: ServedJob, send: Callable[[Message, bytes], None]) -> Done | Failed
 
 
 class _PageFollower:
-    """Shows steps to whoever watches, and waits for its pace."""
+    """Shows steps to a user who watches, and waits for its pace."""
 
     def __init__(
         self, job: ServedJob, steering: Steering, send: Callable[[Message, bytes], None]

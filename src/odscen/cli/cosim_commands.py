@@ -59,7 +59,8 @@ def cosim(
         int | None, typer.Option(min=1, help="Show this many road users at most.")
     ] = None,
     ego: Annotated[
-        Ego, typer.Option(help="Who drives the ego: SUMO, or whoever owns CARLA's role 'hero'.")
+        Ego,
+        typer.Option(help="Driver of the ego: SUMO, or the owner of CARLA's role 'hero'."),
     ] = Ego.SUMO,
     load_map: Annotated[
         bool,

@@ -150,7 +150,7 @@ def weekday(
     )
     log(
         f"{load.trips:,.0f} trips, {load.peak_trips:,.0f} in the busiest hour; then the busiest "
-        f"way into a junction, {load.place}, gets {load.volume:,.0f} of the {load.capacity:,.0f} "
+        f"junction approach, {load.place}, gets {load.volume:,.0f} of the {load.capacity:,.0f} "
         f"vehicles that it carries ({load.volume / load.capacity:.0%})"
     )
     log(f"Wrote {path}")
@@ -167,9 +167,9 @@ def fit(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Hold traffic against the counts of its scenario: GEH and RMSE, and what is not met and why.
+    """Compare traffic with the counts of its scenario: GEH and RMSE; what is not met and why.
 
-    Of a scenario, traffic as planned, with nobody in its way; of a run, as it was.
+    Of a scenario, traffic as planned, without congestion; of a run, as simulated.
     """
     from odscen.app import demands
     from odscen.workspace.store import Workspace

@@ -17,12 +17,12 @@ def report(
         typer.Option(
             metavar="SEGMENT,SEGMENT,...",
             help="Follow vehicles along these segments, in driving direction; junctions between "
-            "them may be left out. [default: the busiest way through several junctions]",
+            "them may be left out. [default: the busiest route through several junctions]",
         ),
     ] = None,
     first: Annotated[
         str | None,
-        typer.Option("--from", metavar="SEGMENT", help="Follow vehicles on the shortest way from"),
+        typer.Option("--from", metavar="SEGMENT", help="Follow vehicles on the shortest path from"),
     ] = None,
     last: Annotated[str | None, typer.Option("--to", metavar="SEGMENT", help="to here.")] = None,
     out: Annotated[

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def _hint(folder: Path) -> Iterator[None]:
-    """Tell whoever interrupts long runs how to go on with them."""
+    """Say how to resume long runs when they are interrupted."""
     from odscen.sumo.runner.long_runs import interrupted
 
     before = set(interrupted(folder))
@@ -33,7 +33,7 @@ def _hint(folder: Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         for name in sorted(set(interrupted(folder)) - before):
-            log(f"{name} is interrupted; to go on with it: odscen resume {folder / name}")
+            log(f"{name} is interrupted; to resume it: odscen resume {folder / name}")
         raise
 
 
@@ -169,7 +169,7 @@ def resume(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Go on with an interrupted long run; it ends as if it had not been interrupted.
+    """Resume an interrupted long run; it ends as if it had not been interrupted.
 
     Exit codes as of ``run``.
     """
@@ -223,7 +223,7 @@ def _follow(step: Callable[[str, float], None], total: int) -> Callable[[RunJob,
 
 
 def _words(name: str, message: Progress) -> str:
-    told = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
+    line = f"{name}: {message.time:,.0f} s, {message.running:,} on the road"
     if message.time_left is None:
-        return told
-    return f"{told}, about {clock(message.time_left + 59)} h left"
+        return line
+    return f"{line}, about {clock(message.time_left + 59)} h left"

@@ -53,7 +53,7 @@ class Baseline:
 def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> Fingerprint:
     """Fingerprint of what a scenario is run from.
 
-    The scenario's parts stand apart, so that the one that has changed can be named. Its seed is
+    The scenario's parts are apart, so that the one that has changed can be named. Its seed is
     left out, as the suite names the seeds, and so are name and description.
     """
     # What has its default value is left out: a field that a later version adds changes nothing.
@@ -75,17 +75,17 @@ def _digest(value: object) -> str:
 
 def changed_inputs(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
     """Say what is different in what two runs were made of, in words; nothing if nothing is."""
-    told = []
+    changes = []
     for name in sorted(old.keys() | new.keys()):
         before, now = old.get(name, "none"), new.get(name, "none")
         if before == now:
             continue
         if name in _VERSIONS:
-            told.append(f"{name} {before} -> {now}")
+            changes.append(f"{name} {before} -> {now}")
         else:
             part = name.removeprefix("scenario.")
-            told.append("the map" if name == "map" else f"the scenario's {part}")
-    return tuple(told)
+            changes.append("the map" if name == "map" else f"the scenario's {part}")
+    return tuple(changes)
 
 
 def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:

@@ -214,8 +214,8 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
             networks.append(figures.network)
         maps.add((str(summary.get("map")), str(summary.get("map_sha256"))))
         scenarios[str(summary.get("scenario"))] = None
-        told = summary.get("versions") or {}
-        versions[", ".join(f"{key} {told[key]}" for key in ("odscen", "sumo") if key in told)] = (
+        used = summary.get("versions") or {}
+        versions[", ".join(f"{key} {used[key]}" for key in ("odscen", "sumo") if key in used)] = (
             None
         )
     if len(scenarios) > 1:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 STEPS = (0.05, 0.15, 0.3)
 """Limits between the colours of the map, as shares of the value in A."""
 
-TOLD = 0.01
-"""Share of the value in A from which a clear difference is told in short."""
+REPORTED = 0.01
+"""Share of the value in A from which a clear difference is in the summary."""
 
 LEAST_VEHICLES = 10.0
 """Vehicles that have passed a place on both sides, on average, for it to have a colour."""
@@ -33,7 +33,7 @@ _ROW, _LABELS, _RIGHT, _WIDTH, _FOOT = 26.0, 310.0, 32.0, 760.0, 44.0
 
 
 def comparison_page(result: RunComparison) -> str:
-    """Page of a comparison: what is clear, figures side by side, places, and how much flows."""
+    """Page of a comparison: what is clear, all figures, places, and the flow diagram."""
     a, b = result.a, result.b
     title = a.scenario if a.scenario == b.scenario else f"{a.scenario} and {b.scenario}"
     figures = [row for row in result.rows if row.key.kind == "run"]
@@ -46,7 +46,7 @@ def comparison_page(result: RunComparison) -> str:
     )
     parts = [
         head,
-        _in_short(figures),
+        _summary_section(figures),
         _chart_section(figures),
         _table_section(figures),
         _place_section(result),
@@ -60,26 +60,26 @@ def _side(name: str, seeds: Iterable[int]) -> str:
     return f"{name} (seed{'s' if len(listed) > 1 else ''} {', '.join(map(str, listed))})"
 
 
-def _in_short(figures: Sequence[Row]) -> Markup:
+def _summary_section(figures: Sequence[Row]) -> Markup:
     clear = [row for row in figures if row.says is Finding.CLEAR]
     clear.sort(key=lambda row: -abs(row.difference.relative or np.inf))
     if not figures or all(row.says is Finding.SAME for row in figures):
         content = element("p", "A and B are the same in every figure.")
     elif not any(map(_counts, clear)):
-        words = "Whatever is clear is too small to matter." if clear else "Each may be chance."
+        words = "Whatever is clear is too small to matter." if clear else "Each may be random."
         content = element("p", f"No difference to speak of. {words}")
     else:
         content = element("ul", *(element("li", _sentence(row)) for row in filter(_counts, clear)))
     explained = (
-        "clear means that the runs of one side differ so little among themselves that chance "
-        "hardly explains the difference. It takes at least two runs a side, better five or more."
+        "clear means statistically significant: the 95 % confidence interval of the difference "
+        "leaves out zero. It takes at least two runs a side, better five or more."
     )
-    return report_section("In short", content, explained=explained, ident="short")
+    return report_section("Summary", content, explained=explained, ident="short")
 
 
 def _counts(row: Row) -> bool:
-    """Whether a clear difference is large enough to be told first."""
-    return abs(row.difference.relative or 1.0) >= TOLD
+    """Whether a clear difference is large enough for the summary."""
+    return abs(row.difference.relative or 1.0) >= REPORTED
 
 
 def _sentence(row: Row) -> str:
@@ -103,9 +103,9 @@ def _chart_section(figures: Sequence[Row]) -> Markup | None:
         return None
     explained = (
         "each dot is the difference of one figure, as a share of its value in A; right of the line "
-        "in the middle it is larger in B. The bar is the range in which the true difference lies, "
-        "19 times in 20: if it does not touch the line, the difference is clear and stands out. "
-        "Bars that are cut at the edge go on. Figures that are alike are left out."
+        "in the middle it is larger in B. The bar is its 95 % confidence interval: if it does not "
+        "touch the line, the difference is clear (statistically significant). Bars that are cut "
+        "at the edge reach further. Figures that are equal are left out."
     )
     return report_section(
         "Differences", _interval_chart(shown), explained=explained, ident="differences"
@@ -146,7 +146,7 @@ def _interval_chart(rows: Sequence[Row]) -> Markup:
         parts.append(element("g", element("title", _sentence(row)), *marks, class_=style))
     svg = element("svg", *parts, viewBox=f"0 0 {number(_WIDTH)} {number(height)}", role="img",
                   class_="chart tall")  # fmt: skip
-    keys = legend([("c-clear", "clear"), ("c-unclear", "may be chance, or too few runs")])
+    keys = legend([("c-clear", "clear"), ("c-unclear", "may be random, or too few runs")])
     return element("div", svg, keys, class_="chart-box")
 
 
@@ -155,14 +155,14 @@ def _reach(largest: float) -> float:
     return next((end for end in (1.0, 2.0, 5.0, 10.0, 20.0, 50.0) if largest <= end), 100.0)
 
 
-_HEADS = ("Figure", "Unit", "A", "B", "B - A", "95 % interval", "Verdict")
+_HEADS = ("Figure", "Unit", "A", "B", "B - A", "95 % confidence interval", "Verdict")
 
 
 def _table_section(figures: Sequence[Row]) -> Markup:
     explained = (
         "A and B are means over the runs of each side. If the same comparison were made many "
         "times, 19 of 20 such intervals would hold the true difference; one that leaves out zero "
-        "is clear, one that holds zero may be chance."
+        "is clear, one that holds zero may be random."
     )
     rows = [_table_row(row) for row in figures]
     table = html_table(_HEADS, rows)
@@ -186,7 +186,8 @@ def _place_section(result: RunComparison) -> Markup | None:
     if not result.places:
         return None
     explained = (
-        "on the map, red places are slower in B, or have longer waits, and blue ones are faster; "
+        "on the map, red places are slower in B, or have a longer stopped delay, and blue ones "
+        "are better; "
         f"places that fewer than {LEAST_VEHICLES:g} vehicles pass stay grey. The table has "
         "segments by mean speed and junctions by stopped delay; large changes where many vehicles "
         "pass come first."
@@ -195,7 +196,7 @@ def _place_section(result: RunComparison) -> Markup | None:
     drawn = None if result.a.shapes is None else _change_map(result, result.a.shapes)
     table = html_table(_HEADS, rows, label="Places")
     return report_section(
-        "Where it changed most", drawn, table, explained=explained, ident="places"
+        "Largest changes by place", drawn, table, explained=explained, ident="places"
     )
 
 
@@ -282,12 +283,13 @@ def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:
         description="Flow of the network over its density, in A and in B",
     )
     explained = (
-        "each dot is one interval of one run: how many vehicles were on the roads, and how many "
-        "got on. If the dots of one side lie higher at the same density, more traffic gets through "
-        "with the same number on the road; if they reach further to the right, the roads are "
-        "fuller."
+        "each dot is one interval of one run: density and flow of the network. If the dots of one "
+        "side lie higher at the same density, its network serves a higher flow; if they reach "
+        "further to the right, it is more congested."
     )
-    return report_section("How much flows", drawn, explained=explained, ident="diagram")
+    return report_section(
+        "Macroscopic fundamental diagram", drawn, explained=explained, ident="diagram"
+    )
 
 
 def _dots(runs: RunSet, name: str) -> Dots | None:

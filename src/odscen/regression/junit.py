@@ -43,9 +43,9 @@ def _test_case(suite: etree._Element, case: CaseResult, suite_name: str) -> None
         "time": f"{case.wall_seconds:.3f}",
     }
     element = etree.SubElement(suite, "testcase", attributes)
-    told = [_UNWRITABLE.sub("?", line) for line in lines(case)]
+    words = [_UNWRITABLE.sub("?", line) for line in lines(case)]
     if case.status is not CaseStatus.PASSED:
         tag = "error" if case.status is CaseStatus.ERROR else "failure"
-        etree.SubElement(element, tag, {"message": told[0]}).text = "\n".join(told)
+        etree.SubElement(element, tag, {"message": words[0]}).text = "\n".join(words)
     elif note := reason(case):
         etree.SubElement(element, "system-out").text = note

@@ -1,7 +1,7 @@
 """pytest plugin: the fixture ``odscen_run``, and scenario files as tests.
 
 Loaded by every pytest that finds odscen installed, so it imports nothing at the top but pytest and
-collects scenario files only where it is told to: named on the command line, or with
+collects scenario files only where it is asked to: named on the command line, or with
 ``odscen_collect = true`` in the configuration.
 """
 
@@ -71,9 +71,9 @@ class _ScenarioTest(pytest.Item):
         expect = self.config.getini("odscen_expect")
         settings = _settings(seed=seed, expect=expect)
         result = _run(self.config, factory.mktemp("odscen"), self.path, settings)
-        told = _shortcomings(result)
-        if told:
-            pytest.fail("\n".join(told), pytrace=False)
+        found = _shortcomings(result)
+        if found:
+            pytest.fail("\n".join(found), pytrace=False)
 
     def repr_failure(
         self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None
@@ -110,9 +110,9 @@ def odscen_run(
         settings = _settings(seed=seed, until=until, expect=expect)
         folder = tmp_path_factory.mktemp("odscen")
         result = _run(request.config, folder, scenario, settings, workspace=workspace)
-        told = _shortcomings(result)
-        if told:
-            pytest.fail("\n".join(told))
+        found = _shortcomings(result)
+        if found:
+            pytest.fail("\n".join(found))
         return result
 
     return run

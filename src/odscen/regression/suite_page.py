@@ -59,7 +59,7 @@ def _case_section(case: CaseResult) -> Markup:
     changes = () if case.verdict is None else (*case.verdict.figures, *case.verdict.places)
     in_table = {change.words for change in changes}
     besides = [problem for problem in case.problems if problem not in in_table]
-    told = [*besides, *(text for text in (where(case), reason(case)) if text)]
+    lines = [*besides, *(text for text in (where(case), reason(case)) if text)]
     rows = [_change_row(change) for change in changes]
     heads = ("Figure", "Baseline", "Now", "Difference", "Allowed", "Verdict")
     explained = (
@@ -68,7 +68,7 @@ def _case_section(case: CaseResult) -> Markup:
     )
     return report_section(
         case.case.name,
-        element("ul", *(element("li", line) for line in told)),
+        element("ul", *(element("li", line) for line in lines)),
         html_table(heads, rows, label=f"Figures of {case.case.name}") if rows else None,
         explained=explained,
         ident=f"case-{case.case.name}",

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from odscen.regression.verdict import Change
 
 MOST = 12
-"""Changes that are told of one scenario; JSON has all."""
+"""Changes that are reported of one scenario; JSON has all."""
 
 
 def reason(result: CaseResult) -> str | None:
@@ -44,11 +44,11 @@ def where(result: CaseResult) -> str | None:
 
 
 def lines(result: CaseResult) -> list[str]:
-    """Everything that is to be told of a scenario, one line each; nothing of one that passed."""
-    told = list(result.problems[:MOST])
+    """All that is reported of a scenario, one line each; nothing of one that passed."""
+    found = list(result.problems[:MOST])
     if len(result.problems) > MOST:
-        told.append(f"and {len(result.problems) - MOST} more")
-    return [*told, *(text for text in (where(result), reason(result)) if text)]
+        found.append(f"and {len(result.problems) - MOST} more")
+    return [*found, *(text for text in (where(result), reason(result)) if text)]
 
 
 def to_dict(result: SuiteResult) -> dict[str, Any]:

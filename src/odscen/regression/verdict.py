@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.comparison import Difference
 
 FEWEST = 5
-"""A place with fewer vehicles, as a mean over the seeds, is told of but fails nothing."""
+"""A place with fewer vehicles, as a mean over the seeds, is reported but fails nothing."""
 
 _NOISE = 1e-4
 """Figures are written with that many decimals; a smaller difference is none."""
@@ -105,7 +105,7 @@ def hold_against(
         old: dict[int, float | None]
         old = {seed: None if stored is None else stored[position[seed]] for seed in seeds}
         new = {seed: runs[seed].get(key) for seed in seeds}
-        if key.place and key.figure == "vehicles":  # a place that nobody passes has no row
+        if key.place and key.figure == "vehicles":  # a place that no vehicle passes has no row
             old = {seed: value or 0.0 for seed, value in old.items()}
             new = {seed: value or 0.0 for seed, value in new.items()}
         weight = _vehicles(key, baseline, runs, seeds, position)

@@ -147,7 +147,7 @@ class Runs:
         """
         folder = self.kept.folder(run)
         if (state := self.info(run).state) != "interrupted":
-            msg = f"run {run!r} is {state}; only an interrupted one can go on"
+            msg = f"run {run!r} is {state}; only an interrupted one can be resumed"
             raise ConflictError(msg)
         scenario = read_scenario(folder / layout.SCENARIO_FILE)
         plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
@@ -155,7 +155,7 @@ class Runs:
             self._refuse_more()
             active = Active(run, scenario, Live(Pace(speed=wish.speed)), plan=plan)
             self._active[run] = active
-        active.future = self._pool.submit(self._run, active, lambda: self._go_on(active))
+        active.future = self._pool.submit(self._run, active, lambda: self._resume_run(active))
 
     def forecast(self, scenario: Scenario, wish: NewRun) -> RunForecast:
         """What a run will need; takes as long as getting it ready.
@@ -207,7 +207,7 @@ class Runs:
             raise ConflictError(msg)
         if control.action == "interrupt":
             if not active.long:
-                msg = f"run {run!r} is not in slices and could not go on later; stop it"
+                msg = f"run {run!r} is not in slices and could not be resumed; stop it"
                 raise ConflictError(msg)
             active.interrupted = True
             active.live.kill()
@@ -258,14 +258,14 @@ class Runs:
         with self._lock:
             active = self._active.get(run)
             if active is not None and active.ended is None:
-                msg = f"run {run!r} is going on; stop it first"
+                msg = f"run {run!r} is under way; stop it first"
                 raise ConflictError(msg)
             self._active.pop(run, None)
         if active is not None and not (self._workspace.runs / run).exists():
             return  # it failed before it had anything to keep
         folder = self.kept.folder(run)
         if going(folder) == "running":
-            msg = f"run {run!r} is going on in another process"
+            msg = f"run {run!r} is running in another process"
             raise ConflictError(msg)
         try:
             discard(folder)
@@ -313,13 +313,13 @@ class Runs:
 
         return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
 
-    def _go_on(self, active: Active) -> tuple[RunState, str | None]:
+    def _resume_run(self, active: Active) -> tuple[RunState, str | None]:
         folder = self._workspace.runs / active.id
         return _end_of(resume(self._workspace, folder, live=active.live), active)
 
     def _refuse_more(self) -> None:
         if sum(one.ended is None for one in self._active.values()) >= MOST:
-            msg = f"{MOST} runs are going on; stop one, or wait for the end of one"
+            msg = f"{MOST} runs are under way; stop one, or wait for the end of one"
             raise ConflictError(msg)
 
     def _mirror(

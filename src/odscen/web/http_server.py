@@ -63,7 +63,7 @@ def serve(
     url = f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
     say(f"odscen is at {url}")
     if token:
-        say("It can be reached from other machines; whoever has this address may use it.")
+        say("It can be reached from other machines; anyone who has this address may use it.")
     say(f"Workspace: {workspace.root}. Ctrl-C ends it.")
     app = create_app(workspace, token=token, hosts=hosts, carla=carla)
     config = uvicorn.Config(

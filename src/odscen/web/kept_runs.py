@@ -148,9 +148,11 @@ def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
     status = read_status(folder) or {}
     at, until = float(status.get("time", 0.0)), float(status.get("until", 0.0))
     state: RunState = going(folder) or "interrupted"
-    told = f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} goes on."
+    message = (
+        f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} resumes it."
+    )
     if summary is not None and summary.error:
-        told = f"{told}\n{summary.error}"
+        message = f"{message}\n{summary.error}"
     return RunInfo(
         run=folder.name,
         state=state,
@@ -161,6 +163,6 @@ def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
             until=until,
             **{key: status.get(key, 0) for key in ("running", "departed", "arrived", "planned")},
         ),
-        error=told if state == "interrupted" else None,
+        error=message if state == "interrupted" else None,
         slices=KeptRuns(folder.parent).slices(folder.name),
     )

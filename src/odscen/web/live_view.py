@@ -73,7 +73,7 @@ class LiveView:
             self._changed.clear()
             over = self._run.ended is not None
             if self._ready:
-                await self._tell_changes()
+                await self._report_changes()
                 if live.picture.number > self._frame:
                     await self._send_frame()
                 elif over:
@@ -102,8 +102,8 @@ class LiveView:
             await self._changed.wait()
             self._changed.clear()
 
-    async def _tell_changes(self) -> None:
-        """Tell what has changed since this client was told last."""
+    async def _report_changes(self) -> None:
+        """Report what has changed since the last report to this client."""
         live, plan = self._run.live, self._run.plan
         if plan is not None and not self._greeted:
             self._greeted = True
@@ -143,7 +143,7 @@ class LiveView:
 
 
 def _hello(plan: Plan) -> str:
-    """Introduce everybody who will ever be in a frame.
+    """Introduce every road user that will ever be in a frame.
 
     A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
     tens of thousands of actors, and the server does nothing else meanwhile.

@@ -179,7 +179,7 @@ class Goals(Answer):
 
 
 class Path(Answer):
-    """Shortest way inside the region, with [x, y] of its nodes; empty if there is none."""
+    """Shortest path inside the region, with [x, y] of its nodes; empty if there is none."""
 
     nodes: list[str]
     points: list[tuple[float, float]]

@@ -67,7 +67,7 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
     """The lane graph, the segments and the pedestrian graph as columns.
 
     Places to the millimetre, headings to 1e-5 rad; a missing speed limit is null. ``spawnable`` and
-    ``walkable`` are 1 where the simulator can place somebody exactly.
+    ``walkable`` are 1 where the simulator can place a road user exactly.
     """
     loaded = load_map(entry)
     graph, usable = loaded.sumo.graph, loaded.usable

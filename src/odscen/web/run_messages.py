@@ -223,14 +223,14 @@ class IncidentInfo(Answer):
 
 
 class RunEvents(Answer):
-    """Incidents of a finished run, as the live view tells them; ``left_off`` were too many."""
+    """Incidents of a finished run, as the live view reports them; ``left_off`` were too many."""
 
     events: list[IncidentInfo]
     left_off: int
 
 
 class ReplayActor(Answer):
-    """Somebody in a recording; metres."""
+    """A road user in a recording; metres."""
 
     id: str
     category: Category

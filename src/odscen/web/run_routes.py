@@ -52,7 +52,7 @@ REPLAY_ROWS = 4_000_000
 router = APIRouter(prefix="/api/runs")
 
 MOST_EVENTS = 5_000
-"""Incidents that are told of a finished run; nobody reads more."""
+"""Incidents that are reported of a finished run; no one reads more."""
 
 _REPORT = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 """Content security policy of a report: it holds everything that it needs."""
@@ -167,7 +167,7 @@ def trajectories(
         int | None, Query(ge=1, description="Rows at most; fewer steps if need be.")
     ] = None,
 ) -> Response:
-    """Where everybody was, as columns; see ``docs/server.md``."""
+    """Where road users were, as columns; see ``docs/server.md``."""
     table, plan, read = _recorded(shared, run)
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))

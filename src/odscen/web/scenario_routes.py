@@ -157,21 +157,21 @@ def goals(name: str, spawn: str, shared: Shared) -> Goals:
 
 @router.get("/{name}/path")
 def path(name: str, spawn: str, goal: str, shared: Shared) -> Path:
-    """Way from ``spawn`` to ``goal`` inside the region, as somebody on foot, or a car, takes it."""
+    """Path from ``spawn`` to ``goal`` inside the region, as a pedestrian, or a car, takes it."""
     scenario = shared.drafts.get(name).scenario
     sumo = shared.map_of(scenario).sumo
     graph = sumo.graph
     start, end = _place(shared, scenario, spawn), _place(shared, scenario, goal)
     if start.walk != end.walk:
-        msg = f"no way leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
+        msg = f"no path leads from {spawn!r} to {goal!r}: one is for vehicles, one for pedestrians"
         raise InputError(msg)
     with shared.search:
         region = _region(shared, scenario)
         category = Category.PEDESTRIAN if start.walk else Category.CAR
-        somebody = RoadUser("somebody", category, start.node, end.node, depart=0.0)
+        user = RoadUser("user", category, start.node, end.node, depart=0.0)
         drivable = Router(graph, region.lanes & sumo.drivable)
-        ((_, way),) = each_path([somebody], region, drivable)
-    found = way.tolist()
+        ((_, path),) = each_path([user], region, drivable)
+    found = path.tolist()
     nodes = region.nodes_of(start)
     return Path(
         nodes=[name_of(graph, GraphPlace(start.walk, node)) for node in found],

@@ -30,7 +30,7 @@ class Services:
     Attributes
     ----------
     search
-        Held while a way is searched: a region remembers its last search.
+        Held while a path is searched: a region remembers its last search.
     """
 
     workspace: Workspace
@@ -57,7 +57,7 @@ class Services:
 
 @lru_cache(maxsize=8)
 def region_of(loaded: LoadedMap, roi: tuple[str, ...]) -> Region:
-    """Region of a scenario; the last few are kept, with the ways searched in them."""
+    """Region of a scenario; the last few are kept, with the paths searched in them."""
     return Region.of(loaded.sumo.graph, roi)
 
 

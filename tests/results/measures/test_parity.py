@@ -109,6 +109,8 @@ def test_nobody_at_all_is_told_and_not_an_error() -> None:
     nobody = states()
     figures = parity_figures(nobody, lights(), PLAN)
     assert figures["share_mirrored"] is None
-    assert "CARLA showed nobody" in render_parity(figures, nobody)
+    assert "CARLA showed no road user" in render_parity(figures, nobody)
     hidden = states((0.0, 0, 1.0, 2.0, 0.0, 0.5, *NOWHERE))
-    assert "CARLA showed nobody" in render_parity(parity_figures(hidden, lights(), PLAN), hidden)
+    assert "CARLA showed no road user" in render_parity(
+        parity_figures(hidden, lights(), PLAN), hidden
+    )

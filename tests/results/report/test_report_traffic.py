@@ -42,7 +42,7 @@ def test_a_junction_has_its_level_delay_and_worst_time():
     section = service_section(made_figures(), SHAPES)
     rows = cells(section)
     row = next(row for row in rows if row[0] == "j10")
-    assert row[:4] == ["j10", "traffic lights", "D", "47.4"]
+    assert row[:4] == ["j10", "signal", "D", "47.4"]
     assert row[6] == "360"
     assert row[8] == "0:30, 90 s"
     assert "r1 &gt; j10 &gt; r2" in str(section)
@@ -54,10 +54,10 @@ def test_the_map_colours_places_and_leaves_those_without_traffic_grey():
     assert re.search(r'href="#place-0" class="los-f"><title>r1: level F, 6 km/h', section)
     assert re.search(r'href="#place-1" class="los-a"><title>r2: level A, 36 km/h', section)
     assert "r9: no traffic" in section
-    assert "j10: level D, 47 s lost by each vehicle" in section
+    assert "j10: level D, 47 s control delay per vehicle" in section
     # The busiest time is the third quarter of an hour, and worse than the whole.
     assert "The busiest time, 0:30 to 0:45 h" in section
-    assert "j10: level F, 90 s lost by each vehicle" in section
+    assert "j10: level F, 90 s control delay per vehicle" in section
 
 
 def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
@@ -65,7 +65,7 @@ def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
     stuck = lane_rows(0, "a_0", 2, length=0.0, lost=900.0, co2=20.0, source=True, sink=False)
     rows = pl.DataFrame([stuck | {"waiting": 1800.0}])
     section = str(service_section(traffic_figures(rows, PLACES, end=900.0), SHAPES))
-    assert "<title>j10: level F, nobody gets into it</title>" in section
+    assert "<title>j10: level F, no vehicle enters it</title>" in section
 
 
 def test_a_place_with_few_vehicles_is_not_among_the_worst():
@@ -85,7 +85,7 @@ def test_the_diagram_has_a_dot_for_each_interval_with_traffic_and_names_the_most
     section = diagram_section(figures.network)
     assert str(section).count("<circle") == 4
     # 150 vehicles over 310 m of lane in a quarter of an hour on 310 m of lanes: 600 an hour.
-    assert "Most flowed from 0:45 to 1:00 h: 600 vehicles an hour per lane" in words(section)
+    assert "The flow was highest from 0:45 to 1:00 h: 600 veh/h per lane" in words(section)
 
 
 def test_a_run_of_one_interval_has_no_course():

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.by_place.corridors import busiest_corridor, corridor_along, way_between
+from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_corridor import NONE_RECORDED
@@ -100,7 +100,7 @@ def test_vehicles_advance_along_a_corridor_as_fast_as_they_drive(run: Path) -> N
 
 def test_junctions_between_named_segments_are_found_and_gaps_are_refused() -> None:
     graph = built(NAME).sumo.graph
-    way = way_between(graph, "r27", "r35")
+    way = path_between(graph, "r27", "r35")
     assert way[0] == "r27"
     assert way[-1] == "r35"
     roads = [name for name in way if name.startswith("r")]
@@ -113,7 +113,7 @@ def test_junctions_between_named_segments_are_found_and_gaps_are_refused() -> No
 
 def test_a_run_without_trajectories_has_no_diagram(tmp_path: Path) -> None:
     where = built(NAME).sumo
-    corridor = corridor_along(where.graph, way_between(where.graph, "r27", "r35"))
+    corridor = corridor_along(where.graph, path_between(where.graph, "r27", "r35"))
     assert corridor_traces(tmp_path, where, corridor) == NONE_RECORDED
 
 

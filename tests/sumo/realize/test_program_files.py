@@ -44,7 +44,7 @@ PHASES = (
     Phase(20.0, "GGr", "stage 1", 8.0, 40.0),
     Phase(3.0, "yyr", "yellow"),
     Phase(7.0, "rrG", "stage 2"),
-    Phase(12.0, "rrr", "crossings clear"),
+    Phase(12.0, "rrr", "pedestrian clearance"),
 )
 LIGHTS = (
     SumoLight("J5", (JunctionId("5"), JunctionId("6")), PHASES, 0.0, (("s1",), ("s1", "s2"), ())),
@@ -89,7 +89,7 @@ def test_other_greens_change_the_stages_and_nothing_else() -> None:
         ("stage 1", "33.5", None, None),
         ("yellow", "3", None, None),
         ("stage 2", "9", None, None),
-        ("crossings clear", "12", None, None),
+        ("pedestrian clearance", "12", None, None),
     ]
     assert [phase.get("state") for phase in logic.iterfind("phase")] == [p.state for p in PHASES]
     params = {param.get("key"): param.get("value") for param in logic.iterfind("param")}

@@ -210,8 +210,8 @@ def test_the_shortest_way_is_by_length_not_by_number_of_edges() -> None:
         for a, b in [("a", "long"), ("long", "z"), ("a", "b"), ("b", "c"), ("c", "z")]
     )
     net = RoadNet({lane.id: lane for lane in lanes.values()}, links)
-    assert net.way("a", "z", "passenger") == ("a", "b", "c", "z")
-    assert net.way("z", "a", "passenger") is None
+    assert net.path("a", "z", "passenger") == ("a", "b", "c", "z")
+    assert net.path("z", "a", "passenger") is None
 
 
 def walk(spawn: str, goal: str, *, lateral: float = 0.0) -> Walk:

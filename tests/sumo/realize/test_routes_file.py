@@ -20,9 +20,9 @@ from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits.demand_edits import set_background, set_counts, set_matrix
 from odscen.scenario.placing.region import Region, place_of
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
-from odscen.sumo.calibrate.town_day import peak_share, town_day, ways_in
+from odscen.sumo.calibrate.town_day import approach_capacities, peak_share, town_day
 from odscen.sumo.realize.passages import planned_passages
-from odscen.sumo.realize.realization import everybody, realize
+from odscen.sumo.realize.realization import all_road_users, realize
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_tools import run_tool
 from odscen.sumo.realize.usable import usable_places
@@ -142,7 +142,7 @@ def surveyed(name: str, *, trips: float) -> tuple[Scenario, list[tuple[str, floa
     graph = built(name).sumo.graph
     known = set_background(empty(name), graph, background="known", trips=trips, end=3300.0)
     region = Region.of(graph, known.roi)
-    users, _ = everybody(known, built(name).sumo, region, until=3600)
+    users, _ = all_road_users(known, built(name).sumo, region, until=3600)
     places = [
         ">".join(names)
         for one, others in sorted(transitions(graph).items())
@@ -203,7 +203,7 @@ def test_a_place_that_no_way_passes_is_the_reason_for_its_count() -> None:
     scenario = set_counts(empty(CROSSING), graph, counts="survey", rows=rows)
     (row,) = planned_fit(scenario, built(CROSSING).sumo).rows
     assert (row.modelled, row.met) == (0, False)
-    assert row.why == "no way inside the region passes here"
+    assert row.why == "no route inside the region passes here"
 
 
 def test_a_run_is_counted_as_it_was_planned_where_traffic_is_light(tmp_path: Path) -> None:
@@ -228,7 +228,7 @@ def test_a_day_of_traffic_keeps_every_way_into_a_junction_below_what_it_carries(
     trips, load = town_day(empty(TOWN, duration=86_400), sumo_map, trips=20_000, day="weekday")
     assert sum(number for _, _, number in trips) == pytest.approx(load.trips, rel=0.01)
     assert load.volume <= 0.71 * load.capacity
-    assert load.capacity == ways_in(sumo_map)[load.place]
+    assert load.capacity == approach_capacities(sumo_map)[load.place]
     assert load.peak_trips == pytest.approx(load.trips * peak_share("weekday"))
     assert 0.08 < peak_share("weekday") < 0.09
 

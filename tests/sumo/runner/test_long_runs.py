@@ -167,7 +167,7 @@ def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     told: list[str] = []
     resume(run, tell=told.append)
     assert told[0] == f"slice {last} is damaged: state.xml.gz is not as it was written"
-    assert told[1] == f"going on at {(last - 1) * SLICE:g} s, after slice {last - 1}"
+    assert told[1] == f"resumes at {(last - 1) * SLICE:g} s, after slice {last - 1}"
     assert results(run) == whole
 
 
@@ -214,9 +214,9 @@ def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
     monkeypatch.setattr(run_status, "PATIENCE", 0.1)
     with run_status.locked(run):
         assert run_status.going(run) == "running"
-        with pytest.raises(ConflictError, match="going on in another process"):
+        with pytest.raises(ConflictError, match="running in another process"):
             resume(run)
-    with pytest.raises(ConflictError, match=r"odscen resume .*run goes on with it"):
+    with pytest.raises(ConflictError, match=r"odscen resume .*run resumes it"):
         run_prepared(long, run)
     resume(run)
     assert run_status.going(run) is None

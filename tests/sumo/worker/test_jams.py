@@ -31,7 +31,7 @@ class Street:
 @pytest.mark.parametrize(
     ("head", "reason"),
     [
-        (FREE._replace(onwards=False), StopReason.NO_WAY_ON),
+        (FREE._replace(onwards=False), StopReason.NO_CONNECTION),
         (FREE._replace(onwards=False, beside=True), StopReason.WRONG_LANE),
         (FREE._replace(light="r", open=False), StopReason.RED),
         (FREE._replace(light="g", open=False), StopReason.GIVES_WAY),

@@ -165,7 +165,7 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
         ending = stage - following
         if walk:
             still = frozenset(g for g in stage if not (g in ending and groups[g].walkers))
-            phases.append(Phase(walk, _state(groups, still, "G", links), "crossings clear"))
+            phases.append(Phase(walk, _state(groups, still, "G", links), "pedestrian clearance"))
         staying = _state(groups, stage & following, "G", links)
         if yellow:
             state = _state(

@@ -1,4 +1,4 @@
-"""Corridors: a way through several junctions, along which vehicles are followed."""
+"""Corridors: a route through several junctions, along which vehicles are followed."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ _TRIED = 40
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corridor:
-    """A way over segments in one direction.
+    """A route over segments in one direction.
 
     Attributes
     ----------
     segments
         Ids in driving direction, junctions included.
     starts
-        Shape ``(K + 1,)``: metres along the way at which each begins; the last is its length.
+        Shape ``(K + 1,)``: metres along the corridor at which each begins; the last is its length.
     nodes
         Lane-graph nodes of all lanes that lead along it, shape ``(M,)``.
     along
-        Metres along the way of each of them.
+        Metres along the corridor of each of them.
     """
 
     segments: tuple[str, ...]
@@ -66,11 +66,11 @@ class Corridor:
 
 
 def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | None:
-    """Corridor on which most vehicles pass most junctions; ``None`` if nobody passed any.
+    """Corridor on which most vehicles pass most junctions; ``None`` if no vehicle passed any.
 
-    From each of the busiest turns that lead straight on a way is continued, forwards and backwards,
-    with the busiest such turn that joins it. Of all ways found, the one with the largest sum of
-    vehicles over its junctions.
+    From each of the busiest turns that lead straight on a route is continued, forwards and
+    backwards, with the busiest such turn that joins it. Of all routes found, the one with the
+    largest sum of vehicles over its junctions.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
     passed = movements.select("movement", "vehicles").iter_rows()
     turns = {tuple(str(name).split(">")): int(vehicles) for name, vehicles in passed if vehicles}
     ahead = _Headings(graph)
-    # Who turns off leaves the corridor; only where nobody goes straight on does it turn itself.
+    # A vehicle that turns leaves the corridor, which turns itself only where none goes straight.
     turns = {turn: count for turn, count in turns.items() if ahead.straight(*turn)} or turns
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
@@ -88,11 +88,11 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
         for other in others:
             before[other].add(one)
     busiest = sorted(turns, key=lambda turn: (-turns[turn], turn))[:_TRIED]
-    ways = {_grown(turn, turns, onwards, before) for turn in busiest}
-    for _, way in sorted(ways, key=lambda found: (-found[0], found[1])):
+    routes = {_grown(turn, turns, onwards, before) for turn in busiest}
+    for _, route in sorted(routes, key=lambda found: (-found[0], found[1])):
         # Turns that join need not do so lane by lane.
         with suppress(InputError):
-            return corridor_along(graph, way)
+            return corridor_along(graph, route)
     return None
 
 
@@ -124,42 +124,42 @@ def _grown(
     onwards: dict[str, set[str]],
     before: dict[str, set[str]],
 ) -> tuple[int, tuple[str, ...]]:
-    """Way through ``turn``, after the vehicles of all its turns."""
-    way, total, junctions = list(turn), turns[turn], 1
+    """Route through ``turn``, after the vehicles of all its turns."""
+    route, total, junctions = list(turn), turns[turn], 1
     least = _STEADY * turns[turn]
     for forwards in (True, False):
         while junctions < LONGEST:
-            tip = way[-1] if forwards else way[0]
+            tip = route[-1] if forwards else route[0]
             joining = [
                 (count, other)
                 for other, count in turns.items()
                 if other[0 if forwards else 2] == tip
                 and count >= least
-                and not set(other[1:] if forwards else other[:2]) & set(way)
+                and not set(other[1:] if forwards else other[:2]) & set(route)
             ]
             if joining:
                 count, chosen = max(joining)
-                way = [*way, *chosen[1:]] if forwards else [*chosen[:2], *way]
+                route = [*route, *chosen[1:]] if forwards else [*chosen[:2], *route]
                 total, junctions = total + count, junctions + 1
                 continue
             # Between two junctions a road may be several segments long: follow it.
             beside = (onwards if forwards else before).get(tip, set())
-            near = {name for name in beside if name[0] == "r"} - set(way)
+            near = {name for name in beside if name[0] == "r"} - set(route)
             if len(near) != 1:
                 break
-            way = [*way, *near] if forwards else [*near, *way]
+            route = [*route, *near] if forwards else [*near, *route]
     # Road that led to no further junction is left out but for its first segment.
-    inside = [place for place, name in enumerate(way) if name[0] == "j"]
-    return total, tuple(way[max(inside[0] - 1, 0) : inside[-1] + 2])
+    inside = [place for place, name in enumerate(route) if name[0] == "j"]
+    return total, tuple(route[max(inside[0] - 1, 0) : inside[-1] + 2])
 
 
-def way_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
-    """Segments of the shortest way over the whole of ``first`` to the end of ``last``.
+def path_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
+    """Segments of the shortest path over the whole of ``first`` to the end of ``last``.
 
     Raises
     ------
     InputError
-        If there is no such segment, or no way.
+        If there is no such segment, or no path.
     """
     path = _shortest(graph, first, last, None)
     if path is None:
@@ -191,7 +191,9 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
     mask = np.isin(graph.lanes.segment, segment_rows(graph.segments, names))
     path = _shortest(graph, names[0], names[-1], mask)
     if path is None or list(_passed(graph, path)) != names:
-        msg = f"one cannot drive along {', '.join(names)} in this order; --from and --to find a way"
+        msg = (
+            f"one cannot drive along {', '.join(names)} in this order; --from and --to find a route"
+        )
         raise InputError(msg)
     return _measured(graph, names, path)
 
@@ -213,7 +215,7 @@ def _with_junctions(graph: MapGraph, names: Sequence[str]) -> list[str]:
 
 
 def _shortest(graph: MapGraph, first: str, last: str, mask: BoolArray | None) -> Int32Array | None:
-    """Nodes of the shortest way from where one enters ``first`` to where one leaves ``last``."""
+    """Nodes of the shortest path from where one enters ``first`` to where one leaves ``last``."""
     lanes = graph.lanes
     start, end = (int(segment_rows(graph.segments, [name])[0]) for name in (first, last))
     inside = lanes.segment[lanes.source] == lanes.segment[lanes.target]
@@ -233,18 +235,18 @@ def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corrid
     from scipy.spatial import cKDTree
 
     lanes = graph.lanes
-    way = np.column_stack([lanes.x[path], lanes.y[path]])
-    metres = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+    line = np.column_stack([lanes.x[path], lanes.y[path]])
+    metres = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     rows = lanes.segment[path]
     first = np.flatnonzero(np.concatenate([[True], np.diff(rows) != 0]))
     nodes, along = [], []
     for begin, end in zip(first.tolist(), [*first[1:].tolist(), len(path)], strict=True):
         here = np.flatnonzero(lanes.segment == rows[begin])
         xy = np.column_stack([lanes.x[here], lanes.y[here]])
-        away, near = cKDTree(way[begin:end]).query(xy)
+        away, near = cKDTree(line[begin:end]).query(xy)
         near += begin
         heading = lanes.hdg[path[near]]
-        offset = xy - way[near]
+        offset = xy - line[near]
         ahead = offset[:, 0] * np.cos(heading) + offset[:, 1] * np.sin(heading)
         # Of a junction only what leads straight along; of a road all lanes of the direction.
         turned = np.cos(lanes.hdg[here] - heading)
@@ -259,7 +261,7 @@ def _measured(graph: MapGraph, names: Sequence[str], path: Int32Array) -> Corrid
 
 
 _WIDEST = 20.0
-"""Metres from the way to the outermost of its lanes."""
+"""Metres from the path to the outermost of its lanes."""
 
 
 def junctions_of(corridor: Corridor, kinds: Iterable[str]) -> list[tuple[str, float, float]]:

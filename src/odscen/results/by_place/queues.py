@@ -1,4 +1,4 @@
-"""Queues at junctions from trajectories: how many stand at one time."""
+"""Queues at junctions from trajectories: how many vehicles are stopped at one time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.lane_places import LanePlaces
 
-STANDS = 0.1
+STOPPED = 0.1
 """m/s; slower counts as standing, as in SUMO's ``waitingTime``."""
 _SHARE = 0.05
 """Of the moments of an interval, in which the queue may be longer than ``queue_p95``."""
@@ -23,8 +23,8 @@ def queue_lengths(
 ) -> pl.DataFrame | None:
     """Greatest queue, and that which 95 % of the moments do not exceed; junction and interval.
 
-    The queue are all vehicles that stand on the ways to the junction and in it. Junctions and
-    intervals without any are left out.
+    The queue are all vehicles that are stopped on the approaches to the junction and in it.
+    Junctions and intervals without any are left out.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def queue_lengths(
     )
     in_interval = moments.group_by("begin").agg(pl.len().alias("moments"))
     standing = (
-        trajectories.filter(pl.col("vehicle_speed") < STANDS)
+        trajectories.filter(pl.col("vehicle_speed") < STOPPED)
         .select(
             time=pl.col("timestep_time").cast(pl.Float64), lane=pl.col("vehicle_lane").cast(str)
         )

@@ -10,24 +10,25 @@ flow, density, speed
     ``speed`` is the space mean, and ``flow = density * speed``.
 L
     Segment: its length along the road, so that flow is that of all lanes and directions together.
-    Junction, movement: mean length of the ways through. Network: sum over the lanes, so that flow
+    Junction, movement: mean length of the connections. Network: sum over the lanes, so that flow
     and density are per lane, as in macroscopic fundamental diagrams (N. Geroliminis and C. F.
     Daganzo, Transportation Research B 42, 2008).
 delay
     SUMO's time loss, the sum of ``(1 - speed / desired speed) dt``, in seconds per vehicle. So
-    ``seconds - time_loss`` is the time that the same way takes at desired speed: free-flow time.
+    ``seconds - time_loss`` is the time that the same distance takes at desired speed: free-flow
+    time.
 standing, waiting
     Of vehicles below 0.1 m/s: their mean number, and seconds per vehicle.
 delay and waiting of a junction
-    Those on the ways to it (from the junction before, over all segments between) and in it, per
-    vehicle that enters it: the control delay of the Highway Capacity Manual (HCM, 7th edition),
-    with what is lost behind other vehicles on the way.
+    Those on the approaches to it (from the junction before, over all segments between) and in it,
+    per vehicle that enters it: the control delay of the Highway Capacity Manual (HCM, 7th edition),
+    with what is lost behind other vehicles on the approach.
 delay and waiting of a movement
     Vehicles that use one lane share its delay alike, as in a lane group of the HCM: that of the
     last edge by lane, that of the edges before it all together.
 
-A junction or movement that nobody got into, though somebody stood all the time, has no delay per
-vehicle and level F. Places are defined in :mod:`odscen.results.by_place.lane_places`, levels of
+A junction or movement that no vehicle entered, though one was stopped all the time, has no delay
+per vehicle and level F. Places are defined in :mod:`odscen.results.by_place.lane_places`, levels of
 service in :mod:`odscen.results.by_place.level_of_service`.
 """
 
@@ -64,14 +65,14 @@ _QUEUES = ("queue_max", "queue_p95")
 class TrafficFigures:
     """Four tables: one row for each place and interval of time, sorted by place and begin.
 
-    A place that nobody came to is in no table; a place has a row for every interval, also without
-    anybody. Columns of all tables:
+    A place that no vehicle came to is in no table; a place has a row for every interval, also
+    without vehicles. Columns of all tables:
 
     - ``begin``, ``end``: s.
     - ``vehicles``: that came into the place or started there; of the network: that were under way.
-    - ``flow`` (veh/h), ``density`` (veh/km), ``speed`` (m/s; null without anybody).
-    - ``delay``, ``waiting``: s per vehicle; null without anybody who passed.
-    - ``standing``: mean number of vehicles that stand, the mean queue.
+    - ``flow`` (veh/h), ``density`` (veh/km), ``speed`` (m/s; null without vehicles).
+    - ``delay``, ``waiting``: s per vehicle; null if no vehicle passed.
+    - ``standing``: mean number of stopped vehicles, the mean queue.
     - ``co2``, ``co``, ``hc``, ``nox``, ``pmx``, ``fuel``: g, at the place itself; null if not
       recorded.
     - ``length``: km, ``L`` of the definitions above.
@@ -84,11 +85,11 @@ class TrafficFigures:
         Also ``running`` (mean number under way), ``departed``, ``arrived``.
     segments
         Also ``segment``, ``travel_time`` and ``free_flow_time`` (s, along the whole segment; null
-        without anybody), ``level``.
+        without vehicles), ``level``.
     junctions
         Also ``junction``, ``control``, ``level``, ``queue_max`` and ``queue_p95`` (vehicles that
-        stand at one time on the ways to it and in it; null without trajectories), ``throughput``
-        (the same as ``vehicles``).
+        are stopped at one time on the approaches to it and in it; null without trajectories),
+        ``throughput`` (the same as ``vehicles``).
     movements
         Also ``movement`` (``r1>j10>r2``), ``junction``, ``control``, ``level``.
     """
@@ -160,9 +161,9 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
         standing=col("standing_seconds") / seconds,
     )
     if "junction" in sums.columns:
-        stuck = (col("vehicles") == 0) & (col("standing") >= 1.0)
+        blocked = (col("vehicles") == 0) & (col("standing") >= 1.0)
         level = junction_level(col("delay"), col("control"))
-        rates = rates.with_columns(level=pl.when(stuck).then(pl.lit("F")).otherwise(level))
+        rates = rates.with_columns(level=pl.when(blocked).then(pl.lit("F")).otherwise(level))
         if "movement" not in sums.columns:
             rates = rates.with_columns(throughput="vehicles")
     elif "segment" in sums.columns:

@@ -23,7 +23,7 @@ SUMS = ("vehicles", *TRAFFIC, *LOST)
 
 
 def intervals(lanes: pl.DataFrame, end: float) -> pl.DataFrame:
-    """All intervals up to ``end``, those without anybody included; ``begin`` and ``end``."""
+    """All intervals up to ``end``, those without vehicles included; ``begin`` and ``end``."""
     import polars as pl
 
     seen = [(0.0, 0.0), *lanes.select(INTERVAL).unique().sort("begin").rows(), (end, end)]
@@ -74,7 +74,7 @@ def segment_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
 
 
 def junction_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -> pl.DataFrame:
-    """Sums per junction: traffic and emissions in it, time lost there and on the ways to it."""
+    """Sums per junction: traffic and emissions in it, time lost there and on its approaches."""
     import polars as pl
 
     inside = pl.col("via").is_not_null()
@@ -100,7 +100,7 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
     import polars as pl
 
     rows = lanes.join(places.ways, on="lane")
-    ways = (
+    connections = (
         rows.filter(pl.col("via").is_not_null())
         .group_by("movement", "approach", "source", "via", *INTERVAL)
         .agg(
@@ -110,11 +110,11 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
         )
     )
     before = rows.filter(pl.col("via").is_null())
-    used = before.select(pl.col("lane").is_in(ways["source"].unique().implode())).to_series()
-    by_lane = _shared(before.filter(used).with_columns(source="lane"), ways, "source")
-    by_edge = _shared(before.filter(~used), ways, "approach")
+    used = before.select(pl.col("lane").is_in(connections["source"].unique().implode())).to_series()
+    by_lane = _shared(before.filter(used).with_columns(source="lane"), connections, "source")
+    by_edge = _shared(before.filter(~used), connections, "approach")
     found = (
-        ways.join(by_lane, on=("source", "begin"), how="left", suffix="_of_lane")
+        connections.join(by_lane, on=("source", "begin"), how="left", suffix="_of_lane")
         .join(by_edge, on=("approach", "begin"), how="left", suffix="_of_edge")
         .with_columns(
             pl.col(name)
@@ -128,11 +128,11 @@ def movement_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) 
     return _filled(found, clock, places.movements)
 
 
-def _shared(lost: pl.DataFrame, ways: pl.DataFrame, by: str) -> pl.DataFrame:
+def _shared(lost: pl.DataFrame, connections: pl.DataFrame, by: str) -> pl.DataFrame:
     """Time lost per vehicle that entered a junction from a lane or edge in an interval."""
     import polars as pl
 
-    entered = ways.group_by(by, "begin").agg(pl.col("through").sum().alias("by_all"))
+    entered = connections.group_by(by, "begin").agg(pl.col("through").sum().alias("by_all"))
     return (
         lost.select(by, "begin", *LOST)
         .sort("begin")
@@ -173,7 +173,7 @@ def _known(column: pl.Expr, name: str) -> pl.Expr:
 
 
 def _filled(found: pl.DataFrame, clock: pl.DataFrame, places: pl.DataFrame) -> pl.DataFrame:
-    """One row for each place that anybody came to and each interval; length in km."""
+    """One row for each place that a vehicle came to and each interval; length in km."""
     import polars as pl
 
     key = places.columns[0]

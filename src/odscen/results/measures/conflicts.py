@@ -28,7 +28,7 @@ SERIOUS_TTC, SERIOUS_DRAC, SERIOUS_PET = 1.5, 3.35, 1.0
 """What makes a conflict serious: seconds or less, m/s^2 or more, seconds or less."""
 
 BODY = 0.25
-"""Metres around the centre of somebody on foot that belong to them."""
+"""Metres around the centre of a pedestrian that belong to it."""
 
 _SCHEMA_NAMES = ("begin", "end", "one", "other", "kind", "x", "y", "ttc", "drac", "pet")
 _TEXTS = frozenset({"one", "other", "kind"})
@@ -111,7 +111,7 @@ def walking_conflicts(
 ) -> list[dict[str, object]]:
     """Post-encroachment between people on foot and vehicles, as rows for :func:`conflict_table`.
 
-    A spot is shared if somebody on foot was there and the body of a vehicle was over it within
+    A spot is shared if a pedestrian was there and the body of a vehicle was over it within
     :data:`SEEN_PET` seconds; the shortest time between both, over all spots that two of them share,
     is their post-encroachment time, to the precision of the records' step.
 

@@ -1,4 +1,4 @@
-"""A run over time as plain numbers, for whoever draws it."""
+"""A run over time as plain numbers, to be drawn."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class CurveTable(NamedTuple):
 
 
 def presence(actors: Sequence[ActorOutcome], *, end: float) -> ActorCounts:
-    """How many were on the road, had arrived, and waited to enter, up to ``end`` seconds."""
+    """How many were on the road, had arrived, and were not inserted yet, up to ``end`` seconds."""
     depart, inserted, arrived = (
         np.array([_number(getattr(actor, key)) for actor in actors])
         for key in ("depart", "inserted", "arrived")

@@ -125,7 +125,7 @@ def evaluate(
 ) -> tuple[ExpectationVerdict, ...]:
     """Hold a run's summary against expectations.
 
-    A figure that the run does not have (nobody arrived, the run failed) fails its expectation.
+    A figure that the run does not have (none arrived, the run failed) fails its expectation.
     """
     return tuple(_verdict(expectation, summary) for expectation in expectations)
 

@@ -26,7 +26,7 @@ FigureKind = Literal["run", "segment", "junction", "actor"]
 
 
 class Better(StrEnum):
-    """Which way a figure should go."""
+    """In which direction a figure is better."""
 
     LOWER = "lower"
     HIGHER = "higher"

@@ -1,12 +1,12 @@
-"""How far two simulators agree on one run: where everybody was, and what the lights showed.
+"""How far two simulators agree on one run: where road users were, and what the lights showed.
 
 Pure functions of two tables. ``states`` has a row for each road user and step of SUMO's::
 
     time, row, x, y, z, hdg, carla_x, carla_y, carla_z, carla_hdg
 
 body centres in the OpenDRIVE frame, metres and radians, ``row`` being that of the plan; CARLA's
-columns are NaN where it showed nobody. ``lights`` has a row for each step and signal that both
-know: ``time, signal, sumo, carla``.
+columns are NaN where it showed no road user. ``lights`` has a row for each step and signal that
+both know: ``time, signal, sumo, carla``.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PERCENTILES = (50, 95, 99, 100)
 def with_errors(states: pl.DataFrame) -> pl.DataFrame:
     """Add ``position`` (level, metres), ``height`` (metres) and ``heading`` (degrees), unsigned.
 
-    All three are null where CARLA showed nobody.
+    All three are null where CARLA did not show it.
     """
     import polars as pl
 
@@ -127,7 +127,7 @@ def _by_category(both: pl.DataFrame, plan: Plan) -> dict[str, Any]:
 
 
 def _departures(states: pl.DataFrame, plan: Plan) -> dict[str, Any]:
-    """Planned against SUMO's first step, and SUMO's against CARLA's first sight of somebody."""
+    """Planned against SUMO's first step, and SUMO's against CARLA's first sight of each."""
     import polars as pl
 
     first = states.sort("time").group_by("row").first()
@@ -187,7 +187,7 @@ def _lights(lights: pl.DataFrame) -> dict[str, Any]:
 
 
 def _worst(both: pl.DataFrame, plan: Plan) -> list[dict[str, Any]]:
-    """Everybody's worst moment, the worst first."""
+    """The worst moment of each road user, the worst first."""
     rows = both.sort("position", descending=True).group_by("row", maintain_order=True).first()
     return [_moment(plan.actors[row["row"]], row) for row in rows.head(WORST).iter_rows(named=True)]
 

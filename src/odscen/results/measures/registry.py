@@ -73,7 +73,7 @@ def run_figure(name: str) -> RunFigure | None:
 
 
 def figure_of(kind: FigureKind, name: str) -> Figure:
-    """Look up a figure; one that old files have and nobody knows has its name, and no unit."""
+    """Look up a figure; one that only old files have has its name, and no unit."""
     known = _BY_NAME.get((kind, name))
     if known is not None:
         return known

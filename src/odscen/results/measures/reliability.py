@@ -68,7 +68,7 @@ FIGURES = (
         basis=Basis.TRIPS,
         display=_RATIO,
         section=ReportSection.KEY_FIGURES,
-        note="free-flow times to plan for 19 of 20 trips",
+        note="95th percentile travel time over free-flow time",
         compute=_late_ratio,
     ),
     RunFigure(

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Trip(NamedTuple):
-    """What SUMO has measured on the way of an actor: seconds, and how many halts.
+    """What SUMO has measured on the trip of an actor: seconds, and how many halts.
 
     ``time_loss`` is ``None`` for a person who has not arrived, ``stops`` for every person.
     """
@@ -60,12 +60,12 @@ class ActorOutcome:
     mean_speed
         Route length over travel time.
     problem
-        Why the SUMO network had no way for it, if so; it is then ``waiting``.
+        Why the SUMO network had no route for it, if so; it is then ``waiting``.
     time_loss
         Seconds lost by driving, or walking, below the speed that it wished for; also while it was
         getting up to that speed.
     waiting_time
-        Seconds that it stood, below 0.1 m/s.
+        Seconds that it was stopped, below 0.1 m/s.
     stops
         How many times a vehicle came to a halt.
     """
@@ -174,7 +174,7 @@ def actor_outcomes(
     Parameters
     ----------
     trips
-        By id; whoever has none has no delay, waiting time and stops.
+        By id; an actor without one has no delay, waiting time and stops.
     """
     found = Outcomes(plan)
     found.hear(events, trips)
@@ -235,7 +235,7 @@ def actors_text(rows: Iterable[str]) -> Iterator[str]:
 
 
 def outcome_row(outcome: ActorOutcome) -> str:
-    """One actor as it stands in ``actors.json``, without indentation and comma."""
+    """One actor as written in ``actors.json``, without indentation and comma."""
     return row_text({name: getattr(outcome, name) for name in _COLUMNS})
 
 

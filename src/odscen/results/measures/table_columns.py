@@ -65,7 +65,7 @@ COLUMNS = (
         "connection; network: per lane",
     ),
     _column("density", "veh/km", "Edie's: seconds of all vehicles over length and time"),
-    _column("speed", "m/s", "Edie's: metres over seconds, the space mean; null without anybody"),
+    _column("speed", "m/s", "Edie's: metres over seconds, the space mean; null without vehicles"),
     _column("distance", "m", f"metres that vehicles travelled; {_SUM}"),
     _column("length", "km", "what flow and density refer to"),
 )

@@ -1,6 +1,6 @@
 """What can become of a run, an actor and a place on the road, and why: with words for each.
 
-A member's value is what stands in the files of a run; its ``label`` is what people read.
+A member's value is written into the files of a run; its ``label`` is what people read.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from enum import StrEnum
 
 
 class RunStatus(StrEnum):
-    """How a run ended; one that somebody has stopped early is ``completed``, too."""
+    """How a run ended; one that a user has stopped early is ``completed``, too."""
 
     COMPLETED = "completed"
     FAILED = "failed"
@@ -41,8 +41,8 @@ _STATUS_LABELS = {
 class IncidentKind(StrEnum):
     """What can go wrong with traffic at a place.
 
-    ``jam``: vehicles stand there for minutes; ``moved_on``: SUMO has teleported a vehicle, that is
-    taken it out and put it back further on; ``kept_out``: planned, but not inserted.
+    ``jam``: vehicles are stopped there for minutes; ``moved_on``: SUMO has teleported a vehicle,
+    that is removed it and put it back further on; ``kept_out``: planned, but not inserted.
     """
 
     JAM = "jam"
@@ -66,7 +66,7 @@ class StopReason(StrEnum):
     """Why vehicles are stopped for minutes, or are not inserted, as far as it shows."""
 
     CIRCLE = "vehicles wait for each other in a circle"
-    NO_WAY_ON = "its lane does not lead on along its way"
+    NO_CONNECTION = "its lane does not lead on along its way"
     WRONG_LANE = "it did not get to the lane that its way needs"
     RED = "a red light"
     PEOPLE = "people on a crossing"
@@ -83,7 +83,7 @@ class StopReason(StrEnum):
 
 _REASON_LABELS = {
     StopReason.CIRCLE: "gridlock: vehicles wait for each other in a circle",
-    StopReason.NO_WAY_ON: "its lane does not continue along its route",
+    StopReason.NO_CONNECTION: "its lane does not continue along its route",
     StopReason.WRONG_LANE: "it did not reach the lane that its route needs",
     StopReason.RED: "red light",
     StopReason.PEOPLE: "pedestrians on a crossing",

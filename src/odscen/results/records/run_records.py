@@ -46,7 +46,7 @@ class PlannedActor:
     route_length
         Metres from the spawn node to the goal along the lane graph.
     free_flow_time
-        Seconds that the way takes at the desired speed without anybody else; ``None`` if unknown.
+        Seconds of the route at the desired speed without other traffic; ``None`` if unknown.
     flow
         Id of the flow it belongs to, if any.
     problem
@@ -158,7 +158,7 @@ class Plan:
 class EventKind(StrEnum):
     """What can happen to an actor.
 
-    A jam is told of whoever is first in it. ``lost``: it did not come back with a saved state.
+    A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
     """
 
     DEPARTED = "departed"
@@ -188,11 +188,11 @@ class Event(NamedTuple):
     travel_time
         Arrivals: seconds since departure.
     detail
-        SUMO's word for the kind of collision; why somebody was stuck (teleports, jams).
+        SUMO's word for the kind of collision; why a vehicle was gridlocked (teleports, jams).
     waited
-        Seconds that whoever is first in a jam, or was moved on, has stood there.
+        Seconds that the first vehicle in a jam, or a teleported one, was stopped there.
     queue
-        How many stand in a jam.
+        How many vehicles are stopped in a jam.
     """
 
     time: float
@@ -210,12 +210,12 @@ class Event(NamedTuple):
 
 
 def event_row(event: Event) -> dict[str, Any]:
-    """One event as it stands in ``events.json``: without what has its default value."""
+    """One event as written in ``events.json``: without what has its default value."""
     return rounded(_without_defaults(event))
 
 
 def event_line(event: Event) -> str:
-    """One event as it stands in ``events.json``, without indentation and comma."""
+    """One event as written in ``events.json``, without indentation and comma."""
     return row_text(_without_defaults(event))
 
 
@@ -303,7 +303,7 @@ def text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> It
 
 
 def row_text(row: Mapping[str, Any]) -> str:
-    """One row as it stands in such a text."""
+    """One row as written in such a text."""
     return _encode(rounded(row))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 OTHER = "other"
-"""Category of whoever is in the trajectories but not among the actors."""
+"""Category of road users that are in the trajectories but not among the actors."""
 
 _NAMES = {"id": "id", "x": "x", "y": "y", "speed": "speed"}
 _TIMES = ("timestep_time", "time")
@@ -47,7 +47,7 @@ def tidy(
     -------
     polars.DataFrame
         Sorted by id, then time; OpenDRIVE frame; rows without a place left out. ``piece`` numbers
-        the stretches without interruption: whoever is teleported is away for a while.
+        the stretches without interruption: a teleported one is away for a while.
     """
     import polars as pl
 
@@ -73,7 +73,7 @@ def tidy(
     pause = pl.col("time").diff()
     step = rows.select(pause.filter(pause > 0).min()).item() or 1.0
     away = pause > 1.5 * step
-    # Some teleports end in the step they begin: nobody covers ten metres more than driving takes.
+    # Some teleports end in the step they begin: none covers ten metres more than driving takes.
     moved = (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
     away |= moved > 2.0 * pause * pl.max_horizontal("speed", pl.col("speed").shift()) + 10.0
     away = away.fill_null(value=False)
@@ -90,7 +90,7 @@ def _column_names(columns: list[str]) -> dict[str, str] | None:
 
 
 class SpeedCurve(NamedTuple):
-    """Speeds per bin of time, m/s; NaN where nobody was there. All of shape ``(B,)``."""
+    """Speeds per bin of time, m/s; NaN where no vehicle was there. All of shape ``(B,)``."""
 
     time: FloatArray
     mean: FloatArray
@@ -162,20 +162,20 @@ def counts_over_time(
 
 
 class Paths(NamedTuple):
-    """Thinned ways of all actors, one for every stretch without interruption.
+    """Thinned trajectories of all actors, one for every stretch without interruption.
 
     Attributes
     ----------
     ids
-        Actor per way, sorted.
+        Actor per trajectory, sorted.
     categories
-        Category per way.
+        Category per trajectory.
     last
-        Whether it is the actor's last way.
+        Whether it is the actor's last trajectory.
     xy
         Shape ``(N, 2)``, metres, OpenDRIVE frame.
     start
-        Shape ``(K + 1,)``: way ``k`` is ``xy[start[k]:start[k + 1]]``.
+        Shape ``(K + 1,)``: trajectory ``k`` is ``xy[start[k]:start[k + 1]]``.
     """
 
     ids: tuple[str, ...]
@@ -186,13 +186,13 @@ class Paths(NamedTuple):
 
 
 def thinned_paths(traces: pl.DataFrame, *, tolerance: float = 0.25) -> Paths:
-    """Give the way of every actor with only the points that matter to ``tolerance`` metres."""
+    """Trajectory of every actor with only the points that matter to ``tolerance`` metres."""
     import polars as pl
     import shapely
 
-    stands = (pl.col("x") == pl.col("x").shift()) & (pl.col("y") == pl.col("y").shift())
+    stopped = (pl.col("x") == pl.col("x").shift()) & (pl.col("y") == pl.col("y").shift())
     begins = (pl.col("piece") != pl.col("piece").shift()).fill_null(value=True)
-    moved = traces.filter(begins | ~stands).filter(pl.len().over("piece") > 1)
+    moved = traces.filter(begins | ~stopped).filter(pl.len().over("piece") > 1)
     if moved.is_empty():
         return Paths((), (), (), np.empty((0, 2)), np.zeros(1, dtype=np.int64))
     several = moved.group_by("piece", maintain_order=True).agg(

@@ -32,7 +32,7 @@ CELL = 3.0
 ABSENT = 50
 """Rows of the list of those who were not shown, at most."""
 
-_HEADS = ("Median", "95 %", "99 %", "Largest")
+_HEADS = ("Median", "95th percentile", "99th percentile", "Largest")
 
 
 def render_parity(
@@ -68,7 +68,7 @@ def _head(title: str, figures: Mapping[str, Any]) -> Markup:
     position, heading = figures["position_error_m"], figures["heading_error_deg"]
     wrong = figures["lights"]["wrong"]
     if position is None:
-        style, words = "bad", "CARLA showed nobody"
+        style, words = "bad", "CARLA showed no road user"
     elif position["max"] <= GOAL_M and heading["max"] <= GOAL_DEG and not wrong:
         style, words = "good", "Both worlds agree"
     else:
@@ -76,28 +76,28 @@ def _head(title: str, figures: Mapping[str, Any]) -> Markup:
     share = figures["share_mirrored"]
     shown = "" if share is None else f"{number(100.0 * share, 2)} % of SUMO's road users"
     sentence = (
-        f"In {figures['steps']:,} steps CARLA showed {shown or 'nobody'}; whoever is beyond the "
-        "radius that was asked for is left out on purpose."
+        f"In {figures['steps']:,} steps CARLA showed {shown or 'no road user'}; those beyond the "
+        "radius that was asked for are left out on purpose."
     )
     kind = "SUMO and CARLA compared"
     return page_head(kind, title, element("p", sentence), verdict=words, style=style)
 
 
 def _errors(figures: Mapping[str, Any]) -> Markup:
-    rows = [_error_row("everybody", figures["mirrored"], figures)]
+    rows = [_error_row("all road users", figures["mirrored"], figures)]
     rows += [
         _error_row(CATEGORIES[key].lower(), figures["by_category"][key]["samples"], part)
         for key in CATEGORIES
         if (part := figures["by_category"].get(key))
     ]
-    heads = ("Who", "Samples", *(f"Place: {name.lower()}" for name in _HEADS))
+    heads = ("Category", "Samples", *(f"Position: {name.lower()}" for name in _HEADS))
     table = html_table((*heads, "Height: largest", "Heading: largest"), rows)
     explained = (
-        f"a sample is one road user in one step. Place is the level distance between the two "
-        f"bodies' centres; a mirror is to keep it within {number(GOAL_M * 100)} cm, and heading "
-        f"within {number(GOAL_DEG)} degrees."
+        "a sample is one road user in one step. Position is the horizontal distance between the "
+        f"two bodies' centres; a mirror is to keep it within {number(GOAL_M * 100)} cm, and "
+        f"heading within {number(GOAL_DEG)} degrees."
     )
-    return report_section("How far apart", table, explained=explained, ident="errors")
+    return report_section("Position and heading errors", table, explained=explained, ident="errors")
 
 
 def _error_row(name: str, samples: int, part: Mapping[str, Any]) -> Markup:
@@ -160,11 +160,11 @@ def _map(states: pl.DataFrame, drawing: MapDrawing | None) -> Markup | None:
         "div", *(swatch(f"e{i}", name) for i, name in enumerate(names)), class_="legend"
     )
     explained = (
-        f"each square is {number(CELL)} m wide and has the colour of the largest distance that "
-        "anybody had there."
+        f"each square is {number(CELL)} m wide and has the colour of the largest position error "
+        "there."
     )
     figure = element("div", svg, legend, class_="map-figure")
-    return report_section("Where", figure, explained=explained, ident="map")
+    return report_section("Position error by place", figure, explained=explained, ident="map")
 
 
 def _time(states: pl.DataFrame) -> Markup | None:
@@ -173,8 +173,8 @@ def _time(states: pl.DataFrame) -> Markup | None:
         return None
     explained = "a rise that never falls again means that one world has slipped against the other."
     if states["position"].max() < NOTHING:  # type: ignore[operator]
-        words = element("p", "At no time was anybody 0.1 mm apart.", class_="good")
-        return report_section("When", words, explained=explained, ident="time")
+        words = element("p", "The position error was below 0.1 mm at all times.", class_="good")
+        return report_section("Position error over time", words, explained=explained, ident="time")
     time, median, most = error_curve(states, width=bin_width(max(last, 1.0)))
     lines = [
         Series("largest", "c-bus", most * 100.0),
@@ -183,14 +183,14 @@ def _time(states: pl.DataFrame) -> Markup | None:
     chart = line_chart(
         time, lines, y_label="distance, cm", description="Distance between the worlds over time"
     )
-    return report_section("When", chart, explained=explained, ident="time")
+    return report_section("Position error over time", chart, explained=explained, ident="time")
 
 
 def _departures(departures: Mapping[str, Any]) -> Markup:
     rows = []
     for name, key, unit in (
         ("SUMO after the plan", "sumo_after_plan_s", "s"),
-        ("SUMO's start from the planned place", "sumo_off_plan_m", "m"),
+        ("SUMO's start off the planned place", "sumo_off_plan_m", "m"),
         ("CARLA after SUMO", "carla_after_sumo_s", "s"),
     ):
         values = departures[key] or {}
@@ -200,16 +200,20 @@ def _departures(departures: Mapping[str, Any]) -> Markup:
         ]
         rows.append(element("tr", element("th", name, scope="row"), *cells))
     counts = (
-        f"{departures['planned']:,} planned, {departures['in_sumo']:,} entered in SUMO, "
+        f"{departures['planned']:,} planned, {departures['in_sumo']:,} inserted in SUMO, "
         f"{departures['in_carla']:,} were seen in CARLA."
     )
     explained = (
-        "a start in SUMO is late when there was no room; one in CARLA when the server refused it "
-        "at first."
+        "a departure in SUMO is late when there was no room; one in CARLA when the server refused "
+        "it at first."
     )
-    table = html_table(("Starts", *_HEADS), rows)
+    table = html_table(("Difference", *_HEADS), rows)
     return report_section(
-        "Planned, SUMO, CARLA", element("p", counts), table, explained=explained, ident="starts"
+        "Departures: planned, SUMO, CARLA",
+        element("p", counts),
+        table,
+        explained=explained,
+        ident="starts",
     )
 
 
@@ -254,9 +258,11 @@ def _worst(worst: Sequence[Mapping[str, Any]]) -> Markup | None:
         )
         for row in worth
     ]
-    heads = ("Road user", "Category", "At", "Apart", "Heading", "Place (x, y)")
-    explained = "each road user is listed once, at its worst moment."
-    return report_section("Worst", html_table(heads, rows), explained=explained, ident="worst")
+    heads = ("Road user", "Category", "At", "Position", "Heading", "Place (x, y)")
+    explained = "each road user is listed once, at its largest error."
+    return report_section(
+        "Largest errors", html_table(heads, rows), explained=explained, ident="worst"
+    )
 
 
 def _absent(absent: Sequence[Mapping[str, Any]]) -> Markup | None:

@@ -1,4 +1,4 @@
-"""How close road users came to a crash: the report's figures, and the worst conflicts."""
+"""Traffic conflicts (surrogate safety measures): the report's figures, and the worst ones."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def conflict_section(conflicts: pl.DataFrame) -> Markup:
         del values["pedestrian_min_pet"]
     cards = figure_cards(ReportSection.CONFLICTS, values)
     explained = (
-        "the time to collision is what is left until two crash if both continue as they do; the "
-        "post-encroachment time is from when the first leaves a spot until the other is there. A "
-        "conflict is "
+        "the time to collision (TTC) is what is left until two collide if both continue as they "
+        "do; the post-encroachment time (PET) is from when the first leaves a spot until the other "
+        "is there; DRAC is the deceleration that avoids a crash. A conflict is "
         f"serious if these are below {SERIOUS_TTC:g} s and {SERIOUS_PET:g} s, or if more than "
-        f"{SERIOUS_DRAC:g} m/s\u00b2 of braking is needed. Where they gather, look "
+        f"{SERIOUS_DRAC:g} m/s\u00b2 of deceleration is needed. Where they gather, look "
         "at sight, speed and right of way. A simulator's drivers see everything and hardly "
         "err, so compare two variants rather than take these numbers for accidents."
     )
-    table = _worst(conflicts) if conflicts.height else element("p", "Nobody came close.")
+    table = _worst(conflicts) if conflicts.height else element("p", "There were no conflicts.")
     return report_section(
-        "How close they came", card_grid(cards), table, explained=explained, ident="conflicts"
+        "Traffic conflicts", card_grid(cards), table, explained=explained, ident="conflicts"
     )
 
 
@@ -67,8 +67,8 @@ def _worst(conflicts: pl.DataFrame) -> Markup:
     )
     worst = conflicts.sort(share, descending=True, maintain_order=True).head(SHOWN)
     heads = (
-        "Since, s", "Who", "With", "How", "To collision, s", "Between, s",
-        "Braking, m/s\u00b2", "At x, y, m",
+        "Since, s", "Road user", "With", "Type", "TTC, s", "PET, s", "DRAC, m/s\u00b2",
+        "At x, y, m",
     )  # fmt: skip
     grave = worst.select(is_serious()).to_series()
     rows = [

@@ -1,4 +1,4 @@
-"""Time-space diagram: vehicles along a corridor, and where they stood."""
+"""Time-space diagram: vehicles along a corridor, and where they were stopped."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 CRAWLS = 5.0 / 3.6
-"""m/s; slower is drawn as standing, as a queue that creeps is one."""
+"""m/s; slower is drawn as queued, as a queue that creeps is one."""
 
 _SHARP = 0.4
 """Units of the drawing by which a simplified line may be off."""
@@ -62,24 +62,24 @@ NONE_RECORDED = "There are no trajectories to draw: the run was made without the
 
 def corridor_section(traces: CorridorTraces | str) -> Markup:
     """Section of the diagram, or of the words why there is none."""
-    heading = "Along a corridor"
+    heading = "Time-space diagram of a corridor"
     explained = (
-        "each line is one vehicle: time runs to the right, the way upwards. A steep line is a fast "
-        "vehicle; a level red one stands or crawls, below 5 km/h. Grey bands are junctions. Red "
+        "each line is one trajectory: time runs to the right, distance upwards. A steep line is a "
+        "fast vehicle; a level red one is queued, below 5 km/h. Grey bands are junctions. Red "
         "wedges that start below a band are queues before it; if they grow from cycle to cycle, "
-        "more arrive than get through. Lines that pass several bands without red have a green "
+        "demand exceeds capacity. Lines that pass several bands without red have a green "
         "wave. Lines begin and end where vehicles turn in and off."
     )
     if isinstance(traces, str):
         return report_section(heading, element("p", traces), explained=explained, ident="corridor")
     first, last = traces.segments[0], traces.segments[-1]
     junctions = _counted(len(traces.junctions), "junction")
-    told = (
+    extent = (
         f"From {first} to {last}, {number(traces.length, 0)} m through {junctions}, "
         f"{stretch(traces.begin, traces.end)}: {_counted(traces.vehicles, 'vehicle')}."
     )
     through = ", ".join(name for name, _, _ in traces.junctions)
-    note = element("p", told, element("small", f" Junctions: {through}.") if through else None)
+    note = element("p", extent, element("small", f" Junctions: {through}.") if through else None)
     return report_section(heading, note, _diagram(traces), explained=explained, ident="corridor")
 
 
@@ -90,7 +90,7 @@ def _counted(count: int, what: str) -> str:
 def _diagram(traces: CorridorTraces) -> Markup:
     frame = ChartFrame(
         clock_axis(traces.begin, traces.end),
-        value_axis(traces.length, "metres along the way", tight=True),
+        value_axis(traces.length, "distance along the corridor, m", tight=True),
         height=460.0,
     )
     left, right = (float(frame.x(value)) for value in (traces.begin, traces.end))
@@ -109,18 +109,18 @@ def _diagram(traces: CorridorTraces) -> Markup:
         element("path", d=data, transform="scale(0.1)", class_=f"trace {style}")
         for style, data in zip(("moving", "standing"), _lines(frame, traces), strict=True)
     ]
-    words = [("c-moving", "a vehicle that drives"), ("c-standing", "one that stands or crawls"),
+    words = [("c-moving", "moving vehicle"), ("c-standing", "queued vehicle"),
              ("c-band", "junction")]  # fmt: skip
     return chart(
         frame,
         [*bands, *driven, *names],
-        description="Places of vehicles along the corridor over time; red where they stand",
+        description="Places of vehicles along the corridor over time; red where they are queued",
         keys=legend(words),
     )
 
 
 def _lines(frame: ChartFrame, traces: CorridorTraces) -> tuple[str, str]:
-    """Path data of everything driven and of everything stood, in tenths of the drawing's units."""
+    """Path data of everything driven and of everything queued, in tenths of the drawing's units."""
     import shapely
 
     count = len(traces.time)

@@ -24,13 +24,13 @@ SUBSTANCES = {
     "nox": ("nitrogen oxides (NOx)", "c-motorcycle"),
     "co": ("carbon monoxide (CO)", "c-van"),
     "hc": ("hydrocarbons (HC)", "c-bicycle"),
-    "pmx": ("fine dust (PMx)", "c-other"),
+    "pmx": ("particulate matter (PMx)", "c-other"),
 }
 """Words and colour by column, in the order of the legends."""
 
 _CHARTS = (
-    ("kg an hour", 1000.0, ("co2", "fuel"), "Carbon dioxide and fuel over time"),
-    ("g an hour", 1.0, ("nox", "hc", "pmx"), "Pollutants over time"),
+    ("kg/h", 1000.0, ("co2", "fuel"), "Carbon dioxide and fuel over time"),
+    ("g/h", 1.0, ("nox", "hc", "pmx"), "Pollutants over time"),
 )
 
 
@@ -49,12 +49,12 @@ def emission_section(figures: TrafficFigures) -> Markup | None:
     ]
     if network.height > 1:
         parts += _charts(network)
-    parts += [element("h3", "Where most of it arises"), _places(figures, total["co2"])]
+    parts += [element("h3", "Places with the highest emissions"), _places(figures, total["co2"])]
     explained = (
-        "what comes out of the exhausts, and what is burnt, by the handbook of emission factors "
-        "(HBEFA) for average vehicles of each category; brakes and tyres are not in it. A share is "
-        "that of the whole network. Much per vehicle at a place means that they stop and start "
-        "there."
+        "exhaust emissions and fuel consumption, by the handbook of emission factors (HBEFA) for "
+        "average vehicles of each category; brakes and tyres are not included. A share is that "
+        "of the whole network. High emissions per vehicle at a place mean that vehicles stop "
+        "and start there."
     )
     return report_section("Emissions and fuel", *parts, explained=explained, ident="emissions")
 
@@ -102,11 +102,11 @@ def _places(figures: TrafficFigures, total: float) -> Markup:
         "CO2 per vehicle, g",
         "Fuel, kg",
         "NOx, g",
-        "Fine dust, g",
+        "PMx, g",
         "Vehicles",
     )
     rows = [_row(row, total) for row in most.iter_rows(named=True)]
-    return html_table(heads, rows, label="Places with most emissions", class_="places")
+    return html_table(heads, rows, label="Places with the highest emissions", class_="places")
 
 
 def _row(row: dict[str, Any], total: float) -> Markup:

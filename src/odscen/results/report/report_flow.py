@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TIMES = 6
 """Parts of the run that have a colour of their own."""
 
-FLOW, DENSITY, SPEED = "vehicles an hour, per lane", "vehicles per km of lane", "speed, km/h"
+FLOW, DENSITY, SPEED = "flow, veh/h per lane", "density, veh/km per lane", "speed, km/h"
 
 
 def column(table: pl.DataFrame, name: str) -> FloatArray:
@@ -52,7 +52,7 @@ def network_chart(
 
 
 def flow_section(network: pl.DataFrame) -> Markup | None:
-    """Three charts over time; ``None`` for a run too short to have a course."""
+    """Three charts over time; ``None`` for a run with one interval only."""
     network = network.sort("begin")
     if network.height < 2:
         return None
@@ -72,7 +72,7 @@ def flow_section(network: pl.DataFrame) -> Markup | None:
     explained = (
         "flow is how many vehicles pass a place on a lane in an hour, density how many are on a "
         f"kilometre of it, both as means over all lanes of the map and {width} min; flow is "
-        "density times speed. When density climbs while speed falls, the roads fill up."
+        "density times speed. When density climbs while speed falls, the network becomes congested."
     )
     return report_section("Flow, density and speed", *charts, explained=explained, ident="flow")
 
@@ -91,19 +91,19 @@ def diagram_section(network: pl.DataFrame) -> Markup | None:
     top = busy.sort("flow", descending=True).row(0, named=True)
     most = element(
         "p",
-        f"Most flowed from {stretch(top['begin'], top['end'])}: {number(top['flow'], 0)} "
-        f"vehicles an hour per lane, at {number(top['density'], 1)} per km and "
+        f"The flow was highest from {stretch(top['begin'], top['end'])}: {number(top['flow'], 0)} "
+        f"veh/h per lane, at {number(top['density'], 1)} veh/km and "
         f"{number(top['speed'] * 3.6, 0)} km/h on average.",
     )
     explained = (
         "each dot is one interval, and the line joins them in order of time. As long as dots climb "
-        "to the right in a straight line, all traffic flows. Where they bend or fall, more "
-        "vehicles no longer get more traffic through: the network is full. If the line comes back "
-        "below the way it went up, it draws a loop: jams dissolve more slowly than they built up, "
-        "and fewer get through with the same number on the road."
+        "to the right in a straight line, traffic flows freely. Where they bend or fall, the "
+        "network has reached its capacity: a higher density no longer brings a higher flow. If the "
+        "line returns below itself, it draws a loop (hysteresis): congestion dissolves more slowly "
+        "than it built up, with a lower flow at the same density."
     )
     return report_section(
-        "How much the network carries", drawn, most, explained=explained, ident="diagram"
+        "Macroscopic fundamental diagram", drawn, most, explained=explained, ident="diagram"
     )
 
 
@@ -125,6 +125,6 @@ def _by_time(busy: pl.DataFrame) -> list[Dots]:
 
 def _title(row: Mapping[str, float]) -> str:
     return (
-        f"{stretch(row['begin'], row['end'])}: {number(row['flow'], 0)} vehicles an hour, "
-        f"{number(row['density'], 1)} per km"
+        f"{stretch(row['begin'], row['end'])}: {number(row['flow'], 0)} veh/h, "
+        f"{number(row['density'], 1)} veh/km"
     )

@@ -1,4 +1,4 @@
-"""The map of a run: ways by category, mean speed by place, spawns, goals and incidents."""
+"""The map of a run: trajectories by category, mean speed by place, spawns, goals and incidents."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from odscen.drawing.map_sheet import length_text, round_length
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.records.run_records import EventKind
 from odscen.results.records.traces import speed_by_place, thinned_paths
-from odscen.results.report.report_trouble import incident_rings
+from odscen.results.report.report_incidents import incident_rings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +46,7 @@ _INCIDENTS = (EventKind.TELEPORT_START, EventKind.COLLISION)
 
 _DRAW_LIMIT = 4000
 _POINT_LIMIT = 150_000
-"""Ways drawn at most, and their points; of more, every n-th is drawn and the page says so."""
+"""Trajectories drawn at most, and their points; of more, every n-th is drawn, as the page says."""
 
 
 def run_map(
@@ -69,7 +69,7 @@ def run_map(
     actors, events
         What became of them and what happened.
     drawing
-        The map to draw below the ways, if there is one.
+        The map to draw below the trajectories, if there is one.
     incidents
         In the order of the report's table.
     """
@@ -79,12 +79,12 @@ def run_map(
     if bounds is None:
         return None
     extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    # Marks shrink where there are many, so that they do not hide the ways.
+    # Marks shrink where there are many, so that they do not hide the trajectories.
     dot = min(max(extent / 260.0, 0.5), 4.0) * min(1.0, (300.0 / max(len(paths.ids), 1)) ** 0.4)
     layers = []
     if drawing is not None:
         options = LayerOptions(symbol_size=dot * 2.2, prefix="map-")
-        # A wide window shows land beside the drawing's box: the roads there go on.
+        # A wide window shows land beside the drawing's box: the roads continue there.
         beside = 0.35 * (bounds[2] - bounds[0])
         wider = (bounds[0] - beside, bounds[1], bounds[2] + beside, bounds[3])
         layers.append(element("g", map_layers(drawing.clipped(wider), options), class_="map"))
@@ -95,7 +95,7 @@ def run_map(
     layers += [rings] if (rings := incident_rings(incidents, extent / 400.0)) else []
     svg = element(
         "svg",
-        element("title", "Map of the run: the ways of all actors"),
+        element("title", "Map of the run: the trajectories of all actors"),
         *layers,
         scale_bar(bounds),
         viewBox=view_box(bounds),
@@ -104,8 +104,8 @@ def run_map(
     )
     note = None
     if (nth := _one_in(paths)) > 1:
-        words = f"There are {len(paths.ids):,} ways; one in {nth} is drawn."
-        note = element("p", words, class_="for-ways")
+        words = f"There are {len(paths.ids):,} trajectories; one in {nth} is drawn."
+        note = element("p", words, class_="for-trajectories")
     return element(
         "div", *_controls(), svg, *_legends(paths), note, class_="map-figure", id="map-figure"
     )
@@ -114,8 +114,12 @@ def run_map(
 def _controls() -> list[Markup]:
     """Radio buttons before the drawing: the style sheet shows what is checked, without a script."""
     parts = []
-    for key, label in (("ways", "Ways by category"), ("speeds", "Mean speed of vehicles by place")):
-        checked = "checked" if key == "ways" else None
+    views = {
+        "trajectories": "Trajectories by category",
+        "speeds": "Mean speed of vehicles by place",
+    }
+    for key, label in views.items():
+        checked = "checked" if key == "trajectories" else None
         name = f"show-{key}"
         parts.append(
             element("input", type="radio", name="map-view", id=name, class_=name, checked=checked)
@@ -126,10 +130,10 @@ def _controls() -> list[Markup]:
 
 def _legends(paths: Paths) -> list[Markup]:
     present = [key for key in CATEGORIES if key in set(paths.categories)]
-    ways = [swatch(f"c-{key}", CATEGORIES[key]) for key in present]
+    lines = [swatch(f"c-{key}", CATEGORIES[key]) for key in present]
     signs = [
-        swatch("spawn", "start"),
-        swatch("goal", "end of the way"),
+        swatch("spawn", "departure"),
+        swatch("goal", "arrival"),
         swatch("incident", "teleport or collision"),
     ]
     steps = ["0", *(number(step, 0) for step in SPEED_STEPS_KMH)]
@@ -137,7 +141,7 @@ def _legends(paths: Paths) -> list[Markup]:
     names.append(f"over {steps[-1]} km/h")
     speeds = [swatch(f"v{i}", name) for i, name in enumerate(names)]
     return [
-        element("div", *ways, *signs, class_="legend for-ways"),
+        element("div", *lines, *signs, class_="legend for-trajectories"),
         element("div", *speeds, class_="legend for-speeds"),
     ]
 
@@ -180,7 +184,7 @@ def _speed_layer(cells: SpeedCells) -> Markup:
 
 
 def _one_in(paths: Paths) -> int:
-    """Of so many ways one is drawn."""
+    """Of so many trajectories one is drawn."""
     return max(-(-len(paths.ids) // _DRAW_LIMIT), -(-len(paths.xy) // _POINT_LIMIT), 1)
 
 
@@ -196,11 +200,11 @@ def _path_layer(paths: Paths, actors: Sequence[ActorOutcome], dot: float) -> Mar
         groups.setdefault(paths.categories[k], []).append(element("path", title, d=data))
     width = round(dot * 4.0)
     drawn = [
-        element("g", *groups[key], class_=f"way c-{key}", stroke_width=width)
+        element("g", *groups[key], class_=f"trajectory c-{key}", stroke_width=width)
         for key in CATEGORIES
         if key in groups
     ]
-    return element("g", *drawn, class_="for-ways", transform="scale(10)")
+    return element("g", *drawn, class_="for-trajectories", transform="scale(10)")
 
 
 def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: float) -> Markup:
@@ -224,7 +228,7 @@ def _mark_layer(paths: Paths, spawns: FloatArray, events: Sequence[Event], dot: 
         for x, y in np.rint(incidents * (100.0, -100.0)).astype(np.int64).tolist()
     )
     shown = element("path", d=crosses, class_="incident", stroke_width=round(dot * 60))
-    return element("g", element("g", *parts, class_="for-ways"), shown if crosses else None)
+    return element("g", element("g", *parts, class_="for-trajectories"), shown if crosses else None)
 
 
 def _dots(places: FloatArray) -> str:

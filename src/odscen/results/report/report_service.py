@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from odscen.results.report.place_shapes import PlaceShapes
 
 LEVELS = {
-    "A": "A: free",
-    "B": "B: good",
-    "C": "C: fair",
-    "D": "D: slow",
-    "E": "E: bad",
-    "F": "F: very bad",
+    "A": "A: free flow",
+    "B": "B: reasonably free",
+    "C": "C: stable",
+    "D": "D: nearly unstable",
+    "E": "E: at capacity",
+    "F": "F: congested",
 }
 """Levels of service with the words of the legends."""
 
@@ -37,7 +37,7 @@ FEW = 20
 
 
 def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Markup | None:
-    """Map and tables; ``None`` if nobody drove."""
+    """Map and tables; ``None`` if no vehicle drove."""
     junctions, movements = over_run(figures.junctions), over_run(figures.movements)
     worst = _worst(junctions)
     turns = _worst(movements)
@@ -45,20 +45,20 @@ def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Mark
     if shapes is not None and (drawn := _service_map(figures, shapes, worst)) is not None:
         parts.append(drawn)
     for title, place, shown, table in (
-        ("Junctions with the longest delay", "junction", worst, figures.junctions),
-        ("Turns with the longest delay", "movement", turns, figures.movements),
+        ("Junctions with the highest delay", "junction", worst, figures.junctions),
+        ("Turning movements with the highest delay", "movement", turns, figures.movements),
     ):
         if shown:
             parts += [element("h3", title), _place_table(place, shown, table)]
     if not parts:
         return None
     explained = (
-        "the level is a grade, from A (hardly anybody is held up) to F (more traffic than the "
-        "place can carry, or hardly any getting on). A junction has it from the time that a "
-        "vehicle loses there on average, a road from how much slower than free it is driven. The "
-        "strip shows the level over the whole run, from left to right. A queue is the number of "
-        "vehicles that stand. Places are named as in the editor; those with fewer than "
-        f"{FEW} vehicles are not listed."
+        "levels from A (free flow) to F (demand exceeds capacity), with the limits of the Highway "
+        "Capacity Manual, 7th edition: junctions and turning movements by control delay per "
+        "vehicle (here with time lost behind slower vehicles), roads by travel speed as a share "
+        "of free-flow speed. The strip shows the level "
+        "over the whole run, from left to right. A queue is the number of stopped vehicles. "
+        f"Places are named as in the editor; those with fewer than {FEW} vehicles are not listed."
     )
     return report_section("Level of service", *parts, explained=explained, ident="service")
 
@@ -75,10 +75,10 @@ def _worst(rows: pl.DataFrame) -> list[dict[str, Any]]:
 def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -> Markup:
     import polars as pl
 
-    heads = ["Junction" if place == "junction" else "Turn: from, through, to"]
+    heads = ["Junction" if place == "junction" else "Turning movement: from, through, to"]
     if place == "junction":
         heads.append("Control")
-    heads += ["Level", "Delay, s", "Mean queue", "Longest queue", "Vehicles"]
+    heads += ["Level", "Control delay, s", "Mean queue", "Longest queue", "Vehicles"]
     heads += ["Over time", "Worst from"]
     if place == "movement":
         heads.remove("Longest queue")
@@ -87,7 +87,7 @@ def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -
         times = table.filter(pl.col(place) == row[place]).sort("begin")
         cells = [element("th", str(row[place]).replace(">", " > "), scope="row")]
         if place == "junction":
-            control = "traffic lights" if row["control"] == "signal" else "right of way"
+            control = "signal" if row["control"] == "signal" else "priority"
             cells.append(element("td", control))
         cells += [element("td", level_badge(row["level"])), _cell(row["delay"], 1)]
         cells.append(_cell(row["standing"], 1))
@@ -96,7 +96,7 @@ def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -
         cells.append(element("td", f"{row['vehicles']:,}", class_="n"))
         cells += [element("td", level_strip(times)), element("td", _worst_time(times))]
         rows.append(element("tr", *cells))
-    label = "Worst junctions" if place == "junction" else "Worst turns"
+    label = "Worst junctions" if place == "junction" else "Worst turning movements"
     return html_table(heads, rows, label=label, class_="places")
 
 
@@ -238,9 +238,9 @@ def _layer(
         row = busy.get(name)
         if row is None:
             continue
-        lost = "nobody gets into it"
+        lost = "no vehicle enters it"
         if row["delay"] is not None:
-            lost = f"{number(row['delay'], 0)} s lost by each vehicle"
+            lost = f"{number(row['delay'], 0)} s control delay per vehicle"
         words = f"{name}: level {row['level']}, {lost}"
         cx, cy = round(x * 100), round(-y * 100)
         disc = element("circle", cx=cx, cy=cy, r=radius, class_=_style(row["level"]))

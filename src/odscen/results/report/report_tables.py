@@ -1,4 +1,4 @@
-"""Tables of the report: expectations, events in plain words, actors."""
+"""Tables of the report: expectations, events, actors."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ PRINTED_ACTORS = 100
 
 EVENT_LIMIT = 300
 
-_STUCK = "Usually a blocked lane, or a turn that other traffic never left room for."
+_GRIDLOCKED = "Usually a blocked lane, or a turn that other traffic never left room for."
 
 EVENT_WORDS = {
-    EventKind.TELEPORT_START: ("was gridlocked and teleported", _STUCK),
+    EventKind.TELEPORT_START: ("was gridlocked and teleported", _GRIDLOCKED),
     EventKind.TELEPORT_END: ("was put back on the road after its teleport", ""),
     EventKind.COLLISION: (
         "collided",
@@ -35,16 +35,16 @@ EVENT_WORDS = {
     ),
     EventKind.EMERGENCY_STOP: (
         "stopped harder than its brakes can",
-        "Usually the way ahead was closed to it at short notice.",
+        "Usually the lane ahead was closed to it at short notice.",
     ),
     EventKind.LOST: (
         "did not come back when the simulation was reloaded",
         "A limit of the simulator; its trip is not counted as finished.",
     ),
 }
-"""What happened and why that may be, for the events worth telling."""
+"""What happened and why that may be, for the events that are reported."""
 
-_NEVER = ("was not inserted", "Its start was never free, or the run ended before its turn.")
+_NOT_INSERTED = ("was not inserted", "Its start was never free, or the run ended before its turn.")
 
 
 def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | None:
@@ -73,28 +73,28 @@ def event_list(
     events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
 ) -> Markup:
     """Everything unusual, in order of time, in words; ``problems`` are known before the start."""
-    told = [(event.time, _event(event)) for event in events if event.kind in EVENT_WORDS]
-    told += [
-        (actor.depart, _item(actor.depart, actor.id, *_NEVER))
+    listed = [(event.time, _event(event)) for event in events if event.kind in EVENT_WORDS]
+    listed += [
+        (actor.depart, _item(actor.depart, actor.id, *_NOT_INSERTED))
         for actor in actors
         if actor.inserted is None
     ]
-    told.sort(key=lambda pair: pair[0])
+    listed.sort(key=lambda pair: pair[0])
     before = [element("li", element("time", "before"), text) for text in problems]
     explained = (
-        "teleports, collisions and actors that could not start are listed here, because each is a "
-        "place where the scenario, the map or the traffic is worth a second look."
+        "teleports, collisions and actors that were not inserted are listed here, because each is "
+        "a place where the scenario, the map or the traffic is worth a second look."
     )
-    if not told and not before:
+    if not listed and not before:
         nothing = element("p", "Nothing unusual happened.", class_="good")
         return report_section("Events", nothing, explained=explained, ident="events")
-    items = [*before[:EVENT_LIMIT], *(item for _, item in told[:EVENT_LIMIT])]
-    listed = element("ol", *items, class_="events")
+    items = [*before[:EVENT_LIMIT], *(item for _, item in listed[:EVENT_LIMIT])]
+    shown = element("ol", *items, class_="events")
     more = None
-    if len(told) > EVENT_LIMIT:
-        text = f"{len(told) - EVENT_LIMIT:,} more are in events.json and actors.json."
+    if len(listed) > EVENT_LIMIT:
+        text = f"{len(listed) - EVENT_LIMIT:,} more are in events.json and actors.json."
         more = element("p", text)
-    return report_section("Events", listed, more, explained=explained, ident="events")
+    return report_section("Events", shown, more, explained=explained, ident="events")
 
 
 def _event(event: Event) -> Markup:
@@ -122,12 +122,12 @@ _COLUMNS = (
     "Actor",
     "Category",
     "Model",
-    "Start, s",
-    "Entered, s",
+    "Planned departure, s",
+    "Inserted, s",
     "Arrived, s",
     "Travel time, s",
     "Delay, s",
-    "Way, m",
+    "Distance, m",
     "Mean speed, km/h",
     "Teleports",
     "Collisions",

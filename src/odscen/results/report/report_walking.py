@@ -29,7 +29,7 @@ def walking_section(
     *,
     end: float,
 ) -> Markup | None:
-    """Figures and speed over time; ``None`` if nobody walked.
+    """Figures and speed over time; ``None`` without pedestrians.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def walking_section(
             )
             parts.append(chart)
     explained = (
-        "those who walk freely make some 1.4 m/s. The lower edge of the band at zero means that at "
-        "any time at least one in ten stands, mostly before a red light or a busy road; much "
-        "waiting asks for a crossing, or for more green for those who walk."
+        "the free walking speed is some 1.4 m/s. The lower edge of the band at zero means that at "
+        "any time at least one in ten is stopped, mostly before a red light or a busy road; long "
+        "waits ask for a crossing, or for more green for pedestrians."
     )
     return report_section("Pedestrians", *parts, explained=explained, ident="walking")

@@ -22,6 +22,7 @@ from odscen.results.report.report_corridor import corridor_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
+from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_service import service_section
 from odscen.results.report.report_tables import (
@@ -29,7 +30,6 @@ from odscen.results.report.report_tables import (
     event_list,
     expectation_table,
 )
-from odscen.results.report.report_trouble import incident_section
 from odscen.results.report.report_walking import walking_section
 from odscen.results.report.report_words import duration
 
@@ -78,7 +78,7 @@ def render_report(
     trajectories
         As read from ``trajectories.parquet``, in SUMO's frame.
     drawing
-        Of the map, if it is to be shown below the ways.
+        Of the map, if it is to be shown below the trajectories.
     every
         Of so many records the trajectories have one only; the page says so.
     figures
@@ -86,9 +86,9 @@ def render_report(
     shapes
         Of the map's places, if it is to be coloured by level of service.
     corridor
-        Vehicles along a corridor, or words why there is no diagram of them.
+        Vehicles along a corridor, or why there is no diagram of them.
     conflicts
-        Who came close to whom, if that was measured.
+        Traffic conflicts, if they were measured.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _in_a_sentence(counts: Values) -> str:
-    """Outcomes of the actors, in one sentence for people."""
+    """Outcomes of the actors, in one sentence."""
     if not counts["planned"]:
         return ""
     parts = [f"{counts['arrived']:,} of {counts['planned']:,} road users arrived"]
@@ -211,8 +211,8 @@ def _map_section(
     if figure is None:
         return None
     explained = (
-        "every line is the way of one actor; point at it to see whose. Switch to mean speed to see "
-        "where traffic was slow: red places stood, blue places flowed."
+        "every line is the trajectory of one actor; point at it to see whose. Switch to mean speed "
+        "to see where traffic was slow: red places were congested, blue places flowed freely."
     )
     if incidents:
         explained += (
@@ -221,10 +221,10 @@ def _map_section(
         )
     if every > 1:
         explained += (
-            f" The run is long: this page is made from one in {every} records of where everybody "
-            "was, so that ways are a little straighter and shorter than they were."
+            f" The run is long: this page is made from one in {every} recorded positions, "
+            "so that trajectories are a little straighter and shorter than they were."
         )
-    return report_section("Where they went", figure, explained=explained, ident="map")
+    return report_section("Trajectories", figure, explained=explained, ident="map")
 
 
 def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
@@ -255,8 +255,8 @@ def _speed_section(traces: pl.DataFrame, end: float) -> Markup | None:
         parts.append(line_chart(curve.time, lines, y_label="speed, km/h", description=text))
     explained = (
         f"each point of the upper chart is the mean over {duration(width)} of all vehicles on the "
-        "road then, those that stand included. A wide band means that some drive freely while "
-        "others wait. A line ends where nobody is left."
+        "road then, stopped ones included. A wide band means that some drive freely while others "
+        "are queued. A line ends where no vehicle is left."
     )
     return report_section("Speed over time", *parts, explained=explained, ident="speed")
 
@@ -267,10 +267,10 @@ def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | No
     counts = presence(actors, end=end)
     series = [
         Series("on the road", "c-running", counts.running),
-        Series("reached their goal", "c-arrived", counts.arrived),
+        Series("arrived", "c-arrived", counts.arrived),
     ]
     if counts.waiting.any():
-        series.append(Series("waiting to enter", "c-waiting", counts.waiting))
+        series.append(Series("not inserted yet", "c-waiting", counts.waiting))
     chart = line_chart(
         counts.time,
         series,
@@ -278,10 +278,10 @@ def _progress_section(actors: Sequence[ActorOutcome], end: float) -> Markup | No
         description="Actors on the road and arrived over time",
     )
     explained = (
-        "when the line of those who arrived climbs steadily, traffic flows. A growing number that "
-        "waits to enter means that there is no room at their start."
+        "when the line of arrivals climbs steadily, traffic flows. A growing number that is not "
+        "inserted yet (insertion backlog) means that there is no room where they depart."
     )
-    return report_section("Entering and arriving", chart, explained=explained, ident="progress")
+    return report_section("Insertions and arrivals", chart, explained=explained, ident="progress")
 
 
 def _foot(summary: Mapping[str, Any]) -> Markup:

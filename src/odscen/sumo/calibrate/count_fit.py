@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from odscen.scenario.demand.count_stations import GOOD, Passing, contradictions, geh, observations
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.placing.region import Region
-from odscen.sumo.realize.counted_traffic import ways_past
+from odscen.sumo.realize.counted_traffic import routes_past
 from odscen.sumo.realize.passages import planned_passages, seen_passages
-from odscen.sumo.realize.realization import everybody
+from odscen.sumo.realize.realization import all_road_users
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class CountFits:
     Attributes
     ----------
     source
-        ``planned`` (ways at free flow) or ``run``.
+        ``planned`` (routes at free flow) or ``run``.
     vehicles
         How many vehicles there are in all.
     contradictions
@@ -91,7 +91,7 @@ class CountFits:
 
 
 def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
-    """Hold the traffic that a scenario plans, with nobody in its way, against its counts.
+    """Compare the traffic that a scenario plans, without congestion, with its counts.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
         With every actor and flow whose spawn or goal is not usable.
     """
     region = Region.of(sumo_map.graph, scenario.roi)
-    users, _ = everybody(scenario, sumo_map, region, until=scenario.simulation.duration)
+    users, _ = all_road_users(scenario, sumo_map, region, until=scenario.simulation.duration)
     ground = TripEnds(region, usable_places(sumo_map))
     seen = observations(scenario.demand)
     passages = planned_passages(users, region, ground.router, seen)
@@ -123,10 +123,10 @@ def _fit(
     vehicles: int,
 ) -> CountFits:
     opposed: dict[tuple[str, str, float, float], str] = {}
-    told: list[str] = []
+    problems: list[str] = []
     for part in scenario.demand.counts:
         for one in contradictions(part, sumo_map.graph):
-            told.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
+            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
             for place in one.places:
                 opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
     passable = _Passable(scenario, sumo_map)
@@ -138,11 +138,11 @@ def _fit(
         if value > GOOD:
             why = opposed.get((name, place, begin, end), "")
             if not why and place not in passable:
-                why = "no way inside the region passes here"
+                why = "no route inside the region passes here"
             if not why:
                 why = _otherwise(modelled, counted, source)
         rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
-    return CountFits(source, tuple(rows), vehicles, tuple(told))
+    return CountFits(source, tuple(rows), vehicles, tuple(problems))
 
 
 def _otherwise(modelled: float, counted: float, source: str) -> str:
@@ -150,11 +150,11 @@ def _otherwise(modelled: float, counted: float, source: str) -> str:
         return "vehicles were late" if modelled < counted else "vehicles of another slice came late"
     if modelled > counted:
         return "other counts, or other traffic of the scenario, bring more"
-    return "other counts on the ways past this place allow no more"
+    return "other counts on the routes past this place allow no more"
 
 
 class _Passable:
-    """Places that some way inside the region passes; found out when first asked."""
+    """Places that some route inside the region passes; found out when first asked."""
 
     def __init__(self, scenario: Scenario, sumo_map: SumoMap) -> None:
         self._scenario = scenario
@@ -170,6 +170,6 @@ class _Passable:
         found: set[str] = set()
         for part in self._scenario.demand.counts:
             passing = Passing(region.graph, [row[0] for row in part.rows])
-            kinds = ways_past(ground, part, passing)
+            kinds = routes_past(ground, part, passing)
             found.update(passing.places[place] for kind in kinds for place in kind)
         return found

@@ -1,6 +1,6 @@
 """A day of traffic on a whole town, as much as its junctions carry.
 
-Trips are drawn anywhere; of those whose way leads past a junction that would be too busy in the
+Trips are drawn anywhere; of those whose route leads past a junction that would be too busy in the
 busiest hour, fewer are made, and more of the others.
 """
 
@@ -20,7 +20,7 @@ from odscen.scenario.document.scenario_document import Background, Demand
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.passages import each_passing
 from odscen.sumo.realize.program_files import scenario_lights
-from odscen.sumo.realize.realization import everybody
+from odscen.sumo.realize.realization import all_road_users
 
 if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
@@ -31,26 +31,26 @@ TOWN_MIX = {"car": 80, "van": 8, "truck": 4, "bus": 2, "motorcycle": 3, "bicycle
 """Vehicles of a town by kind, per cent: cars by far, set by hand."""
 
 SAMPLE = 12_000
-"""Trips anywhere whose ways are looked at."""
+"""Trips anywhere whose routes are looked at."""
 SATURATION = 1800.0
 """Vehicles per hour that a lane lets off while it has green, the textbook's value."""
 LOST = 0.2
-"""Share of the time in which nobody has green, or nobody makes use of a gap."""
+"""Share of the time in which no approach has green, or no vehicle uses a gap."""
 MEETING = 600.0
-"""Vehicles per hour that a junction without a light carries in all if its ways have one lane each:
-above that, ways of which none has priority lock each other up in SUMO."""
+"""Vehicles per hour that a junction without a light carries in all if its approaches have one lane
+each: above that, approaches of which none has priority gridlock in SUMO."""
 SPARE = 0.7
-"""Share of what a way into a junction carries that a day's demand uses of it at most."""
+"""Share of what an approach to a junction carries that a day's demand uses of it at most."""
 ROUNDS = 200
 """Rounds of making fewer trips past busy junctions and more elsewhere."""
 OFTEN = 5.0
-"""Times as often as on average that a trip is made at most, however free its way is."""
+"""Times as often as on average that a trip is made at most, however free its route is."""
 STEP = 0.9
 """Times the trips, if the junctions do not carry so many."""
 
 
 class Load(NamedTuple):
-    """How much a day's demand asks of the busiest way into a junction, in the busiest hour.
+    """How much a day's demand asks of the busiest approach to a junction, in the busiest hour.
 
     ``volume`` and ``capacity`` are vehicles per hour at ``place``.
     """
@@ -70,8 +70,8 @@ def town_day(
     Parameters
     ----------
     trips
-        How many are wanted; fewer are made if the junctions do not carry so many: if no way into a
-        junction may get more than :data:`SPARE` of what it carries in the busiest hour.
+        How many are wanted; fewer are made if the junctions do not carry so many: if no approach to
+        a junction may get more than :data:`SPARE` of what it carries in the busiest hour.
     day
         A built-in day profile.
 
@@ -85,23 +85,23 @@ def town_day(
         If no trips are possible on the map.
     """
     region = Region.of(sumo_map.graph, scenario.roi)
-    carried = ways_in(sumo_map)
+    carried = approach_capacities(sumo_map)
     passing = Passing(sumo_map.graph, sorted(carried))
     sample = Background.model_validate({"id": "sample", "trips": SAMPLE, "mix": TOWN_MIX})
     drawn = scenario.model_copy(update={"demand": Demand(background=(sample,))})
-    users, _ = everybody(drawn, sumo_map, region, until=DAY)
+    users, _ = all_road_users(drawn, sumo_map, region, until=DAY)
     drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
-    ways = sorted(each_passing(users, region, drivable, passing), key=lambda way: way[0].id)
-    if not ways:
+    routes = sorted(each_passing(users, region, drivable, passing), key=lambda route: route[0].id)
+    if not routes:
         msg = "no trips are possible on this map"
         raise InputError(msg)
     uses = sparse.csr_array(
         (
-            np.ones(sum(len(passed) for _, passed in ways)),
-            [place for _, passed in ways for place, _ in passed],
-            np.cumsum([0, *(len(passed) for _, passed in ways)]),
+            np.ones(sum(len(passed) for _, passed in routes)),
+            [place for _, passed in routes for place, _ in passed],
+            np.cumsum([0, *(len(passed) for _, passed in routes)]),
         ),
-        shape=(len(ways), len(passing.places)),
+        shape=(len(routes), len(passing.places)),
     )
     capacity = np.array([carried[place] for place in passing.places])
     share = peak_share(day)
@@ -120,7 +120,7 @@ def town_day(
     )
     ids, segment = sumo_map.graph.segments.ids, sumo_map.graph.lanes.segment
     numbers: Counter[tuple[str, str]] = Counter()
-    for (user, _), weight in zip(ways, weights.tolist(), strict=True):
+    for (user, _), weight in zip(routes, weights.tolist(), strict=True):
         numbers[str(ids[segment[user.spawn]]), str(ids[segment[user.goal]])] += weight / share
     rows = ((*pair, round(number, 2)) for pair, number in sorted(numbers.items()))
     return tuple(row for row in rows if row[2] > 0), load
@@ -176,11 +176,11 @@ def peak_share(day: str) -> float:
     return max(curve.amount(start + 3600.0) - curve.amount(start) for start in starts) / DAY
 
 
-def ways_in(sumo_map: SumoMap) -> dict[str, float]:
-    """Vehicles per hour that each way into a junction carries, by its place.
+def approach_capacities(sumo_map: SumoMap) -> dict[str, float]:
+    """Vehicles per hour that each approach to a junction carries, by its place.
 
     A lane lets off :data:`SATURATION` vehicles per hour of green, and the stages of a light share
-    the time that is not lost. Where three ways or more meet without a light they share
+    the time that is not lost. Where three approaches or more meet without a light they share
     :data:`MEETING`; two simply take turns.
     """
     graph = sumo_map.graph

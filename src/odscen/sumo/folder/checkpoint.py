@@ -44,7 +44,7 @@ class Checkpoint:
     last
         Whether the run ended with it.
     stopped
-        Whether somebody who watched the run ended it.
+        Whether a user who watched the run ended it.
     routes
         Where in the routes file the next slice begins, bytes.
     steps, wall_seconds
@@ -54,7 +54,7 @@ class Checkpoint:
     running
         How many vehicles and persons were on the road.
     present
-        Ids of all vehicles and persons that the state holds, as far as SUMO tells.
+        Ids of all vehicles and persons that the state holds, as far as SUMO says.
     lanes
         How many vehicles the state holds on each lane.
     recorder

@@ -1,7 +1,7 @@
 """Trajectories made alike, so that the parts of a long run read as one table; room for a part.
 
 SUMO names the columns after whatever comes first in a file, ``vehicle_x`` or ``person_x``, and
-writes a file without columns if nobody is there.
+writes a file without columns if no road user is there.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ RESERVE = 1.5
 
 
 def tidy_part(path: Path) -> None:
-    """Give trajectories the columns that all have; remove a file in which nobody is.
+    """Give trajectories the columns that all have; remove a file without any road user.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def recorded_files(run: Path, file: str) -> list[Path]:
 
 
 def trajectory_files(run: Path) -> list[Path]:
-    """Parquet files of the trajectories; empty if none were recorded, or nobody was there."""
+    """Parquet files of the trajectories; empty if none were recorded, or no road user was there."""
     return recorded_files(run, TRAJECTORIES_FILE)
 
 
@@ -95,7 +95,7 @@ def read_trips(run: Path) -> pl.DataFrame | None:
 
     Returns
     -------
-    ``None`` if nothing was recorded, or nobody was there.
+    ``None`` if nothing was recorded, or no road user was there.
     """
     return _read(run, TRIPS_FILE)
 

@@ -79,7 +79,7 @@ def locked(run: Path, *, patience: float = PATIENCE) -> Iterator[int]:
     Raises
     ------
     ConflictError
-        If somebody else holds it.
+        If another process holds it.
     """
     descriptor = os.open(run / layout.LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
     try:
@@ -96,7 +96,7 @@ def _take(descriptor: int, run: Path, patience: float) -> None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             if time.monotonic() >= end:
-                msg = f"run {run.name!r} is going on in another process"
+                msg = f"run {run.name!r} is running in another process"
                 raise ConflictError(msg) from None
             time.sleep(0.05)
         else:

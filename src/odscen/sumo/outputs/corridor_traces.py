@@ -35,7 +35,7 @@ _LANES_APART = 1e6
 """Metres put between lanes in the search, so that a node of another lane is never nearest."""
 
 _AWAY = 10.0
-"""Seconds; whoever is away for longer, or comes back further behind, passes anew."""
+"""Seconds; a vehicle that is away for longer, or comes back further behind, passes anew."""
 
 
 def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> CorridorTraces | str:
@@ -51,14 +51,14 @@ def corridor_traces(run: Path, sumo_map: SumoMap, corridor: Corridor) -> Corrido
     row_of = {places.lanes[row]: row for row in np.unique(places.lane[nodes]).tolist()}
     table = pl.scan_parquet(files)
     if "vehicle_lane" not in table.collect_schema().names():
-        return "The trajectories do not say on which lane anybody was, so there is no diagram."
-    on_way = table.filter(pl.col("vehicle_lane").is_in(list(row_of)))
-    window = _busiest(on_way)
+        return "The trajectories do not say on which lanes vehicles were, so there is no diagram."
+    on_corridor = table.filter(pl.col("vehicle_lane").is_in(list(row_of)))
+    window = _busiest(on_corridor)
     if window is None:
-        return "Nobody drove along this corridor."
+        return "No vehicle drove along this corridor."
     begin, end = window
     rows = (
-        on_way.filter(pl.col("timestep_time").is_between(begin, end))
+        on_corridor.filter(pl.col("timestep_time").is_between(begin, end))
         .select(
             pl.col("timestep_time").alias("time"),
             pl.col("vehicle_id").alias("id"),
@@ -92,12 +92,12 @@ def _kinds(sumo_map: SumoMap, corridor: Corridor) -> list[str]:
     return [kind_of[name] for name in corridor.segments]
 
 
-def _busiest(on_way: pl.LazyFrame) -> tuple[float, float] | None:
+def _busiest(on_corridor: pl.LazyFrame) -> tuple[float, float] | None:
     """Begin and end of the busiest stretch that is not too full to be drawn."""
     import polars as pl
 
     seen = (
-        on_way.select(
+        on_corridor.select(
             (pl.col("timestep_time") / _GRAIN).floor().cast(pl.Int64).alias("grain"),
             pl.col("vehicle_id").alias("id"),
         )
@@ -119,7 +119,7 @@ def _busiest(on_way: pl.LazyFrame) -> tuple[float, float] | None:
         inside = seen.filter(pl.col("grain").is_between(begin, begin + size - 1))
         if inside["id"].n_unique() <= MOST:
             break
-    last_time = float(on_way.select(pl.col("timestep_time").max()).collect().item())
+    last_time = float(on_corridor.select(pl.col("timestep_time").max()).collect().item())
     return begin * _GRAIN, min((begin + size) * _GRAIN, max(last_time, begin * _GRAIN + 1.0))
 
 

@@ -9,7 +9,7 @@ seconds                             time that vehicles spent, vehicle-seconds
 distance                            that they drove, m
 entered, left                       vehicles that came from and went to another edge
 departed, arrived                   vehicles whose trips began and ended here
-waiting                             of ``seconds``, those in which they stood (below 0.1 m/s)
+waiting                             of ``seconds``, those in which they were stopped (below 0.1 m/s)
 time_loss                           of ``seconds``, those lost by driving below the desired speed
 co2, co, hc, nox, pmx, fuel         g, if emissions were recorded
 electricity                         Wh, if emissions were recorded
@@ -17,7 +17,7 @@ electricity                         Wh, if emissions were recorded
 
 A vehicle is where its front is. SUMO itself counts a vehicle on every lane that a part of its body
 is on, so that its seconds add up to more than there were: by a sixth in a town of short lanes.
-SUMO also tells, per lane, travel time and distance of the fronts, from which
+SUMO also gives, per lane, travel time and distance of the fronts, from which
 
     seconds   = traveltime * distance / length
     time_loss = seconds - distance * (sampled - timeLoss) / (speed * sampled)
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 _MOST_TRAVEL_TIME = 99_999.0
-"""Seconds; SUMO tells 100,000 at most, and then not what it was; none where all stood."""
+"""Seconds; SUMO gives 100,000 at most, and then not what it was; none where all were stopped."""
 _COUNTS = ("entered", "left", "departed", "arrived")
 
 
@@ -58,7 +58,7 @@ def lane_table(
     lanes, emissions
         SUMO's Parquet files; ``None`` if emissions were not recorded.
     lengths
-        Of lanes for vehicles, m, by edge. SUMO's mesoscopic model measures edges: what it tells
+        Of lanes for vehicles, m, by edge. SUMO's mesoscopic model measures edges: what it gives
         of one is given to the first of these lanes.
     present
         How many vehicles were on each lane when a saved state was loaded. SUMO counts them as
@@ -66,7 +66,7 @@ def lane_table(
 
     Returns
     -------
-    Sorted by ``begin`` and ``lane``; without rows if nobody was there.
+    Sorted by ``begin`` and ``lane``; without rows if no vehicle was there.
     """
     import polars as pl
 
@@ -83,8 +83,8 @@ def lane_table(
     ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
     by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
-    # Where nearly nobody moved there is no travel time, and SUMO's density has an upper bound; all
-    # stood for the whole interval then, a whole number of vehicles.
+    # Where hardly a vehicle moved there is no travel time, and SUMO's density has an upper bound;
+    # all were stopped for the whole interval then, a whole number of vehicles.
     at_least = col("density") * col("length") / 1000.0
     still = pl.when(col("entered") + col("left") + col("departed") + col("arrived") == 0)
     standing = still.then((at_least - 1e-3).ceil()).otherwise(at_least) * _period()
@@ -122,7 +122,7 @@ def _named(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.DataFra
     import polars as pl
 
     rows = pl.read_parquet(file)
-    if "edge_id" not in rows.columns:  # nobody was there, and SUMO had no columns to write
+    if "edge_id" not in rows.columns:  # no vehicle was there, and SUMO had no columns to write
         return _nothing()
     if "lane_id" not in rows.columns:
         rows = rows.with_columns(

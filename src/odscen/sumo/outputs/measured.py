@@ -27,7 +27,8 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     Parameters
     ----------
     meso
-        Whether it was mesoscopic: nobody stands in its trajectories, so that there are no queues.
+        Whether it was mesoscopic: no vehicle is stopped in its trajectories, so that there are no
+        queues.
 
     Returns
     -------

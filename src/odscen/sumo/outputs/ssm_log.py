@@ -18,7 +18,7 @@ _KINDS = {
     **dict.fromkeys((1, 2, 3, 18), "following"),
     **dict.fromkeys((4, 5, 6, 7, 8, 19), "merging"),
 }
-"""By SUMO's number of the encounter; the others are of ways that cross."""
+"""By SUMO's number of the encounter; the others are of routes that cross."""
 
 _MEASURES = {"minTTC": "ttc", "maxDRAC": "drac", "PET": "pet"}
 

@@ -8,7 +8,7 @@ person              whether it walks
 depart, arrival     s; arrival null if it had not arrived when the run ended
 duration            of the trip, s; so far if it had not arrived
 route_length        m; so far if it had not arrived, null for a person who had not
-waiting_time        s that it stood (below 0.1 m/s)
+waiting_time        s that it was stopped (below 0.1 m/s)
 waiting_count       how many times it came to a halt; null for persons
 time_loss           s lost by driving (walking) below the speed it wished for; null for a
                     person who had not arrived
@@ -37,7 +37,7 @@ def trip_table(tripinfo: Path, *, unfinished: bool) -> pl.DataFrame:
     ----------
     unfinished
         Whether those who have not arrived are trips too: not at a boundary between slices, where
-        SUMO writes everybody who is on the road.
+        SUMO writes all who are on the road.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Traffic that reproduces counts: ways through the region, and how often each is used.
+"""Traffic that reproduces counts: routes through the region, and how often each is used.
 
-Which ways there are comes from the lane graph; how often each is driven is chosen by SUMO's
+Which routes there are comes from the lane graph; how often each is driven is chosen by SUMO's
 routeSampler, a linear program for each slice of time. It is given the places of counting as edges
-and, as routes, the places that a way passes, so that it needs no network. Turns and streams are
+and, as routes, the places that a route passes, so that it needs no network. Turns and flows are
 then counted alike.
 """
 
@@ -33,19 +33,19 @@ WAYS = 200_000
 OF_A_KIND = 8
 """Ways that are kept of those which pass the same places."""
 KINDS_OF_A_PLACE = 40
-"""Kinds of ways that are kept for each place: the most frequent, and the shortest."""
+"""Kinds of routes that are kept for each place: the most frequent, and the shortest."""
 FEWER_VEHICLES = "0.05"
-"""How much a vehicle weighs against one that is missing in a count: long ways win over short ones
+"""How much a vehicle weighs against one that is missing in a count: long routes win over short ones
 where both meet the counts."""
 USUAL_SPEED = 8.0
 """m/s at which vehicles are taken to get from their start to the places of counting."""
 
 PassedStations = tuple[int, ...]
-"""Places that a way passes, in order, by their number."""
+"""Places that a route passes, in order, by their number."""
 
 
 class StationRoute(NamedTuple):
-    """A way that passes places of counting.
+    """A route that passes count stations.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def counted_trips(
         Vehicles of the rest of the scenario by place, begin and end of the slice.
     """
     passing = Passing(ground.region.graph, [row[0] for row in counts.rows])
-    kinds = ways_past(ground, counts, passing)
+    kinds = routes_past(ground, counts, passing)
     wanted = [
         (place, begin, end, max(0.0, number - others.get((place, begin, end), 0.0)))
         for place, begin, end, number in counts.rows
@@ -86,24 +86,24 @@ def counted_trips(
     rng = stream(scenario.seed, "counts", counts.id)
     uniform = rng.random((len(chosen), 3))
     categories = drawn_categories(counts.mix, uniform[:, 0])
-    ways = [
+    routes = [
         kinds[kind][int(number * len(kinds[kind]))]
         for (kind, _), number in zip(chosen, uniform[:, 1].tolist(), strict=True)
     ]
-    times = np.array([time for _, time in chosen]) - np.array([one.lead for one in ways]) / (
+    times = np.array([time for _, time in chosen]) - np.array([one.lead for one in routes]) / (
         USUAL_SPEED
     )
     yield Trips(
         name=counts.id,
         part=counts.id,
         categories=categories,
-        starts=_starts(ground, counts, ways, uniform[:, 2]),
-        goals=np.array([one.goal for one in ways], dtype=np.int32),
+        starts=_starts(ground, counts, routes, uniform[:, 2]),
+        goals=np.array([one.goal for one in routes], dtype=np.int32),
         departs=np.maximum(np.round(times, 2), FIRST),
     )
 
 
-def ways_past(
+def routes_past(
     ground: TripEnds, counts: Counts, passing: Passing
 ) -> dict[PassedStations, list[StationRoute]]:
     """Ways through the region that pass a place of counting, by the places that they pass."""
@@ -116,14 +116,14 @@ def ways_past(
         return {}
     per_goal = max(10, WAYS // len(ends))
     for goal in ends.tolist():
-        ways = ground.router.paths_to(goal)
-        metres = ways.distance(first)
+        paths = ground.router.paths_to(goal)
+        metres = paths.distance(first)
         near = np.flatnonzero(np.isfinite(metres) & (metres > 0))
         near = near[np.argsort(metres[near], kind="stable")]
         rest = near[per_goal // 2 :]
         thin = max(1, -(-len(rest) // (per_goal - per_goal // 2)))
         sources = first[np.concatenate([near[: per_goal // 2], rest[::thin]])]
-        marks, nodes = ways.stretches(sources, segment)
+        marks, nodes = paths.stretches(sources, segment)
         for start, row, entered in zip(sources.tolist(), marks.tolist(), nodes, strict=True):
             segments = tuple(row[: row.index(-1)] if -1 in row else row)
             found = passing.of(segments)
@@ -133,13 +133,13 @@ def ways_past(
                 kept = kinds.setdefault(kind, [])
                 if len(kept) < OF_A_KIND:
                     middle = entered[found[len(found) // 2][1]]
-                    lead = ways.distance(np.array([start, middle]))
+                    lead = paths.distance(np.array([start, middle]))
                     kept.append(StationRoute(start, goal, segments, float(lead[0] - lead[1])))
     return {kind: kinds[kind] for kind in _selected(often, len(passing.places))}
 
 
 def _selected(often: Mapping[PassedStations, int], places: int) -> list[PassedStations]:
-    """Kinds of ways to choose from, sorted: for each place the most frequent and the shortest."""
+    """Kinds of routes to choose from, sorted: for each place the most frequent and the shortest."""
     of_place: list[list[PassedStations]] = [[] for _ in range(places)]
     for kind in sorted(often):
         for place in kind:
@@ -159,7 +159,7 @@ def _choose(
     *,
     seed: int,
 ) -> list[tuple[PassedStations, float]]:
-    """Let routeSampler choose ways: the kind of each vehicle's way, and when it passes, seconds."""
+    """Let routeSampler choose: the kind of each vehicle's route, and when it passes, seconds."""
     with tempfile.TemporaryDirectory(prefix="odscen-counts-") as name:
         folder = Path(name)
         (folder / "ways.rou.xml").write_text(_routes_xml(kinds), encoding="utf-8")
@@ -212,30 +212,30 @@ def _stretch_starts(ground: TripEnds, starts: Int32Array) -> Int32Array:
 
 
 def _starts(
-    ground: TripEnds, counts: Counts, ways: Sequence[StationRoute], uniform: np.ndarray
+    ground: TripEnds, counts: Counts, routes: Sequence[StationRoute], uniform: np.ndarray
 ) -> Int32Array:
-    """Draw a start for each way: on its stretch of lane, where the way through segments is same."""
+    """Draw a start for each route: on its stretch of lane, of the same route through segments."""
     lanes = ground.region.graph.lanes
     usual = max(counts.mix, key=lambda one: counts.mix[one])
     starts = ground.starts(usual)
     of_goal: dict[int, set[StationRoute]] = defaultdict(set)
-    for way in ways:
-        of_goal[way.goal].add(way)
+    for route in routes:
+        of_goal[route.goal].add(route)
     possible: dict[StationRoute, Int32Array] = {}
     for goal, mine in sorted(of_goal.items()):
         to_goal = ground.router.paths_to(goal)
-        for way in sorted(mine):
-            beside = lanes.lane[starts] == lanes.lane[way.start]
-            beside &= lanes.segment[starts] == lanes.segment[way.start]
+        for route in sorted(mine):
+            beside = lanes.lane[starts] == lanes.lane[route.start]
+            beside &= lanes.segment[starts] == lanes.segment[route.start]
             marks, _ = to_goal.stretches(starts[beside], lanes.segment)
             due = np.full(marks.shape[1], -1)
-            due[: len(way.segments)] = way.segments[: len(due)]
+            due[: len(route.segments)] = route.segments[: len(due)]
             same = np.all(marks == due, axis=1)
-            possible[way] = starts[beside][same]
+            possible[route] = starts[beside][same]
     return np.array(
         [
-            possible[way][int(number * len(possible[way]))]
-            for way, number in zip(ways, uniform.tolist(), strict=True)
+            possible[route][int(number * len(possible[route]))]
+            for route, number in zip(routes, uniform.tolist(), strict=True)
         ],
         dtype=np.int32,
     )

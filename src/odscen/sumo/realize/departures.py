@@ -119,7 +119,7 @@ def demand_users(
 ) -> tuple[list[RoadUser], list[str]]:
     """Members of the scenario's demand who depart before ``until``, and what of it is not met.
 
-    Counts come last: they are made up for what everybody else, ``placed`` and the rest of the
+    Counts come last: they are made up for what all others, ``placed`` and the rest of the
     demand, leaves of them.
     """
     taken = [place for actor in scenario.actors if (place := region.place(actor.spawn))]

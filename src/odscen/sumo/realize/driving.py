@@ -1,4 +1,4 @@
-"""How somebody drives or walks: the attributes of a vType, from category, style and weather.
+"""How a road user drives or walks: the attributes of a vType, from category, style and weather.
 
 Nothing is left to SUMO's random numbers but dawdling (``sigma``): each actor's speed factor is
 drawn here, from the scenario's seed and the actor's id, and written down.
@@ -132,7 +132,7 @@ def driver(
     weather: WeatherEffect,
     electric: bool = False,
 ) -> Driver:
-    """Attributes of somebody who drives, or walks, like this.
+    """Attributes of a road user that drives, or walks, like this.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def driver(
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
         return _walker(user, body, speed=speed)
-    kind, manner = KINDS[category], STYLES[user.design.style]
+    kind, style = KINDS[category], STYLES[user.design.style]
     max_speed = kind.max_speed
     if speed is not None:
         max_speed = speed
@@ -159,9 +159,9 @@ def driver(
             factor = max(factor, speed / limit)
     max_speed = min(max_speed * weather.speed, weather.sight_speed)
     factor *= weather.speed
-    accel = kind.accel * manner.accel * weather.grip
+    accel = kind.accel * style.accel * weather.grip
     two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
-    min_gap = manner.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0)
+    min_gap = style.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0)
     attributes = (
         ("vClass", kind.vclass),
         ("guiShape", kind.shape),
@@ -171,8 +171,8 @@ def driver(
         ("accel", number(accel)),
         ("decel", number(kind.decel * weather.grip)),
         ("emergencyDecel", number(kind.emergency_decel * weather.grip)),
-        ("tau", number(manner.headway * weather.headway)),
-        ("sigma", number(manner.sigma)),
+        ("tau", number(style.headway * weather.headway)),
+        ("sigma", number(style.sigma)),
         ("minGap", number(min_gap)),
         ("emissionClass", ELECTRIC.get(category, kind.emissions) if electric else kind.emissions),
     )

@@ -1,4 +1,4 @@
-"""Who passes places of counting, and when: planned, from ways, or seen, from a run."""
+"""Vehicles that pass count stations, and when: planned, from routes, or seen, from a run."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ UNKNOWN_LIMIT = 13.89
 def planned_passages(
     users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
 ) -> Passages:
-    """Count vehicles at the places of observations, as they would pass with nobody in their way."""
+    """Count vehicles at the places of observations, as they would pass without congestion."""
     passing = Passing(region.graph, [one.place for one in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
@@ -49,7 +49,7 @@ def each_passing(
 ) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
     """Yield vehicles with the places that they pass, by number, and when, with a free road.
 
-    The order is not that of ``users``; pedestrians and those without a way are left out.
+    The order is not that of ``users``; pedestrians and those without a route are left out.
     """
     lanes = region.graph.lanes
     vehicles = [user for user in users if not user.person]
@@ -100,8 +100,8 @@ def seen_passages(
         .collect()
     )
     between = _Between(sumo_map.graph)
-    for times, way in zip(changes["time"].to_list(), changes["segment"].to_list(), strict=True):
-        whole, moments = between.filled(way, times)
+    for times, route in zip(changes["time"].to_list(), changes["segment"].to_list(), strict=True):
+        whole, moments = between.filled(route, times)
         for place, step in passing.of(whole):
             clock.count(found, passing.places[place], moments[step])
     return found, len(changes)
@@ -133,10 +133,10 @@ class _Between:
             row[one]: {row[other] for other in others} for one, others in transitions(graph).items()
         }
 
-    def filled(self, way: Sequence[int], times: Sequence[float]) -> tuple[list[int], list[float]]:
-        """Segments and times of a way with what lies between two that do not touch, if one does."""
-        whole, moments = [way[0]], [times[0]]
-        for segment, time in zip(way[1:], times[1:], strict=True):
+    def filled(self, route: Sequence[int], times: Sequence[float]) -> tuple[list[int], list[float]]:
+        """Segments and times of a route with what lies between two that do not touch."""
+        whole, moments = [route[0]], [times[0]]
+        for segment, time in zip(route[1:], times[1:], strict=True):
             onwards = self._onwards.get(whole[-1], set())
             if segment not in onwards:
                 steps = [one for one in sorted(onwards) if segment in self._onwards.get(one, ())]

@@ -1,7 +1,7 @@
 """From a scenario to the files that SUMO runs, and the plan that the run is held against.
 
 Pure: the scenario, the map's graph and its SUMO network go in, texts come out, the same for the
-same input. Everybody's type, speed factor, route and place are written out; nothing is left to
+same input. Type, speed factor, route and place of all are written out; nothing is left to
 SUMO's random numbers but the dawdling of drivers.
 """
 
@@ -81,7 +81,7 @@ class Realization:
     """SUMO files by name, the plan, and what could not be done as designed.
 
     ``problems`` name actors that are in the plan but not in the files, because the SUMO network has
-    no way for them; ``notes`` name routes that had to be repaired, and demand that was not met.
+    no route for them; ``notes`` name routes that had to be repaired, and demand that was not met.
     """
 
     files: dict[str, str]
@@ -120,7 +120,7 @@ def realize(
     until = own.duration if settings.until is None else settings.until
     step_length = own.step_length if settings.step_length is None else settings.step_length
     region = Region.of(sumo_map.graph, scenario.roi)
-    users, unmet = everybody(scenario, sumo_map, region, until=until)
+    users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
     demand = RoutesFile((VEHICLE_PARAMETER,) if recording.criticality else ())
@@ -179,7 +179,7 @@ def slices_of(until: float, length: SliceLength, step_length: float) -> float | 
     return max(1, round(length / step_length)) * step_length
 
 
-def everybody(
+def all_road_users(
     scenario: Scenario, sumo_map: SumoMap, region: Region, *, until: float
 ) -> tuple[tuple[RoadUser, ...], list[str]]:
     """Road users of a scenario by departure, then id, and what of its demand is not met.
@@ -198,7 +198,7 @@ def everybody(
 
 
 class _PlannedRoute(NamedTuple):
-    """How somebody gets to the goal; metres and seconds. Without a route, the problem says why."""
+    """Route of a road user to its goal; metres and seconds. Without one, the problem says why."""
 
     route: Route | Walk | None
     problem: str | None
@@ -234,22 +234,26 @@ class _Writer:
     def add(self, users: Sequence[RoadUser]) -> tuple[PlannedActor, ...]:
         """Write road users in their order and return the plan for them.
 
-        Ways are found in another order, those from one spawn or to one goal together.
+        Routes are found in another order, those from one spawn or to one goal together.
         """
         bodies = [self._body(user) for user in users]
-        manners = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
-        ways: dict[int, _PlannedRoute] = {}
+        drivers = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
+        routes: dict[int, _PlannedRoute] = {}
         for index, path in each_path(users, self._region, self._drivable, bodies):
-            ways[index] = self._way(users[index], bodies[index], manners[index], path)
+            routes[index] = self._plan_route(users[index], bodies[index], drivers[index], path)
         return tuple(
-            self._write(user, body, manner, ways[index])
-            for index, (user, body, manner) in enumerate(zip(users, bodies, manners, strict=True))
+            self._write(user, body, behaviour, routes[index])
+            for index, (user, body, behaviour) in enumerate(
+                zip(users, bodies, drivers, strict=True)
+            )
         )
 
-    def _way(self, user: RoadUser, body: Body, manner: Driver, path: Int32Array) -> _PlannedRoute:
+    def _plan_route(
+        self, user: RoadUser, body: Body, behaviour: Driver, path: Int32Array
+    ) -> _PlannedRoute:
         steps = self._steps(user, path)
         length = float(np.sum(steps))
-        duration = self._free_flow_time(user, manner, path, steps)
+        duration = self._free_flow_time(user, behaviour, path, steps)
         try:
             return _PlannedRoute(self._route(user, body, path), None, length, duration)
         except NoRouteError as error:
@@ -261,21 +265,21 @@ class _Writer:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
         route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
-        # A trip ends in a segment, not on a lane of it: nobody has to stop for a lane change.
+        # A trip ends in a segment, not on a lane of it: no vehicle has to stop for a lane change.
         return replace(route, arrival_lane=None) if user.trip else route
 
     def _write(
-        self, user: RoadUser, body: Body, manner: Driver, way: _PlannedRoute
+        self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute
     ) -> PlannedActor:
-        if way.route is None:
-            self.problems.append(f"{user.id}: {way.problem}")
+        if planned.route is None:
+            self.problems.append(f"{user.id}: {planned.problem}")
         else:
-            if isinstance(way.route, Walk):
-                self.demand.add_walk(user, manner, way.route)
+            if isinstance(planned.route, Walk):
+                self.demand.add_walk(user, behaviour, planned.route)
             else:
-                self.demand.add_vehicle(user, manner, way.route)
-            self.notes += [f"{user.id}: {repair.words}" for repair in way.route.repairs]
-        return self._planned(user, body, manner, way)
+                self.demand.add_vehicle(user, behaviour, planned.route)
+            self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
+        return self._planned(user, body, behaviour, planned)
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
@@ -297,7 +301,7 @@ class _Writer:
         return DEFAULT_BODY[user.category] if known is None else known
 
     def _planned(
-        self, user: RoadUser, body: Body, manner: Driver, way: _PlannedRoute
+        self, user: RoadUser, body: Body, behaviour: Driver, planned: _PlannedRoute
     ) -> PlannedActor:
         graph = self._graph.walks if user.person else self._graph.lanes
         name = walk_node_id if user.person else node_id
@@ -316,13 +320,13 @@ class _Writer:
             z=float(graph.z[spawn]),
             hdg=hdg,
             speed=user.speed,
-            speed_factor=manner.speed_factor,
-            route_length=way.length,
-            free_flow_time=way.free_flow_time,
+            speed_factor=behaviour.speed_factor,
+            route_length=planned.length,
+            free_flow_time=planned.free_flow_time,
             model=user.design.model,
             flow=user.flow,
             ego=user.design.ego,
-            problem=way.problem,
+            problem=planned.problem,
         )
 
     def _steps(self, user: RoadUser, path: Int32Array) -> np.ndarray:
@@ -331,7 +335,7 @@ class _Writer:
         return np.hypot(np.diff(graph.x[path]), np.diff(graph.y[path]))
 
     def _free_flow_time(
-        self, user: RoadUser, manner: Driver, path: Int32Array, steps: np.ndarray
+        self, user: RoadUser, behaviour: Driver, path: Int32Array, steps: np.ndarray
     ) -> float | None:
         """Seconds along the path at the speed the actor wants, from standing.
 
@@ -340,11 +344,11 @@ class _Writer:
         if len(path) < 2:
             return None
         if user.person:
-            return float(np.sum(steps)) / manner.max_speed
+            return float(np.sum(steps)) / behaviour.max_speed
         limit = self._graph.lanes.speed_limit[path[:-1]]
         limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
-        speed = np.minimum(limit * manner.speed_factor, manner.max_speed)
-        return float(np.sum(steps / speed) + speed[0] / (2.0 * manner.accel))
+        speed = np.minimum(limit * behaviour.speed_factor, behaviour.max_speed)
+        return float(np.sum(steps / speed) + speed[0] / (2.0 * behaviour.accel))
 
 
 def _effect(environment: Environment, assets: ModelSizes | None) -> WeatherEffect:

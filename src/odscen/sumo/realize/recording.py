@@ -35,7 +35,7 @@ class Recording:
     columns
         Of :data:`OPTIONAL`, beside :data:`NEEDED`.
     emissions
-        Whether lanes tell what was emitted on them; without trajectories too.
+        Whether lanes report what was emitted on them; without trajectories too.
     criticality
         Whether vehicles watch how close they come to each other, and to people on foot if there
         are trajectories of every step.

@@ -31,7 +31,7 @@ class RoadNetLane:
     allowed: frozenset[str] | None = None
 
     def allows(self, vclass: str) -> bool:
-        """Whether somebody of this vehicle class may use the lane."""
+        """Whether a road user of this vehicle class may use the lane."""
         return self.allowed is None or vclass in self.allowed
 
 
@@ -68,7 +68,7 @@ class RoadNet:
     walk_links: frozenset[tuple[str, str]] = frozenset()
     lefthand: bool = False
     ends: dict[str, tuple[str, str]] = field(default_factory=dict)
-    _ways: dict[tuple[str, str, str], tuple[str, ...] | None] = field(default_factory=dict)
+    _paths: dict[tuple[str, str, str], tuple[str, ...] | None] = field(default_factory=dict)
 
     @cached_property
     def edge_lanes(self) -> dict[str, tuple[RoadNetLane, ...]]:
@@ -144,7 +144,7 @@ class RoadNet:
         """Length of an edge's lanes, metres."""
         return self.edge_lanes[edge][0].length
 
-    def way_length(self, edges: Iterable[str]) -> float:
+    def path_length(self, edges: Iterable[str]) -> float:
         """Sum of the lengths of edges, metres."""
         return sum(self.edge_length(edge) for edge in edges)
 
@@ -154,17 +154,17 @@ class RoadNet:
             return self.walk_neighbours(edge)
         return self.followers(edge, vclass)
 
-    def way(self, source: str, target: str, vclass: str) -> tuple[str, ...] | None:
-        """Edges of the shortest way from ``source`` to ``target``, both included, if there is one.
+    def path(self, source: str, target: str, vclass: str) -> tuple[str, ...] | None:
+        """Edges of the shortest path from ``source`` to ``target``, both included, if there is one.
 
         Dijkstra's algorithm over the lengths of edges; ties go to the smaller id.
         """
         key = source, target, vclass
-        if key not in self._ways:
-            self._ways[key] = self._find_way(source, target, vclass)
-        return self._ways[key]
+        if key not in self._paths:
+            self._paths[key] = self._find_path(source, target, vclass)
+        return self._paths[key]
 
-    def _find_way(self, source: str, target: str, vclass: str) -> tuple[str, ...] | None:
+    def _find_path(self, source: str, target: str, vclass: str) -> tuple[str, ...] | None:
         queue: list[tuple[float, str, str]] = [(0.0, source, "")]
         before: dict[str, str] = {}
         while queue:
@@ -180,13 +180,13 @@ class RoadNet:
                     heapq.heappush(queue, (step, follower, edge))
         if target not in before:
             return None
-        way = [target]
-        while way[-1] != source:
-            way.append(before[way[-1]])
-        return tuple(reversed(way))
+        path = [target]
+        while path[-1] != source:
+            path.append(before[path[-1]])
+        return tuple(reversed(path))
 
     def passage(self, lane: str, next_edge: str) -> tuple[RoadNetLane, ...] | None:
-        """Return the lanes after ``lane`` on the way to ``next_edge``, that edge's lane last.
+        """Return the lanes after ``lane`` on the path to ``next_edge``, that edge's lane last.
 
         Internal lanes come first, in order; ``None`` if ``lane`` has no link to that edge.
         """

@@ -1,11 +1,11 @@
-"""The ways of many road users on the graphs, those with a common end found together.
+"""The routes of many road users on the graphs, those with a common end found together.
 
 A search over the whole graph costs milliseconds; tens of thousands of trips have a few hundred
 goals between them.
 
 A vehicle does not change lanes before its front is where the lane change begins, and it needs room
-for it: its way leads straight on for so long, even if the shortest one changes lanes at once. SUMO
-would have it stand before the junction on the wrong lane.
+for it: its route leads straight on for so long, even if the shortest one changes lanes at once.
+SUMO would have it stand before the junction on the wrong lane.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ def each_path(
     drivable: Router,
     bodies: Sequence[Body] | None = None,
 ) -> Iterator[tuple[int, Int32Array]]:
-    """Yield the position of each user and the nodes of its way inside the region.
+    """Yield the position of each user and the nodes of its route inside the region.
 
     It is the shortest one, of vehicles among those that do not change lanes at their very start, if
-    there is one. Ways of vehicles lead over lanes that SUMO has, if there is such a way. The order
-    is that of spawns (actors and flows) and of goals (trips of the demand).
+    there is one. Routes of vehicles lead over lanes that SUMO has, if there is such a route. The
+    order is that of spawns (actors and flows) and of goals (trips of the demand).
 
     Parameters
     ----------
@@ -66,15 +66,15 @@ def each_path(
     leads = _Leads(region.graph.lanes)
     for (person, spawn), group in by_spawn.items():
         goals = {index: users[index].goal for index in group}
-        ways: dict[int, Int32Array] = {}
+        paths: dict[int, Int32Array] = {}
         if person:
-            ways = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
+            paths = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
         else:
             for router in (drivable, region.router):
-                rest = {index: goal for index, goal in goals.items() if index not in ways}
-                ways |= _from_spawn(spawn, rest, bodies, router, leads)
+                rest = {index: goal for index, goal in goals.items() if index not in paths}
+                paths |= _from_spawn(spawn, rest, bodies, router, leads)
         for index in group:
-            yield index, ways.get(index, _NOWHERE)
+            yield index, paths.get(index, _NOWHERE)
     for (person, goal), group in by_goal.items():
         there = (region.walk_router if person else drivable).paths_to(goal)
         for first in range(0, len(group), TOGETHER):
@@ -103,7 +103,7 @@ class _Leads:
         self._first = np.searchsorted(lanes.source[follows], np.arange(len(lanes.x) + 1))
 
     def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_Lead]:
-        """Straight ways of somebody who sets off, inside the mask, and last the spawn alone."""
+        """Straight paths of a vehicle that departs, inside the mask, and last the spawn alone."""
         least = body.length / 2.0 + LANE_CHANGE
         found: list[_Lead] = []
         open_ = [_Lead((spawn,), 0.0)]
@@ -141,11 +141,11 @@ def _from_spawn(
         )
         for index, mine in begun.items()
     }
-    ways = {
+    paths = {
         index: _joined(lead, router.path(lead.nodes[-1], goals[index]))
         for index, lead in sorted(chosen.items(), key=lambda pair: pair[1].nodes[-1])
     }
-    return {index: way for index, way in ways.items() if len(way)}
+    return {index: path for index, path in paths.items() if len(path)}
 
 
 def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> list[Int32Array]:

@@ -218,11 +218,11 @@ class RoutePlanner:
     ) -> tuple[str, ...]:
         """Put the internal edges before ``edges`` that lead there from an internal lane."""
         leaving = self._leaving(lane)
-        way = self._net.way(leaving[-1].edge, edges[0], vclass)
-        if way is None:
+        between = self._net.path(leaving[-1].edge, edges[0], vclass)
+        if between is None:
             msg = f"the SUMO network has no way for {vclass} from {lane.id} to edge {edges[0]}"
             raise NoRouteError(msg)
-        return (lane.edge, *way, *edges[1:])
+        return (lane.edge, *between, *edges[1:])
 
     def _leaving(self, lane: RoadNetLane) -> tuple[RoadNetLane, ...]:
         leaving = self._net.leaving(lane.id)
@@ -251,18 +251,18 @@ class RoutePlanner:
     def _along(
         self, lane: RoadNetLane, edges: tuple[str, ...], vclass: str
     ) -> tuple[tuple[str, ...], tuple[RouteRepair, ...]]:
-        """Leave by a link of the lane that the body stands on, as its front is beyond the end.
+        """Leave by a link of the lane that the body is on, as its front is beyond the end.
 
         The path would have it change lanes first, for which it is too late.
         """
-        ways = [
-            way
+        paths = [
+            found
             for link in self._net.links_from.get(lane.id, ())
-            if (way := self._net.way(self._net.lanes[link.target].edge, edges[-1], vclass))
+            if (found := self._net.path(self._net.lanes[link.target].edge, edges[-1], vclass))
         ]
-        if len(edges) < 2 or not ways:
+        if len(edges) < 2 or not paths:
             return edges, ()
-        best = min(ways, key=lambda way: (self._net.way_length(way), way))
+        best = min(paths, key=lambda path: (self._net.path_length(path), path))
         repair = RouteRepair.of(
             RepairKind.OTHER_LINK, before=lane.id, edge=best[0], left_out=edges[1]
         )
@@ -301,9 +301,9 @@ def connected(
 ) -> tuple[tuple[str, ...], tuple[RouteRepair, ...]]:
     """Make a list of edges a connected route.
 
-    Where two edges have no link, the shortest way between them is put in; where there is none of at
-    most :data:`DETOUR` metres, the second one is left out. If the last edge cannot be reached then,
-    the route leaves the path for the shortest way to it, as late as possible.
+    Where two edges have no link, the shortest path between them is put in; where there is none of
+    at most :data:`DETOUR` metres, the second one is left out. If the last edge cannot be reached
+    then, the route leaves the path for the shortest path to it, as late as possible.
 
     Returns
     -------
@@ -312,7 +312,7 @@ def connected(
     Raises
     ------
     NoRouteError
-        If the last edge cannot be reached from any edge on the way.
+        If the last edge cannot be reached from any edge of the route.
     """
     route = [edges[0]]
     repairs: list[RouteRepair] = []
@@ -320,13 +320,15 @@ def connected(
         if edge in net.next_edges(route[-1], vclass):
             route.append(edge)
             continue
-        way = net.way(route[-1], edge, vclass)
-        if way is None or net.way_length(way[1:-1]) > DETOUR:
+        between = net.path(route[-1], edge, vclass)
+        if between is None or net.path_length(between[1:-1]) > DETOUR:
             repairs.append(RouteRepair.of(RepairKind.LEFT_OUT, edge=edge, before=route[-1]))
             continue
-        route.extend(way[1:])
-        put_in = " ".join(way[1:-1]) or edge
-        repairs.append(RouteRepair.of(RepairKind.PUT_IN, edges=put_in, before=way[0], edge=edge))
+        route.extend(between[1:])
+        put_in = " ".join(between[1:-1]) or edge
+        repairs.append(
+            RouteRepair.of(RepairKind.PUT_IN, edges=put_in, before=between[0], edge=edge)
+        )
     if len(edges) > 1 and edges[-1] not in net.next_edges(route[-1], vclass):
         route, repair = _ended(net, route, edges[-1], vclass)
         repairs.append(repair)
@@ -338,16 +340,16 @@ def connected(
 def _ended(net: RoadNet, route: list[str], last: str, vclass: str) -> tuple[list[str], RouteRepair]:
     """Lead a route to its last edge from the latest place where that is possible."""
     for kept in range(len(route), 0, -1):
-        way = net.way(route[kept - 1], last, vclass)
-        if way is None:
+        between = net.path(route[kept - 1], last, vclass)
+        if between is None:
             continue
         repair = RouteRepair.of(
             RepairKind.LED_AROUND if kept < len(route) else RepairKind.PUT_IN,
             left_out=" ".join(route[kept:]),
-            edges=" ".join(way[1:-1]) or last,
-            before=way[0],
+            edges=" ".join(between[1:-1]) or last,
+            before=between[0],
             edge=last,
         )
-        return [*route[:kept], *way[1:]], repair
+        return [*route[:kept], *between[1:]], repair
     msg = f"the SUMO network has no way for {vclass} from edge {route[-1]} to {last}"
     raise NoRouteError(msg)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class RoutesFile:
     """Collects vehicles and persons; equal vTypes are written once.
 
-    Everybody who departs at 0 is inserted unconditionally: the scenario has checked that bodies do
-    not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of a dense
-    standing crowd. Those who come later wait until SUMO finds room.
+    Every road user that departs at 0 is inserted unconditionally: the scenario has checked that
+    bodies do not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of
+    a dense standing crowd. Those who come later wait until SUMO finds room.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What SUMO's SSM device is told to measure, see :mod:`odscen.sumo.outputs.ssm_log`.
+"""What SUMO's SSM device is asked to measure, see :mod:`odscen.sumo.outputs.ssm_log`.
 
 Every vehicle has one, by a parameter of its vType: devices given by probability are gone from
 vehicles that come in with a saved state.

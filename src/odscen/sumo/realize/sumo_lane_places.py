@@ -42,7 +42,7 @@ class _LaneChain(NamedTuple):
 
 
 class _JunctionPath(NamedTuple):
-    """One way through a junction: a lane, the lanes inside, and the movement that it is of."""
+    """One connection of a junction: a lane, the lanes inside, and the movement that it is of."""
 
     source: RoadNetLane
     inside: tuple[RoadNetLane, ...]
@@ -68,18 +68,18 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
     parts |= _beside(parts, net)
     chains = list(_chains(net))
     parts |= _inside(chains, parts, junctions, net)
-    ways = list(_ways(chains, parts, junctions))
+    connections = list(_connections(chains, parts, junctions))
     control = _controls(sumo_map)
-    movements = {way.movement: way.junction for way in ways}
+    movements = {connection.movement: connection.junction for connection in connections}
     lengths: dict[str, list[float]] = defaultdict(list)
-    for way in ways:
-        length = sum(lane.length for lane in way.inside)
-        lengths[way.junction].append(length)
-        lengths[way.movement].append(length)
+    for connection in connections:
+        length = sum(lane.length for lane in connection.inside)
+        lengths[connection.junction].append(length)
+        lengths[connection.movement].append(length)
     mean = {name: float(np.mean(some)) for name, some in lengths.items()}
     return LanePlaces.of(
         lanes=list(_lane_rows(parts, net)),
-        ways=list(_way_rows(ways, net)),
+        ways=list(_connection_rows(connections, net)),
         segments=list(_segment_rows(parts, sumo_map)),
         junctions=[
             (name, control[name], mean[name]) for name in sorted(dict.fromkeys(movements.values()))
@@ -136,8 +136,8 @@ def _inside(
 ) -> _Parts:
     """Places of lanes inside of SUMO junctions that have no node, or only nodes of roads.
 
-    They are in the junction that their way crosses; if it has no nodes at all, in another one that
-    the SUMO junction stands for, as of a road that goes on past a side road.
+    They are in the junction that their connection crosses; if it has no nodes at all, in another
+    one that the SUMO junction represents, as of a road that continues past a side road.
     """
 
     def crossed(lane: RoadNetLane) -> str | None:
@@ -161,7 +161,7 @@ def _inside(
     return found
 
 
-def _ways(
+def _connections(
     chains: Sequence[_LaneChain], parts: _Parts, junctions: set[str]
 ) -> Iterator[_JunctionPath]:
     """Connections that cross a junction of the map."""
@@ -199,15 +199,17 @@ def _lane_rows(parts: _Parts, net: RoadNet) -> Iterator[tuple[str, float, bool, 
                 yield name, lane.length, motor, part.segment, part.share, entry
 
 
-def _way_rows(ways: Sequence[_JunctionPath], net: RoadNet) -> Iterator[tuple[str | None, ...]]:
+def _connection_rows(
+    connections: Sequence[_JunctionPath], net: RoadNet
+) -> Iterator[tuple[str | None, ...]]:
     inside = {
-        lane.id: (way.junction, way.source.edge, way.source.id, way.inside[0].id, way.movement)
-        for way in reversed(ways)
-        for lane in way.inside
+        lane.id: (one.junction, one.source.edge, one.source.id, one.inside[0].id, one.movement)
+        for one in reversed(connections)
+        for lane in one.inside
     }
     for name, row in sorted(inside.items()):
         yield name, *row
-    ahead = {way.source.edge: way.junction for way in reversed(ways)}
+    ahead = {one.source.edge: one.junction for one in reversed(connections)}
     for edge, last in sorted(_last_edges(ahead, inside, net).items()):
         for lane in net.edge_lanes[edge]:
             if _for_vehicles(lane):

@@ -57,7 +57,7 @@ class SumoMap:
 
     @cached_property
     def drivable(self) -> BoolArray:
-        """Lane-graph nodes that a way in SUMO can lead over, shape ``(N,)``.
+        """Lane-graph nodes that a route in SUMO can lead over, shape ``(N,)``.
 
         Those of lanes that exist in SUMO, somewhere along them at least.
         """
@@ -130,8 +130,8 @@ def with_gaps(places: NodePositions, graph: LaneGraph, net: RoadNet) -> NodePosi
     """Places with the scale of short internal lanes, on which no two nodes lie.
 
     SUMO's length of such a lane may be twice what it measures on the ground, or 0.1 m where there
-    is nothing at all. The ground is what is left of the way between the nodes before and behind it;
-    where one node lies on it, the way from its start to that node.
+    is nothing at all. The ground is what is left of the path between the nodes before and behind
+    it; where one node lies on it, the path from its start to that node.
     """
     scale = places.scale.copy()
     row_of = {name: row for row, name in enumerate(places.lanes)}
@@ -143,18 +143,18 @@ def with_gaps(places: NodePositions, graph: LaneGraph, net: RoadNet) -> NodePosi
         one, other = (net.lanes[places.lanes[places.lane[node]]] for node in (start, end))
         if one.internal:
             continue
-        way = float(graph.length[edge])
-        way -= (one.length - float(places.pos[start])) / _or_one(scale[row_of[one.id]])
+        ground = float(graph.length[edge])
+        ground -= (one.length - float(places.pos[start])) / _or_one(scale[row_of[one.id]])
         if other.internal:
             inside: tuple[RoadNetLane, ...] = (other,)
             length = float(places.pos[end])
         else:
             inside = (net.passage(one.id, other.edge) or ())[:-1]
             length = sum(lane.length for lane in inside)
-            way -= float(places.pos[end]) / _or_one(scale[row_of[other.id]])
+            ground -= float(places.pos[end]) / _or_one(scale[row_of[other.id]])
         rows = [row_of[lane.id] for lane in inside]
         if rows and np.all(np.isnan(scale[rows])):
-            scale[rows] = max(length, NOTHING) / max(way, NOTHING)
+            scale[rows] = max(length, NOTHING) / max(ground, NOTHING)
     return _all_scaled(replace(places, scale=scale))
 
 

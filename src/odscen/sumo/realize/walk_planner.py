@@ -59,7 +59,7 @@ class WalkPlanner:
         Raises
         ------
         NoRouteError
-            If the SUMO network has no way to walk there.
+            If the SUMO network has no path to walk there.
         """
         start = self._place(int(path[0]), "spawn")
         end = self._place(int(path[-1]), "goal")
@@ -91,7 +91,7 @@ class WalkPlanner:
         """Return the edges that the path walks along, in order.
 
         An edge that is only touched, at a corner between two crosswalks, is left out: SUMO would
-        have it walked to its other end. SUMO finds the way across a junction by itself.
+        have it walked to its other end. SUMO finds the path across a junction by itself.
         """
         rows = self._places.lane[path]
         starts = np.flatnonzero(np.diff(rows, prepend=-2))

@@ -17,10 +17,10 @@ def fast_allocator() -> str | None:
     if not sys.platform.startswith("linux"):
         return None
     try:
-        told = subprocess.run(
+        listed = subprocess.run(
             ["/sbin/ldconfig", "-p"], check=True, capture_output=True, text=True, timeout=10
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    there = set(re.findall(r"^\s*(\S+) \(", told.stdout, re.MULTILINE))
+    there = set(re.findall(r"^\s*(\S+) \(", listed.stdout, re.MULTILINE))
     return next((name for name in NAMES if name in there), None)

@@ -65,13 +65,13 @@ def run_long(
     WorkspaceError
         If the folder cannot be written.
     """
-    with _told(out):
+    with _disk_errors(out):
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
             _write_settings(prepared, folder)
             write_status(folder, prepared.plan, None)
         with locked(out) as lock:
-            return _go_on(prepared, out, lock, progress, finish, live)
+            return _resume_from(prepared, out, lock, progress, finish, live)
 
 
 def resume(
@@ -105,16 +105,16 @@ def resume(
             raise ConflictError(msg)
         what = "interrupted run"
         raise NotFoundError(what, folder.name, interrupted(folder.parent))
-    with _told(folder), locked(folder) as lock:
+    with _disk_errors(folder), locked(folder) as lock:
         prepared = _restore(folder, time_limit)
         number, problems = survey(folder)
         if tell is not None:
             for problem in problems:
                 tell(problem)
             begin = read_checkpoint(folder, number).time if number else 0.0
-            tell(f"going on at {begin:g} s, after slice {number}" if number else "begins anew")
+            tell(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
-        return _go_on(prepared, folder, lock, progress, finish, live)
+        return _resume_from(prepared, folder, lock, progress, finish, live)
 
 
 def refuse_interrupted(out: Path) -> None:
@@ -129,7 +129,7 @@ def refuse_interrupted(out: Path) -> None:
     if status is not None:
         msg = (
             f"run {out.name!r} has not ended (it is at {status.get('time', 0):g} s); "
-            f"odscen resume {out} goes on with it; delete the folder to begin anew"
+            f"odscen resume {out} resumes it; delete the folder to begin anew"
         )
         raise ConflictError(msg)
 
@@ -150,7 +150,7 @@ def about(folder: Path) -> dict[str, Any]:
         return {}
 
 
-def _go_on(
+def _resume_from(
     prepared: PreparedRun,
     folder: Path,
     lock: int,
@@ -167,7 +167,7 @@ def _go_on(
         kept = summary["slices"]["time"]
         summary["error"] = (
             f"{summary['error']}\nWhat happened up to {kept:g} s is kept; "
-            f"to go on from there: odscen resume {folder}"
+            f"to resume there: odscen resume {folder}"
         )
     elif finish is not None:
         finish(folder, summary)
@@ -241,7 +241,7 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
 
 
 @contextmanager
-def _told(folder: Path) -> Iterator[None]:
+def _disk_errors(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

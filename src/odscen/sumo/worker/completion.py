@@ -24,8 +24,8 @@ class Completion:
     def __init__(self, run: Path) -> None:
         self._connection, theirs = Pipe()
         os.set_inheritable(theirs.fileno(), True)
-        # It inherits the lock of the run, which nobody else may touch before it has ended, too, and
-        # where the worker's messages go: whoever reads them knows from their end that both have.
+        # It inherits the lock of the run, which no other may touch before it has ended, too, and
+        # where the worker's messages go: their reader knows from their end that both have.
         self._process = subprocess.Popen(
             [sys.executable, "-m", COMPLETER, str(run), str(theirs.fileno())],
             stdin=subprocess.DEVNULL,
@@ -82,7 +82,7 @@ class Completion:
             raise error
 
     def write_results(self) -> None:
-        """Complete the last slice and write what has become of everybody.
+        """Complete the last slice and write the outcome of every actor.
 
         Raises
         ------

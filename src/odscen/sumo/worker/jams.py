@@ -1,9 +1,10 @@
-"""Where traffic is stuck, found while the simulation goes, with the reason as far as it shows.
+"""Where traffic is gridlocked, found while the simulation goes, with the reason as far as it shows.
 
-A lane is jammed while somebody on it has stood for :data:`STUCK` seconds, which is longer than a
-red light. Who is first in it is asked what it has ahead; if that is another standing vehicle, that
-one is asked, and so on to the head of the queue, whose reason is everybody's. Asking begins
-earlier, at :data:`WATCHED` seconds: whoever cannot go on at green will be looked at at red, too.
+A lane is jammed while a vehicle on it has been stopped for :data:`JAMMED` seconds, which is longer
+than a red light. The first vehicle in it is asked what it has ahead; if that is another stopped
+vehicle, that one is asked, and so on to the head of the queue, whose reason is that of all. Asking
+begins earlier, at :data:`WATCHED` seconds: a vehicle that cannot move at green will be looked at at
+red, too.
 """
 
 from __future__ import annotations
@@ -16,25 +17,25 @@ from odscen.results.records.run_records import Event, EventKind
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from odscen.sumo.worker.observed import Ahead, Standing
+    from odscen.sumo.worker.observed import Ahead, StoppedVehicle
     from odscen.sumo.worker.session import Session
 
 PERIOD = 15.0
 """Simulated seconds between two looks."""
 WATCHED = 45.0
-"""Seconds of standing from which the reason is looked for."""
-STUCK = 180.0
-"""Seconds of standing that make a jam."""
+"""Seconds of being stopped from which the reason is looked for."""
+JAMMED = 180.0
+"""Seconds of being stopped that make a jam."""
 
 _HOPS = 200
 """Vehicles that a reason is followed through."""
 
 RELEASE = 60.0
-"""Seconds without anybody watched after which a jam is over: moving up a little does not end it."""
+"""Seconds without a stopped vehicle after which a jam is over; moving up does not end it."""
 
 
-class Stuck(NamedTuple):
-    """A vehicle that stood at the last look: where (OpenDRIVE frame), since when, and why."""
+class LastStop(NamedTuple):
+    """Of a vehicle, at the last look: where (OpenDRIVE frame), since when, and why it stopped."""
 
     lane: str
     x: float | None
@@ -44,7 +45,7 @@ class Stuck(NamedTuple):
 
 
 class JamWatch:
-    """Finds jams and says why somebody was stuck.
+    """Finds jams and says why somebody was stop.
 
     Attributes
     ----------
@@ -57,7 +58,7 @@ class JamWatch:
         self._offset = net_offset
         self._since: dict[str, float] = {}
         self._seen: dict[str, float] = {}
-        self._stuck: dict[str, Stuck] = {}
+        self._stops: dict[str, LastStop] = {}
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
@@ -65,7 +66,7 @@ class JamWatch:
             "next": self.due,
             "since": dict(self._since),
             "seen": dict(self._seen),
-            "stuck": dict(self._stuck),
+            "stuck": dict(self._stops),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -73,26 +74,26 @@ class JamWatch:
         self.due = state["next"]
         self._since = dict(state["since"])
         self._seen = dict(state["seen"])
-        stuck = {name: Stuck(*row) for name, row in state["stuck"].items()}
-        self._stuck = {
-            name: one._replace(reason=stop_reason(one.reason)) for name, one in stuck.items()
+        stops = {name: LastStop(*row) for name, row in state["stuck"].items()}
+        self._stops = {
+            name: one._replace(reason=stop_reason(one.reason)) for name, one in stops.items()
         }
 
-    def stuck(self, vehicle: str) -> Stuck | None:
-        """Where and why a vehicle stood at the last look, if it did."""
-        return self._stuck.get(vehicle)
+    def last_stop(self, vehicle: str) -> LastStop | None:
+        """Where and why a vehicle was stopped at the last look, if it was."""
+        return self._stops.get(vehicle)
 
     def look(self, session: Session, time: float) -> list[Event]:
         """Jams that have begun or ended since the last look."""
         self.due = time + PERIOD
-        queues: dict[str, list[Standing]] = {}
-        for one in session.standing(WATCHED):
+        queues: dict[str, list[StoppedVehicle]] = {}
+        for one in session.stopped(WATCHED):
             queues.setdefault(one.lane, []).append(one)
-        jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= STUCK}
+        jammed = {lane for lane, queue in queues.items() if max(q.waited for q in queue) >= JAMMED}
         self._seen.update((lane, time) for lane in self._since.keys() & queues.keys())
         over = [lane for lane, seen in self._seen.items() if time - seen >= RELEASE]
         events = [self._end(time, lane) for lane in sorted(over)]
-        before, self._stuck = self._stuck, {}
+        before, self._stops = self._stops, {}
         for lane, queue in sorted(queues.items()):
             first = max(queue, key=lambda one: (one.pos, one.vehicle))
             reason: StopReason | str
@@ -100,37 +101,37 @@ class JamWatch:
             if reason in (StopReason.RED, StopReason.UNKNOWN) and first.vehicle in before:
                 reason = before[first.vehicle].reason
             for one in queue:
-                self._stuck[one.vehicle] = self._place(session, one, time, reason)
+                self._stops[one.vehicle] = self._place(session, one, time, reason)
             if lane in jammed and lane not in self._since:
                 self._since[lane] = time - first.waited
                 self._seen[lane] = time
                 events.append(self._begin(time, first, len(queue), head))
         return events
 
-    def nobody_left(self, time: float) -> list[Event]:
+    def road_is_empty(self, time: float) -> list[Event]:
         """Jams that are over because the road is empty."""
         return [self._end(time, lane) for lane in sorted(self._since)]
 
     def _place(
-        self, session: Session, one: Standing, time: float, reason: StopReason | str
-    ) -> Stuck:
+        self, session: Session, one: StoppedVehicle, time: float, reason: StopReason | str
+    ) -> LastStop:
         front = session.vehicle_front(one.vehicle)
         dx, dy = self._offset
         x = None if front is None else front.x - dx
         y = None if front is None else front.y - dy
-        return Stuck(one.lane, x, y, time - one.waited, reason)
+        return LastStop(one.lane, x, y, time - one.waited, reason)
 
-    def _begin(self, time: float, first: Standing, queue: int, head: str) -> Event:
-        stuck = self._stuck[first.vehicle]
+    def _begin(self, time: float, first: StoppedVehicle, queue: int, head: str) -> Event:
+        stop = self._stops[first.vehicle]
         return Event(
             time,
             EventKind.JAM_BEGIN,
             first.vehicle,
-            x=stuck.x,
-            y=stuck.y,
-            lane=stuck.lane,
+            x=stop.x,
+            y=stop.y,
+            lane=stop.lane,
             partner=None if head == first.vehicle else head,
-            detail=stuck.reason,
+            detail=stop.reason,
             waited=first.waited,
             queue=queue,
         )
@@ -141,7 +142,7 @@ class JamWatch:
 
 
 def explain(session: Session, vehicle: str) -> tuple[StopReason, str]:
-    """Why a vehicle stands, and the vehicle at the head of the queue that it stands in."""
+    """Why a vehicle is stopped, and the vehicle at the head of its queue."""
     seen = [vehicle]
     ahead = session.ahead(vehicle)
     while ahead is not None and _own_reason(ahead) is None and ahead.leader:
@@ -157,7 +158,7 @@ def explain(session: Session, vehicle: str) -> tuple[StopReason, str]:
 def _own_reason(ahead: Ahead) -> StopReason | None:
     """Return the reason that is not just the vehicle ahead."""
     if not ahead.onwards:
-        return StopReason.WRONG_LANE if ahead.beside else StopReason.NO_WAY_ON
+        return StopReason.WRONG_LANE if ahead.beside else StopReason.NO_CONNECTION
     if ahead.leader is not None:
         return None
     if ahead.light in ("r", "u"):

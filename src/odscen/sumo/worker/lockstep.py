@@ -1,4 +1,4 @@
-"""A run in step with another simulator: a step when told to, and all that is to know after it.
+"""A run in step with another simulator: a step when asked to, and all that is to know after it.
 
 A :class:`~odscen.sumo.worker.protocol.State` is followed by little-endian float64 rows, one for
 each vehicle and person of the plan that is on the road:
@@ -9,7 +9,7 @@ row    index, x, y, angle_deg, speed, signals, lane, pos
 
 ``index`` is the actor's row in the plan; x, y, angle_deg are SUMO's own (front, SUMO frame), for
 height and slope, which the body centre needs, are not known to SUMO. ``lane`` counts the names of
-lanes told so far, -1 for none. ``pos`` is metres along it.
+lanes reported so far, -1 for none. ``pos`` is metres along it.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class LockstepWatch:
         self._queue: list[Command | EgoPose] = []
         self._send = send
         self._steps = 0
-        self._told = 0
+        self._reported = 0
         self._lights: dict[str, str] = {}
         self._lane: dict[str, int] = {"": -1}
 
@@ -95,7 +95,7 @@ class LockstepWatch:
         self.show(session, recorder)
 
     def show(self, session: Session, recorder: Recorder) -> None:
-        """Tell of the step just made; there is nothing to tell before the first."""
+        """Report the step just made; there is nothing to report before the first."""
         if not self._steps:
             return
         known = len(self._lane) - 1
@@ -109,7 +109,7 @@ class LockstepWatch:
         states = session.light_states()
         changed = {name: state for name, state in states.items() if self._lights.get(name) != state}
         self._lights = states
-        events, self._told = recorder.events[self._told :], len(recorder.events)
+        events, self._reported = recorder.events[self._reported :], len(recorder.events)
         state = State(
             size=len(rows),
             time=session.time - self._step_length,
@@ -134,7 +134,7 @@ class LockstepWatch:
         return rows[(rows[:, 0] >= 0) & (np.abs(rows[:, 1]) < INVALID)]
 
     def _next(self) -> Command | EgoPose:
-        """Wait for the next command; to stop, once nobody is there to give one."""
+        """Wait for the next command; to stop, once there is no one to give one."""
         while not self._queue:
             block = os.read(self._commands, _BLOCK)
             if not block:

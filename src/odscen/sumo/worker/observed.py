@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Front(NamedTuple):
-    """Where a road user is, SUMO's way: centre of the front, metres and degrees, SUMO frame."""
+    """Where a road user is, as SUMO has it: centre of the front, metres and degrees, SUMO frame."""
 
     x: float
     y: float
@@ -36,7 +36,7 @@ class Poses(NamedTuple):
 
 
 class Collision(Protocol):
-    """One collision that lasts, as libsumo tells of it."""
+    """One collision that lasts, as libsumo reports it."""
 
     collider: str
     victim: str
@@ -61,8 +61,8 @@ class StepLists(NamedTuple):
     fronts: Mapping[str, Front | None]
 
 
-class Standing(NamedTuple):
-    """A vehicle that stands: where its front is, metres along ``lane``, and for how long, s."""
+class StoppedVehicle(NamedTuple):
+    """A vehicle that is stopped: where its front is, metres along ``lane``, and for how long, s."""
 
     vehicle: str
     lane: str
@@ -76,18 +76,18 @@ class Ahead(NamedTuple):
     Attributes
     ----------
     onwards
-        Whether its lane leads on along its way.
+        Whether its lane continues along its route.
     light
         Letter of the next link: ``r`` red, ``y`` yellow, ``G``, ``g`` green; others without light.
     open
         Whether right of way and light let it pass.
     leader
-        Vehicle that stands so close ahead that there is no room to go on: right in front, or just
-        behind the junction, which must be kept clear.
+        Vehicle that is stopped so close ahead that there is no room to proceed: right in front, or
+        just behind the junction, which must be kept clear.
     people
-        Whether somebody is on a crossing that its next link runs over.
+        Whether a pedestrian is on a crossing that its next link runs over.
     beside
-        Where its own lane does not lead on: whether another lane of the road does.
+        Where its own lane does not continue: whether another lane of the road does.
     """
 
     onwards: bool

@@ -3,7 +3,7 @@
 A run that can be watched (see :mod:`odscen.sumo.runner.live_run`) also sends frames: a line
 :class:`FrameMessage` and then so many bytes. A run in lockstep (see
 :mod:`odscen.sumo.worker.lockstep`) sends a :class:`State` and its bytes after each step. A run that
-nobody can watch sends :class:`Progress` and its end only.
+no one can watch sends :class:`Progress` and its end only.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Progress:
 class Done:
     """The run has ended without an error: simulated seconds, steps, wall seconds of the simulation.
 
-    ``stopped`` if somebody who watched it has ended it before its time.
+    ``stopped`` if a user who watched it has ended it before its time.
     """
 
     sim_seconds: float
@@ -99,9 +99,9 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Lockstep:
-    """As an argument of the worker: make a step only when told to, and tell all after each.
+    """As an argument of the worker: make a step only when asked to, and report all after each.
 
-    ``placed`` is the row in the plan of a vehicle that somebody else drives, -1 for none.
+    ``placed`` is the row in the plan of a vehicle that another program drives, -1 for none.
     """
 
     placed: int = -1
@@ -136,7 +136,7 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class EgoPose:
-    """To the worker: the vehicle that somebody else drives; front, SUMO frame, m/s."""
+    """To the worker: the vehicle that another program drives; front, SUMO frame, m/s."""
 
     x: float
     y: float

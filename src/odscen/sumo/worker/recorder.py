@@ -33,8 +33,8 @@ class Recorder:
     """Turns the session's lists into events.
 
     Steps in which something happened are put by and gone through together, at every look for jams
-    and whenever somebody asks: after a step of SUMO nothing of Python is in the processor's caches,
-    and one event alone costs several times as much as one of many.
+    and whenever they are asked for: after a step of SUMO nothing of Python is in the processor's
+    caches, and one event alone costs several times as much as one of many.
 
     Attributes
     ----------
@@ -112,9 +112,9 @@ class Recorder:
         self._stopping = set(state["stopping"])
         self._jams.restore(state["jams"])
 
-    def nobody_left(self, time: float) -> None:
+    def road_is_empty(self, time: float) -> None:
         """Say that the run ends because the road is empty: every jam is over."""
-        self.events.extend(self._jams.nobody_left(time))
+        self.events.extend(self._jams.road_is_empty(time))
 
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
@@ -139,7 +139,7 @@ class Recorder:
         self._quiet_before(self._number + 1)
 
     def _quiet_before(self, number: int) -> None:
-        """If nothing happened in the step before this one, nobody touched or braked hard."""
+        """If nothing happened in the step before this one, no vehicles touched or braked hard."""
         if self._settled < number - 1:
             self._touching, self._stopping = set(), set()
 
@@ -179,9 +179,9 @@ class Recorder:
         self._events.append(Event(time, EventKind.ARRIVED, name, travel_time=spent))
 
     def _teleport(self, time: float, vehicle: str) -> None:
-        """Tell where and why it stood until now, as it has no place any more."""
-        stuck = self._jams.stuck(vehicle)
-        if stuck is None:
+        """Report where and why it was stopped until now, as it has no place any more."""
+        stop = self._jams.last_stop(vehicle)
+        if stop is None:
             self._events.append(Event(time, EventKind.TELEPORT_START, vehicle))
             return
         self._events.append(
@@ -189,11 +189,11 @@ class Recorder:
                 time,
                 EventKind.TELEPORT_START,
                 vehicle,
-                x=stuck.x,
-                y=stuck.y,
-                lane=stuck.lane,
-                detail=stuck.reason,
-                waited=time - stuck.since,
+                x=stop.x,
+                y=stop.y,
+                lane=stop.lane,
+                detail=stop.reason,
+                waited=time - stop.since,
             )
         )
 

@@ -67,7 +67,7 @@ class RouteSlices:
         return place
 
     def more(self, offset: int) -> bool:
-        """Whether anybody departs after the cut that returned ``offset``."""
+        """Whether any road user departs after the cut that returned ``offset``."""
         with self._routes.open("rb") as source:
             source.seek(max(offset, len(self._head)))
             return _BEGIN.match(source.readline()) is not None

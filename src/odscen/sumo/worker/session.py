@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from odscen.base.errors import SimulationError
-from odscen.sumo.worker.observed import Ahead, Front, Poses, Standing, StepLists
+from odscen.sumo.worker.observed import Ahead, Front, Poses, StepLists, StoppedVehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -37,12 +37,12 @@ _EDGES_AHEAD = 3
 
 
 _CLOSE = 5.0
-"""Metres that a standing vehicle ahead may be away and be the reason for standing."""
-_IN_THE_WAY = 10.0
+"""Metres that a stopped vehicle ahead may be away and be the reason for stopping."""
+_BLOCKING = 10.0
 """Metres from the front to the middle of another body in a junction that may be the reason."""
 _RED = ("r", "u")
-"""States of a traffic light's link at which nobody goes."""
-_STANDS = 0.1
+"""States of a traffic light's link at which no vehicle goes."""
+_STOPPED = 0.1
 """Speed, m/s, below which SUMO counts a vehicle as waiting."""
 
 
@@ -144,7 +144,7 @@ class Session:
         return [(lane(name), pos(name)) for name in ids]
 
     def place(self, vehicle: str, at: EgoPose) -> bool:
-        """Put a vehicle where somebody else has driven it; false if SUMO cannot.
+        """Put a vehicle where another program has driven it; false if SUMO cannot.
 
         The place is taken exactly, on or off the road, and so is the speed, whatever limits,
         lights and right of way say: nothing of SUMO's drives it. ``keepRoute=2`` lets the vehicle
@@ -236,7 +236,7 @@ class Session:
     def knows(self, name: str) -> bool:
         """Whether there is such a vehicle or person, on the road or still to come.
 
-        :meth:`present` does not tell right after a state is loaded: SUMO lists vehicles that wait
+        :meth:`present` does not say right after a state is loaded: SUMO lists vehicles that wait
         for room only after its first step.
         """
         for domain in (self._sumo.vehicle, self._sumo.person):
@@ -259,14 +259,14 @@ class Session:
             msg = f"SUMO could not save its state at {self.time:g} s: {error}"
             raise SimulationError(msg) from error
 
-    def standing(self, seconds: float) -> list[Standing]:
-        """Vehicles on the road that have stood for so long; a microsecond for each on the road."""
+    def stopped(self, seconds: float) -> list[StoppedVehicle]:
+        """Vehicles that have been stopped for so long; a microsecond for each on the road."""
         vehicle = self._sumo.vehicle
         found = []
         for name in vehicle.getIDList():
             waited = vehicle.getWaitingTime(name)
             if waited >= seconds and (lane := vehicle.getLaneID(name)):
-                found.append(Standing(name, lane, vehicle.getLanePosition(name), waited))
+                found.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
         return found
 
     def ahead(self, name: str) -> Ahead | None:
@@ -274,7 +274,7 @@ class Session:
         vehicle = self._sumo.vehicle
         try:
             links = vehicle.getNextLinks(name)
-            leader = self._standing_leader(name, float(links[0][7]) if links else 0.0)
+            leader = self._stopped_leader(name, float(links[0][7]) if links else 0.0)
             at_end = vehicle.getRouteIndex(name) >= len(vehicle.getRoute(name)) - 1
             lane = str(vehicle.getLaneID(name))
             if leader is None and not at_end and (wrong := self._leads_astray(name)) is not None:
@@ -283,10 +283,10 @@ class Session:
             goes = bool(links) and links[0][5] not in _RED  # else that is the reason
             through = lane if inside else str(links[0][4]) if goes else ""
             if leader is None and through:
-                leader = self._in_the_way(name, through)
+                leader = self._blocking_vehicle(name, through)
         except self._errors:
             return None
-        if not links:  # inside a junction the way out of it is not among them
+        if not links:  # inside a junction the link out of it is not among them
             onwards = at_end or inside
             return Ahead(onwards, "", onwards, leader, people=False)
         link = links[0]
@@ -295,7 +295,7 @@ class Session:
         return Ahead(True, str(link[5]), bool(link[2]), leader, people)
 
     def _leads_astray(self, name: str) -> bool | None:
-        """Whether another lane leads on along a vehicle's way; ``None`` if its own lane does."""
+        """Whether another lane continues along a vehicle's route; ``None`` if its own lane does."""
         vehicle, lanes = self._sumo.vehicle, self._sumo.lane
         lane, index = vehicle.getLaneID(name), vehicle.getRouteIndex(name)
         if not lane or lane in self._internal_lanes:
@@ -313,8 +313,8 @@ class Session:
         wants = next((one[3] for one in vehicle.getBestLanes(name) if one[0] == lane), 0)
         return True if wants else None
 
-    def _standing_leader(self, name: str, junction: float) -> str | None:
-        """Return who leaves no room for the vehicle behind ``junction`` metres of junction."""
+    def _stopped_leader(self, name: str, junction: float) -> str | None:
+        """Return the vehicle that leaves no room behind ``junction`` metres of junction."""
         vehicle = self._sumo.vehicle
         lane = vehicle.getLaneID(name)
         rest = self._sumo.lane.getLength(lane) - vehicle.getLanePosition(name) if lane else 0.0
@@ -323,17 +323,17 @@ class Session:
         leader = vehicle.getLeader(name, needed)
         if not leader or not leader[0] or leader[1] > needed:
             return None
-        return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STANDS else None
+        return str(leader[0]) if vehicle.getSpeed(leader[0]) < _STOPPED else None
 
-    def _in_the_way(self, name: str, internal: str) -> str | None:
-        """Return who stands ahead on another way through the junction, the nearest of them."""
+    def _blocking_vehicle(self, name: str, internal: str) -> str | None:
+        """Return the nearest vehicle stopped ahead on another connection of the junction."""
         vehicle, lanes = self._sumo.vehicle, self._sumo.lane
         x, y = vehicle.getPosition(name)
         angle = math.radians(vehicle.getAngle(name))
-        nearest, found = _IN_THE_WAY, None
+        nearest, found = _BLOCKING, None
         for foe in sorted(lanes.getInternalFoes(internal)):
             for other in lanes.getLastStepVehicleIDs(foe):
-                if vehicle.getSpeed(other) >= _STANDS:
+                if vehicle.getSpeed(other) >= _STOPPED:
                     continue
                 (fx, fy), turned = vehicle.getPosition(other), math.radians(vehicle.getAngle(other))
                 half = vehicle.getLength(other) / 2.0
@@ -406,7 +406,7 @@ def open_session(arguments: Sequence[str]) -> Iterator[Session]:
     try:
         yield Session(sumo)
     except BaseException:
-        with suppress(*errors):  # the first error is the one to tell
+        with suppress(*errors):  # the first error is the one to report
             sumo.close()
         raise
     else:

@@ -2,12 +2,12 @@
 
 libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
 run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
-beside it, steps until nobody is left or the end is reached (in slices, see
+beside it, steps until no road user is left or the end is reached (in slices, see
 :mod:`odscen.sumo.worker.slices`, if the plan says so), writes ``events.json`` and ``actors.json``,
 and sends :mod:`odscen.sumo.worker.protocol` messages to its stdout. Whatever SUMO says goes to
 ``sumo.log``. With a :class:`~odscen.sumo.worker.protocol.Pace` as second argument the run can be
 watched and takes commands on its stdin; with a :class:`~odscen.sumo.worker.protocol.Lockstep` it
-makes each step when it is told to.
+makes each step when it is asked to.
 """
 
 from __future__ import annotations

@@ -136,18 +136,18 @@ class _RunningSlice:
         return arguments
 
     def _compare(self, session: Session, stepper: Stepper) -> None:
-        """Say who has not come back; nobody has ever been seen to be lost, but we look."""
+        """Say who has not come back; none has ever been seen to be lost, but we look."""
         if self._before is None:
             return
         if abs(session.time - self._before.time) > 1e-6:
-            msg = f"SUMO goes on at {session.time:g} s instead of {self._before.time:g} s"
+            msg = f"SUMO resumes at {session.time:g} s instead of {self._before.time:g} s"
             raise SimulationError(msg)
         missing = [name for name in self._before.present if not session.knows(name)]
         stepper.recorder.lose(session.time, missing)
 
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
-        nobody = not more and session.expected() == 0
-        return now >= self._plan.until or nobody or stepper.stopped
+        empty = not more and session.expected() == 0
+        return now >= self._plan.until or empty or stepper.stopped
 
 
 @contextmanager

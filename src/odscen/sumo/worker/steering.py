@@ -39,7 +39,7 @@ class Steering:
     stopped
         Whether the run is to end now.
     frame_wanted
-        Whether somebody waits for a frame; whoever makes it takes the wish back.
+        Whether a frame is awaited; its maker takes the wish back.
     """
 
     def __init__(self, commands: int, pace: Pace, *, step_length: float) -> None:

@@ -1,4 +1,4 @@
-"""The loop that every run goes through: step, record, tell how far it is."""
+"""The loop that every run goes through: step, record, report how far it is."""
 
 from __future__ import annotations
 
@@ -56,16 +56,16 @@ class Stepper:
 
     @property
     def stopped(self) -> bool:
-        """Whether whoever watches has ended the run."""
+        """Whether a user who watches has ended the run."""
         return self._watch is not None and self._watch.stopped
 
     def run(self, session: Session, until: float, *, more: bool = False) -> float:
-        """Step until ``until``, or until nobody is left; simulated seconds then.
+        """Step until ``until``, or until no road user is left; simulated seconds then.
 
         Parameters
         ----------
         more
-            Whether somebody is to come whom this simulation does not know of.
+            Whether road users are to come that this simulation does not know of.
         """
         watch, record, clock = self._watch, self.recorder.record, time.monotonic
         now = session.time
@@ -84,16 +84,16 @@ class Stepper:
             self.steps += 1
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
-                self._tell(session, now, self._busy + self._sent - begin - waited)
+                self._report(session, now, self._busy + self._sent - begin - waited)
         self._busy += clock() - begin - waited
         if not more and session.expected() == 0:
-            self.recorder.nobody_left(now)
-        if self._watch is not None:  # whoever watches sees how it ends
+            self.recorder.road_is_empty(now)
+        if self._watch is not None:  # a user who watches sees how it ends
             self._watch.show_last(session, self.recorder)
-            self._tell(session, now, self._busy)
+            self._report(session, now, self._busy)
         return now
 
-    def _tell(self, session: Session, now: float, busy: float) -> None:
+    def _report(self, session: Session, now: float, busy: float) -> None:
         recorder, plan = self.recorder, self._plan
         self._send(
             Progress(

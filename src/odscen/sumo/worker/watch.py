@@ -1,6 +1,6 @@
 """The worker's side of a run that can be watched: steered from outside, and telling what is seen.
 
-Frames are made only when somebody waits for one, and take a small share of the time while the run
+Frames are made only when one is awaited, and take a small share of the time while the run
 is in a hurry; while it waits for its pace they cost nothing.
 """
 
@@ -49,7 +49,7 @@ class Watch:
         self._pace = steering.pace
         self._step_length = plan.step_length
         self._lights: dict[str, str] = {}
-        self._told = 0
+        self._reported = 0
         self._step = self._framed = 0
         self._next_frame = 0.0
         self._mark = time.monotonic(), 0
@@ -57,14 +57,14 @@ class Watch:
 
     @property
     def stopped(self) -> bool:
-        """Whether somebody has ended the run before its time."""
+        """Whether a user has ended the run before its time."""
         return self.steering.stopped
 
     def next_step(self, session: Session, recorder: Recorder) -> bool:
         """Show what is wanted, then wait for the next step; false if the run is to stop."""
 
         def idle(has_time: bool) -> None:
-            self._tell_pace()
+            self._report_pace()
             if has_time or time.monotonic() >= self._next_frame:
                 self.show(session, recorder)
 
@@ -80,7 +80,7 @@ class Watch:
             self._show(session, recorder)
 
     def show_last(self, session: Session, recorder: Recorder) -> None:
-        """Send the last frame, wanted or not: somebody may ask for it later."""
+        """Send the last frame, wanted or not: a user may ask for it later."""
         if self._framed != self._step:
             self._show(session, recorder)
 
@@ -93,7 +93,7 @@ class Watch:
         if changed:
             self._lights = states
             self._send(Lights(changed), b"")
-        self._tell_incidents(recorder)
+        self._report_incidents(recorder)
         frame = self._snapshots.frame(
             session,
             step=self._step,
@@ -105,14 +105,14 @@ class Watch:
         end = time.monotonic()
         self._next_frame = end + max(LEAST_PAUSE, (end - start) * (1 / SHARE - 1))
 
-    def _tell_pace(self) -> None:
+    def _report_pace(self) -> None:
         if self.steering.pace != self._pace:
             self._pace = self.steering.pace
             self._send(self._pace, b"")
 
-    def _tell_incidents(self, recorder: Recorder) -> None:
-        new = recorder.since(self._told)
-        self._told = recorder.count
+    def _report_incidents(self, recorder: Recorder) -> None:
+        new = recorder.since(self._reported)
+        self._reported = recorder.count
         rows = [event_row(event) for event in new if event.kind not in _PLAIN]
         if rows:
             self._send(Incidents(rows), b"")

@@ -16,7 +16,7 @@ from odscen.web.run_messages import IncidentInfo, RunState
 
 
 class LiveActor(Answer):
-    """Somebody who will ever be in a frame, and the row by which frames name them; metres."""
+    """A road user that will ever be in a frame, and the row by which frames name them; metres."""
 
     index: int
     id: str

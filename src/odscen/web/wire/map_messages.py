@@ -52,7 +52,7 @@ class NetCounts(Answer):
 
 
 class MapInfo(Answer):
-    """A map of the catalogue; ``report_counts`` says how many elements had which fate."""
+    """A map of the catalogue; ``report_counts`` says how many elements had which outcome."""
 
     name: str
     sha256: str
@@ -112,7 +112,7 @@ class SemanticsInfo(Answer):
 
 
 class LightInfo(Answer):
-    """A traffic light: its SUMO id, by which live states are told, and what scenarios call it.
+    """A traffic light: its SUMO id, by which live states are reported, and what scenarios call it.
 
     ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
     of its state, the OpenDRIVE signals that show it.
@@ -174,7 +174,7 @@ class EdgeColumns(Answer):
 class WalkColumns(NodeColumns):
     """The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
 
-    ``walkable`` is 1 where the simulator can place somebody exactly.
+    ``walkable`` is 1 where the simulator can place a road user exactly.
     """
 
     walkable: list[int]
@@ -196,7 +196,7 @@ class GraphColumns(NodeColumns):
 
     Per lane its type, and the junction that it lies in. Per node ``speed_limit`` in m/s, if there
     is one, ``left_lane`` and ``right_lane`` (-1 if there is none), and whether it is ``spawnable``:
-    1 where the simulator can place somebody exactly.
+    1 where the simulator can place a road user exactly.
     """
 
     spacing: float

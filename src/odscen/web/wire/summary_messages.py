@@ -27,7 +27,7 @@ else:
 
 
 class GridlockInfo(Answer):
-    """Where traffic got stuck: how often, and the first of the places."""
+    """Gridlock and teleports: how often, and the first of the places."""
 
     jams: int
     jams_at_the_end: int

@@ -21,7 +21,7 @@ def incident_section(found: Sequence[Incident]) -> Markup | None:
     """Table of the incidents; ``None`` if there were none."""
     if not found:
         return None
-    heads = ("No.", "What", "Why", "How many", "Since, s", "Until, s", "Where")
+    heads = ("No.", "Incident", "Reason", "Vehicles", "Since, s", "Until, s", "Place")
     shown = _shown(found)
     rows = [_row(index, one) for index, one in enumerate(shown, start=1)]
     more = None
@@ -37,7 +37,7 @@ def incident_section(found: Sequence[Incident]) -> Markup | None:
     )
     places = html_table(heads, rows)
     return report_section(
-        "Gridlock and teleports", places, more, explained=explained, ident="stuck"
+        "Gridlock and teleports", places, more, explained=explained, ident="incidents"
     )
 
 
@@ -59,7 +59,7 @@ def incident_rings(found: Sequence[Incident], dot: float) -> Markup | None:
                 "text", str(index), x=x + round(radius * 1.2), y=y, font_size=round(dot * 420)
             )
         parts.append(element("g", title, ring, label))
-    return element("g", *parts, class_="stuck") if parts else None
+    return element("g", *parts, class_="incidents") if parts else None
 
 
 def _shown(found: Sequence[Incident]) -> list[Incident]:
