@@ -164,7 +164,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, list[
     folders = []
     for seed in (1, 2):
         settings = RunSettings(seed=seed, recording=Recording(criticality=True))
-        runs.run(store, [SCENARIO], out=root / str(seed), settings=settings)
+        runs.run_many(store, [SCENARIO], out=root / str(seed), settings=settings)
         folders.append(root / str(seed) / "signal_crossing")
     return store, folders
 

@@ -409,7 +409,7 @@ export interface paths {
         };
         /**
          * Path
-         * @description Way from ``spawn`` to ``goal`` inside the region, as somebody on foot, or a car, takes it.
+         * @description Path from ``spawn`` to ``goal`` inside the region, as a pedestrian, or a car, takes it.
          */
         get: operations["path_api_scenarios__name__path_get"];
         put?: never;
@@ -717,7 +717,7 @@ export interface paths {
         };
         /**
          * Trajectories
-         * @description Where everybody was, as columns; see ``docs/server.md``.
+         * @description Where road users were, as columns; see ``docs/server.md``.
          */
         get: operations["trajectories_api_runs__run__trajectories_get"];
         put?: never;
@@ -1052,7 +1052,7 @@ export interface components {
         };
         /**
          * Better
-         * @description Which way a figure should go.
+         * @description In which direction a figure is better.
          * @enum {string}
          */
         Better: "lower" | "higher" | "neither";
@@ -1541,7 +1541,7 @@ export interface components {
          * EventKind
          * @description What can happen to an actor.
          *
-         *     A jam is told of whoever is first in it. ``lost``: it did not come back with a saved state.
+         *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
          * @enum {string}
          */
         EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost";
@@ -1702,7 +1702,7 @@ export interface components {
          *
          *     Per lane its type, and the junction that it lies in. Per node ``speed_limit`` in m/s, if there
          *     is one, ``left_lane`` and ``right_lane`` (-1 if there is none), and whether it is ``spawnable``:
-         *     1 where the simulator can place somebody exactly.
+         *     1 where the simulator can place a road user exactly.
          */
         GraphColumns: {
             /** Lane Keys */
@@ -1766,7 +1766,7 @@ export interface components {
         };
         /**
          * GridlockInfo
-         * @description Where traffic got stuck: how often, and the first of the places.
+         * @description Gridlock and teleports: how often, and the first of the places.
          */
         GridlockInfo: {
             /** Jams */
@@ -1909,8 +1909,8 @@ export interface components {
          * IncidentKind
          * @description What can go wrong with traffic at a place.
          *
-         *     ``jam``: vehicles stand there for minutes; ``moved_on``: SUMO has teleported a vehicle, that is
-         *     taken it out and put it back further on; ``kept_out``: planned, but not inserted.
+         *     ``jam``: vehicles are stopped there for minutes; ``moved_on``: SUMO has teleported a vehicle,
+         *     that is removed it and put it back further on; ``kept_out``: planned, but not inserted.
          * @enum {string}
          */
         IncidentKind: "jam" | "moved_on" | "kept_out";
@@ -1970,7 +1970,7 @@ export interface components {
         };
         /**
          * LightInfo
-         * @description A traffic light: its SUMO id, by which live states are told, and what scenarios call it.
+         * @description A traffic light: its SUMO id, by which live states are reported, and what scenarios call it.
          *
          *     ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
          *     of its state, the OpenDRIVE signals that show it.
@@ -2024,7 +2024,7 @@ export interface components {
         };
         /**
          * MapInfo
-         * @description A map of the catalogue; ``report_counts`` says how many elements had which fate.
+         * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
          */
         MapInfo: {
             /** Name */
@@ -2265,7 +2265,7 @@ export interface components {
         };
         /**
          * Path
-         * @description Shortest way inside the region, with [x, y] of its nodes; empty if there is none.
+         * @description Shortest path inside the region, with [x, y] of its nodes; empty if there is none.
          */
         Path: {
             /** Nodes */
@@ -2369,7 +2369,7 @@ export interface components {
         };
         /**
          * ReplayActor
-         * @description Somebody in a recording; metres.
+         * @description A road user in a recording; metres.
          */
         ReplayActor: {
             /** Id */
@@ -2471,7 +2471,7 @@ export interface components {
         };
         /**
          * RunEvents
-         * @description Incidents of a finished run, as the live view tells them; ``left_off`` were too many.
+         * @description Incidents of a finished run, as the live view reports them; ``left_off`` were too many.
          */
         RunEvents: {
             /** Events */
@@ -2624,7 +2624,7 @@ export interface components {
         };
         /**
          * RunStatus
-         * @description How a run ended; one that somebody has stopped early is ``completed``, too.
+         * @description How a run ended; one that a user has stopped early is ``completed``, too.
          * @enum {string}
          */
         RunStatus: "completed" | "failed";
@@ -3269,7 +3269,7 @@ export interface components {
          * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
          *
-         *     ``walkable`` is 1 where the simulator can place somebody exactly.
+         *     ``walkable`` is 1 where the simulator can place a road user exactly.
          */
         WalkColumns: {
             /** Lane Keys */
@@ -3347,7 +3347,7 @@ export interface components {
         };
         /**
          * LiveActor
-         * @description Somebody who will ever be in a frame, and the row by which frames name them; metres.
+         * @description A road user that will ever be in a frame, and the row by which frames name them; metres.
          */
         LiveActor: {
             /** Index */
