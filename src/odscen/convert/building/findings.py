@@ -9,25 +9,30 @@ import numpy as np
 from odscen.base.ids import LaneKey
 from odscen.convert.model.access import BICYCLE_TYPES, is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
+from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.model.connections import PlannedConnections
     from odscen.convert.model.net import Net
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
     from odscen.convert.signals.map_signals import SignalControl
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive, Signal
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
 AREA = 1.5
 """Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
+CROSSING_REACH = 20.0
+"""Metres from a crossing within which its pedestrian lights stand."""
 
 VARYING = 0.25
 """Metres that a lane's width may differ from its SUMO lane's without an entry."""
@@ -55,7 +60,7 @@ def findings(
         *_varying(table, lanes),
         *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
         *_crosswalks(odr, crosswalks),
-        *_signals(odr, net, control),
+        *_signals(odr, table, net, control),
     ]
     lengths = _lengths(odr, table, lanes)
     figures = {
@@ -67,6 +72,7 @@ def findings(
         "traffic_lights": float(len(net.lights)),
         "signals": float(sum(len(road.signals) for road in odr.roads.values())),
         "signals_unplaced": float(len(control.unplaced)),
+        "signals_guessed": float(len(control.guessed)),
         "roundabouts": float(len(net.roundabouts)),
     }
     return Findings((*_kept(lengths, found), *entries), figures)
@@ -173,23 +179,56 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
                 yield ReportEntry(ElementOutcome.LOST, element, "crosswalk without any size")
 
 
-def _signals(odr: OpenDrive, net: Net, control: SignalControl) -> Iterator[ReportEntry]:
-    unplaced = dict(control.unplaced)
+def _signals(
+    odr: OpenDrive, table: RoadTable, net: Net, control: SignalControl
+) -> Iterator[ReportEntry]:
+    unplaced, guessed = dict(control.unplaced), dict(control.guessed)
+    crossed = _lit_crossings(net)
     for road in odr.roads.values():
         for signal in road.signals:
             element = f"road {road.id} > signal {signal.id}"
             kind = signal_kind(signal)
             if element in unplaced:
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
+            elif element in guessed:
+                yield ReportEntry(ElementOutcome.GUESSED, element, guessed[element])
             elif kind in ("traffic_light", "stop", "yield"):
                 word = kind.replace("_", " ")
                 yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
             elif kind == "pedestrian_light":
-                reason = "every crossing of a junction with lights has a light, wherever poles are"
-                yield ReportEntry(ElementOutcome.GUESSED, element, reason)
+                yield _walk_light(element, table.road_index[road.id], signal, table, crossed)
+            elif signal.dynamic:
+                reason = (
+                    f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
+                )
+                yield ReportEntry(ElementOutcome.LOST, element, reason)
     if net.lights:
         reason = (
             f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "
             "timing; no two movements that meet have green together"
         )
         yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
+
+def _lit_crossings(net: Net) -> FloatArray:
+    """Points of the crossings that a light controls, shape ``(N, 2)``."""
+    lit = {link.target for link in net.links if link.light}
+    points = [
+        lane.shape[:, :2]
+        for edge in net.edges
+        if edge.id in lit and edge.function == CROSSING
+        for lane in edge.lanes
+    ]
+    return np.concatenate(points) if points else np.empty((0, 2))
+
+
+def _walk_light(
+    element: str, road: int, signal: Signal, table: RoadTable, crossed: FloatArray
+) -> ReportEntry:
+    x, y, _ = table.points(np.array([road]), np.array([signal.s]), np.array([signal.t]))
+    gaps = np.hypot(crossed[:, 0] - x, crossed[:, 1] - y)
+    if gaps.min(initial=np.inf) <= CROSSING_REACH:
+        reason = "every crossing of a junction with lights has a light, wherever poles are"
+        return ReportEntry(ElementOutcome.GUESSED, element, reason)
+    reason = f"pedestrian light: no crossing with a light within {CROSSING_REACH:.0f} m"
+    return ReportEntry(ElementOutcome.LOST, element, reason)
