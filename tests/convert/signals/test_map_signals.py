@@ -13,6 +13,7 @@ from odscen.convert.signals.signal_facing import (
     FAR_SIDE,
     WHOLE_JUNCTION,
 )
+from odscen.convert.verify.fidelity import verify
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive
 from tests.convert.legs import (
@@ -74,6 +75,18 @@ def test_lights_that_all_face_the_wrong_way_control_what_they_would_the_right_wa
     assert entries(wrong, ElementOutcome.GUESSED) == dict.fromkeys(LEGS, AWAY_FROM_HOME)
     assert wrong.network.report.figures["signals_guessed"] == 4
     assert wrong.network.report.figures["signals_unplaced"] == 0
+
+
+def test_verify_finds_the_lights_of_both_habits() -> None:
+    for text in (
+        crossing(lights(LIGHT, "-"), *CONTROLLERS, controllers=("a", "b")),
+        crossing(lights("traffic_light", "+")),
+    ):
+        network = made(text)
+        signals = verify(network.network.net_xml, network.odr, network.roads).signals
+        assert (signals.lights, signals.lost, signals.lost_lights, signals.invented) == (
+            4, (), (), ()
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["206", "205", LIGHT])
@@ -145,6 +158,12 @@ def test_a_pedestrian_light_without_a_crossing_is_lost() -> None:
     crossed = entries(of_model(read(named("signal_crossing").read_text("utf-8"))),
                       ElementOutcome.GUESSED)  # fmt: skip
     assert set(crossed) == {"3", "4", "7", "8", "11", "12", "15", "16"}
+
+
+def test_a_junction_whose_controller_names_nothing_is_lost() -> None:
+    network = made(crossing({}, '<controller id="a"/>', controllers=("a",)))
+    lost = {e.element: e.reason for e in network.network.report.entries if e.outcome == "lost"}
+    assert "controller a names no signal" in lost["junction 9"]
 
 
 def test_signals_with_one_id_are_each_kept_or_lost() -> None:

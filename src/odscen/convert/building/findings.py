@@ -202,12 +202,25 @@ def _signals(
                     f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
                 )
                 yield ReportEntry(ElementOutcome.LOST, element, reason)
+    yield from _bare_controllers(odr, net)
     if net.lights:
         reason = (
             f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "
             "timing; no two movements that meet have green together"
         )
         yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
+
+def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:
+    """Junctions that stay without lights because their controllers name no signal of the file."""
+    lit = {
+        name for one in net.junctions if one.type == "traffic_light" for name in one.xodr.split()
+    }
+    for junction in odr.junctions.values():
+        bare = [key for key in junction.controllers if not odr.controllers[key].controls]
+        if bare and junction.id not in lit:
+            reason = f"no lights: controller {bare[0]} names no signal of the file"
+            yield ReportEntry(ElementOutcome.LOST, f"junction {junction.id}", reason)
 
 
 def _lit_crossings(net: Net) -> FloatArray:
