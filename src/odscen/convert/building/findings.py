@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.ids import LaneKey
+from odscen.convert.building.one_way import one_way_ends
 from odscen.convert.model.access import BICYCLE_TYPES, is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
+from odscen.convert.model.edge_plan import LEAST_WIDTH
 from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+from odscen.opendrive.topology import dead_ends
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
     from odscen.convert.signals.map_signals import SignalControl
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Signal
+
+BOTH_WAYS = "bidirectional"
+"""Lane type (up to 1.7) of lanes for both directions, mostly for turning left from the middle."""
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
@@ -55,10 +61,13 @@ def findings(
     crosswalks: Sequence[PlacedCrosswalk],
 ) -> Findings:
     """Say what became of each element."""
+    nowhere = list(_leading_nowhere(odr, table))
     entries = [
         *_lanes(odr, table, lanes),
         *_varying(table, lanes),
         *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
+        *nowhere,
+        *one_way_ends(odr, table, found),
         *_crosswalks(odr, crosswalks),
         *_signals(odr, table, net, control),
     ]
@@ -66,7 +75,7 @@ def findings(
     figures = {
         **lengths,
         "connections": float(len(found.connections)),
-        "connections_lost": float(len(found.lost)),
+        "connections_lost": float(len(found.lost) + len(nowhere)),
         "crosswalks": float(len(crosswalks)),
         "crossings": float(net.counts()["crossings"]),
         "traffic_lights": float(len(net.lights)),
@@ -98,6 +107,16 @@ def _place(road: str, section: int, lane: int) -> str:
     return f"road {road} > laneSection {section} > lane {lane}"
 
 
+def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
+    """Connecting lanes that no connection leads over: the table says nothing, nor does geometry."""
+    for lane, end, leads in dead_ends(odr):
+        s = np.array([0.0 if end == "start" else odr.roads[lane.road].length])
+        if table.lane_width(np.array([table.lane_index[lane]]), s)[0] >= LEAST_WIDTH:
+            what = "leads to no lane" if leads else "is reached from no lane"
+            reason = f"connecting lane {what}, and not exactly one meets it there"
+            yield ReportEntry(ElementOutcome.LOST, _place(*lane), reason)
+
+
 def _covered(lanes: LaneTable) -> dict[object, float]:
     """Metres of s of each lane that have a SUMO lane."""
     covered: dict[object, float] = {}
@@ -120,8 +139,13 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
                     f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
                 )
                 yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+            if odr.roads[key.road].sections[key.section].lanes[key.lane].direction == "both":
+                reason = "open both ways; SUMO has it in one direction only, that of its side"
+                yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
         elif kind not in ("none", ""):
             reason = f"lanes of type {kind} are open to no road user and left out"
+            if kind == BOTH_WAYS:
+                reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
 
 
