@@ -104,6 +104,42 @@ def test_one_signal_that_faces_away_among_others_is_believed_and_lost() -> None:
     assert set(entries(network, ElementOutcome.LOST)) == {"2"}
 
 
+def two_junctions(*on_leg: str) -> str:
+    """The crossing with signals on leg 1, whose other end, 60 m back, is at a junction as well."""
+    behind = '<link><predecessor elementType="junction" elementId="8"/>'
+    west = '<geometry s="0" x="{}" y="0" hdg="3.141592653589793" length="{}"><line/></geometry>'
+    on = '<link><predecessor id="1"/><successor id="-1"/></link>'
+    through = road(
+        "80",
+        length=20.0,
+        plan=west.format(-70, 20),
+        lanes=section(lane(-1, inside=on)),
+        link='<predecessor elementType="road" elementId="1" contactPoint="start"/>'
+        '<successor elementType="road" elementId="5" contactPoint="start"/>',
+        junction="8",
+    )
+    beyond = road("5", length=60.0, plan=west.format(-90, 60), lanes=section(lane(-1)))
+    table = (
+        '<junction id="8" name=""><connection id="0" incomingRoad="1" connectingRoad="80" '
+        'contactPoint="start"><laneLink from="1" to="-1"/></connection></junction>'
+    )
+    others = [leg(name, signal(int(name), "206", "-")) for name in ("2", "3", "4")]
+    first = leg("1", *on_leg).replace("<link>", behind, 1)
+    ways = [way(name) for name in LEGS]
+    parts = (first, *others, *ways, through, beyond, table)
+    return document(*parts, junction(*(entry(name) for name in LEGS)))
+
+
+@pytest.mark.parametrize("orientation", ["-", "+"])
+def test_a_sign_is_for_the_junction_at_which_it_stands_and_not_the_other(orientation: str) -> None:
+    network = made(two_junctions(signal(1, "206", orientation), signal(6, "206", "-")))
+    kinds = {j.get("id"): j.get("type") for j in network.xml.iter("junction")}
+    assert kinds["J9"] == "allway_stop"
+    assert kinds["J8"] == "priority"
+    guesses = set(entries(network, ElementOutcome.GUESSED))
+    assert guesses == {"2", "3", "4", "6"} | ({"1"} if orientation == "-" else set())
+
+
 def test_a_light_beyond_its_junction_is_for_the_approach_before_it() -> None:
     text = document(
         leg("1"),

@@ -123,11 +123,11 @@ def settle_signals(
         As :func:`signal_homes` gives them.
     """
     settled = [SettledSignal(place, tuple(reach.controls(place))) for place in places]
-    backwards = _all_face_away([p for p in places if p.signal not in homes], reach)
+    backwards = _facing_away(places, reach, homes)
     astray = _astray(settled, homes)
     settled = [
         _reversed(one, reach, homes.get(one.place.signal))
-        if one.place.signal in astray or (backwards and one.place.signal not in homes)
+        if one.place.signal in astray or one.place in backwards
         else one
         for one in settled
     ]
@@ -182,17 +182,29 @@ def _replaced(one: SettledSignal, numbers: Sequence[int], guess: str) -> Settled
     return SettledSignal(one.place, tuple(numbers), guess) if numbers else one
 
 
-def _all_face_away(places: Iterable[Acting], reach: SignalReach) -> bool:
-    """Whether signals that stand at one junction mostly face another, or none."""
-    away = towards = 0
-    for place in places:
-        if _flipped(place) is None:
-            continue
-        growing = place.orientation == "+"
-        ahead = reach.distance(place, growing=growing)
-        behind = reach.distance(place, growing=not growing)
-        nearer = min(ahead, behind)
-        if math.isfinite(nearer) and nearer <= STANDS_NEAR < abs(ahead - behind):
-            away += behind < ahead
-            towards += ahead < behind
-    return away > 0 and away >= REVERSED_SHARE * (away + towards)
+def _looks(place: Acting, reach: SignalReach) -> int:
+    """1 if a signal faces the junction at which it stands, -1 if it faces away, 0 if unclear."""
+    if _flipped(place) is None:
+        return 0
+    growing = place.orientation == "+"
+    ahead = reach.distance(place, growing=growing)
+    behind = reach.distance(place, growing=not growing)
+    nearer = min(ahead, behind)
+    if not math.isfinite(nearer) or nearer > STANDS_NEAR or abs(ahead - behind) <= STANDS_NEAR:
+        return 0
+    return 1 if ahead < behind else -1
+
+
+def _facing_away(
+    places: Sequence[Acting], reach: SignalReach, homes: Mapping[str, frozenset[int]]
+) -> frozenset[Acting]:
+    """Places without a controller's junction to be taken reversed: none, or all of the file.
+
+    All but those that do face the junction at which they stand.
+    """
+    looks = {place: _looks(place, reach) for place in places if place.signal not in homes}
+    away = sum(look < 0 for look in looks.values())
+    towards = sum(look > 0 for look in looks.values())
+    if not away or away < REVERSED_SHARE * (away + towards):
+        return frozenset()
+    return frozenset(place for place, look in looks.items() if look <= 0)
