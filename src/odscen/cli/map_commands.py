@@ -264,6 +264,7 @@ def _print_fidelity(name: str, fidelity: Fidelity) -> None:
             f"lost: {', '.join(signals.lost) or 'none'}; "
             f"invented: {', '.join(signals.invented) or 'none'}",
         ),
+        ("traffic lights", f"{signals.lights}; lost: {', '.join(signals.lost_lights) or 'none'}"),
     ]
     print_table("", (), counts)
     worst = list(_worst(fidelity))

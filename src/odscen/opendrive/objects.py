@@ -272,14 +272,31 @@ _NAMES: Final[tuple[tuple[str, SignalKind], ...]] = (
 )
 
 
+# Types in words, as converters from OpenStreetMap and some editors write them; letters only.
+_WORDS: Final[tuple[tuple[str, SignalKind], ...]] = (
+    (r"(pedestrian|walk|crossing)(traffic)?(light|signal)s?", "pedestrian_light"),
+    (r"traffic(light|signal)s?", "traffic_light"),
+    (r"(allway)?stop(sign)?", "stop"),
+    (r"(yield|giveway)(sign)?", "yield"),
+    (r"(max)?speed(limit)?(sign)?", "speed_limit"),
+)
+
+
 def signal_kind(signal: Signal) -> SignalKind:
-    """What a signal means for traffic: by its type, or by its name where there is no type."""
-    kind = _KINDS.get(signal.type.lower()) or _KINDS.get(f"{signal.type}{signal.subtype}".lower())
+    """What a signal means for traffic: by its type, or by its name where there is no type.
+
+    A type is a number of a catalogue, or a word: ``traffic_light``, ``give_way``, ``stop``.
+    """
+    code = signal.type.lower()
+    if code.startswith("1.000."):  # as the tables of 1.4 print them
+        code = code.replace(".", "")
+    kind = _KINDS.get(code) or _KINDS.get(f"{code}{signal.subtype.lower()}")
     if kind is not None:
         return kind
-    if signal.dynamic and signal.type.startswith("10000"):
+    if signal.dynamic and code.startswith("10000"):
         return "traffic_light"
-    if signal.type in {"", "-1", "none"}:
+    if code in {"", "-1", "none"}:
         name = signal.name.lower()
         return next((kind for pattern, kind in _NAMES if re.search(pattern, name)), "other")
-    return "other"
+    word = re.sub(r"[^a-z]", "", code)
+    return next((kind for pattern, kind in _WORDS if re.fullmatch(pattern, word)), "other")

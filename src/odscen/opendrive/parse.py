@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import re
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.base.errors import in_file
 from odscen.opendrive.parse_checks import check_numbers
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_references import check_references
+from odscen.opendrive.parse_repairs import repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
 from odscen.opendrive.parse_xml import (
@@ -91,7 +93,8 @@ def _parse_root(root: Element) -> OpenDrive:
         _add(controllers, controller.id, controller, element)
     check_numbers(roads, notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
-    return OpenDrive(header, roads, junctions, controllers, notes.sentences())
+    odr = repair_junction_tables(OpenDrive(header, roads, junctions, controllers), notes)
+    return replace(odr, notes=notes.sentences())
 
 
 def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:

@@ -20,6 +20,8 @@ class Rule(StrEnum):
     """A road without ``junction``, or with an empty one, belongs to no junction."""
     DANGLING_LINK = "dangling-link"
     """A reference to something that is not in the file is left out: the road or lane ends there."""
+    JUNCTION_TABLE = "junction-table"
+    """A connecting lane that leads nowhere is joined to the one lane that it meets in the plane."""
     MISSING_CONTACT = "missing-contact-point"
     """A road link without ``contactPoint`` is left out: which end it means is not guessed."""
     DUPLICATE_ID = "duplicate-id"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
+from odscen.opendrive.road_model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -163,6 +164,41 @@ def _incoming_ends(
         for end, own in ends
         if own is not None and own.element_type == "junction" and own.element_id == junction.id
     )
+
+
+class DeadEnd(NamedTuple):
+    """A drivable lane at an end of a connecting road without a lane behind it, or before it.
+
+    ``leads`` says which: whether traffic would drive on from there, or come from there.
+    """
+
+    lane: LaneKey
+    end: End
+    leads: bool
+
+
+def dead_ends(odr: OpenDrive) -> tuple[DeadEnd, ...]:
+    """Connecting lanes that lead nowhere, or that nothing leads to, in the order of the file.
+
+    Lanes that begin or end in the section, and those of virtual junctions, which begin beside a
+    lane (:func:`side_links`), are none.
+    """
+    successors = lane_successors(odr)
+    reached = {there for following in successors.values() for there in following}
+    beside = {(side.other, side.leaves) for side in side_links(odr)}
+    found: list[DeadEnd] = []
+    for key, following in successors.items():
+        road = odr.roads[key.road]
+        lane = road.sections[key.section].lanes[key.lane]
+        if road.junction is None or lane.type not in DRIVABLE_TYPES:
+            continue
+        forward = is_forward(road, lane)
+        ends: tuple[End, End] = ("start", "end") if forward else ("end", "start")
+        for end, leads, joined in ((ends[0], False, key in reached), (ends[1], True, following)):
+            at_end = key.section == end_section(road, end)
+            if at_end and not joined and (key, not leads) not in beside:
+                found.append(DeadEnd(key, end, leads))
+    return tuple(found)
 
 
 class SideLink(NamedTuple):

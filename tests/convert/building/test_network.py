@@ -17,6 +17,7 @@ from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+from tests.convert.legs import crossing
 from tests.convert.maps import Converted, converted, each_map, named, of_model
 from tests.opendrive.snippets import document, lane, road, section
 
@@ -185,3 +186,16 @@ def test_build_network_needs_nothing_but_the_model() -> None:
     roads = RoadTable.of(odr)
     made = of_model(odr)
     assert build_network(odr, roads, made.graph.walks).net_xml == made.network.net_xml
+
+
+def test_a_faulty_junction_table_makes_the_network_of_the_sound_one() -> None:
+    sound = crossing({})
+    bare = sound.replace('<laneLink from="-1" to="-1"/>', "").replace(
+        '<successor id="1"/>', '<successor id="-9"/>'
+    )
+    network = of_model(parse(bare)).network
+    assert network.net_xml == of_model(parse(sound)).network.net_xml
+    repaired = [e for e in network.report.entries if "junction-table" in e.reason]
+    assert {e.outcome for e in repaired} == {ElementOutcome.REPAIRED}
+    assert len(repaired) == 8
+    assert network.report.figures["connections_lost"] == 0

@@ -167,10 +167,36 @@ def test_junctions_with_lights_are_compared_by_place():
     table = RoadTable.of(lit)
     kept = verify(bytes(replace(HandNet(), states=("Gr", "rG"))), lit, table).signals
     assert (kept.opendrive, kept.sumo, kept.lost, kept.invented) == (1, 1, (), ())
-    lost = verify(bytes(HandNet()), lit, table).signals
-    assert (lost.sumo, lost.lost) == (0, ("9",))
+    fidelity = verify(bytes(HandNet()), lit, table)
+    assert (fidelity.signals.sumo, fidelity.signals.lost) == (0, ("9",))
+    assert broken(fidelity) == {"junctions with lights lost"}
     invented = found(replace(HandNet(), states=("Gr", "rG"))).signals
     assert (invented.opendrive, invented.invented) == (0, ("j",))
+
+
+LIT = replace(HandNet(), states=("Gr", "rG"))
+
+
+LIGHT = '<signal s="39" t="-4" id="1" name="" dynamic="no" orientation="+" type="traffic_light"/>'
+
+
+@pytest.mark.parametrize(("net", "lost"), [(LIT, ()), (HandNet(), ("road 1 > signal 1",))])
+def test_a_light_on_an_approach_makes_no_invention_and_must_not_be_lost(net, lost):
+    odr = fork(sign=LIGHT)
+    fidelity = verify(bytes(net), odr, RoadTable.of(odr))
+    assert fidelity.signals.lights == 1
+    assert (fidelity.signals.opendrive, fidelity.signals.invented) == (0, ())
+    assert fidelity.signals.lost_lights == lost
+    assert broken(fidelity) == ({"traffic lights lost"} if lost else set())
+
+
+def test_a_light_far_from_all_that_lights_control_is_lost():
+    far = road("8", section(lane(-1)), y=300.0, length=40.0).replace(
+        "</road>", f"<signals>{LIGHT}</signals></road>"
+    )
+    odr = network(road("1", section(lane(-1)), length=40.0), far)
+    fidelity = verify(bytes(HandNet()), odr, RoadTable.of(odr))
+    assert fidelity.signals.lost_lights == ("road 8 > signal 1",)
 
 
 def test_a_controller_of_signs_alone_is_no_light():

@@ -7,27 +7,38 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.ids import LaneKey
+from odscen.convert.building.one_way import one_way_ends
 from odscen.convert.model.access import BICYCLE_TYPES, is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
+from odscen.convert.model.edge_plan import LEAST_WIDTH
+from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
+from odscen.opendrive.topology import dead_ends
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.model.connections import PlannedConnections
     from odscen.convert.model.net import Net
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
     from odscen.convert.signals.map_signals import SignalControl
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive, Signal
+
+BOTH_WAYS = "bidirectional"
+"""Lane type (up to 1.7) of lanes for both directions, mostly for turning left from the middle."""
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
 AREA = 1.5
 """Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
+CROSSING_REACH = 20.0
+"""Metres from a crossing within which its pedestrian lights stand."""
 
 VARYING = 0.25
 """Metres that a lane's width may differ from its SUMO lane's without an entry."""
@@ -50,23 +61,27 @@ def findings(
     crosswalks: Sequence[PlacedCrosswalk],
 ) -> Findings:
     """Say what became of each element."""
+    nowhere = list(_leading_nowhere(odr, table))
     entries = [
         *_lanes(odr, table, lanes),
         *_varying(table, lanes),
         *(ReportEntry(ElementOutcome.LOST, _place(*lost.lane), lost.reason) for lost in found.lost),
+        *nowhere,
+        *one_way_ends(odr, table, found),
         *_crosswalks(odr, crosswalks),
-        *_signals(odr, net, control),
+        *_signals(odr, table, net, control),
     ]
     lengths = _lengths(odr, table, lanes)
     figures = {
         **lengths,
         "connections": float(len(found.connections)),
-        "connections_lost": float(len(found.lost)),
+        "connections_lost": float(len(found.lost) + len(nowhere)),
         "crosswalks": float(len(crosswalks)),
         "crossings": float(net.counts()["crossings"]),
         "traffic_lights": float(len(net.lights)),
         "signals": float(sum(len(road.signals) for road in odr.roads.values())),
         "signals_unplaced": float(len(control.unplaced)),
+        "signals_guessed": float(len(control.guessed)),
         "roundabouts": float(len(net.roundabouts)),
     }
     return Findings((*_kept(lengths, found), *entries), figures)
@@ -92,6 +107,16 @@ def _place(road: str, section: int, lane: int) -> str:
     return f"road {road} > laneSection {section} > lane {lane}"
 
 
+def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
+    """Connecting lanes that no connection leads over: the table says nothing, nor does geometry."""
+    for lane, end, leads in dead_ends(odr):
+        s = np.array([0.0 if end == "start" else odr.roads[lane.road].length])
+        if table.lane_width(np.array([table.lane_index[lane]]), s)[0] >= LEAST_WIDTH:
+            what = "leads to no lane" if leads else "is reached from no lane"
+            reason = f"connecting lane {what}, and not exactly one meets it there"
+            yield ReportEntry(ElementOutcome.LOST, _place(*lane), reason)
+
+
 def _covered(lanes: LaneTable) -> dict[object, float]:
     """Metres of s of each lane that have a SUMO lane."""
     covered: dict[object, float] = {}
@@ -114,8 +139,13 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
                     f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: nothing leads there"
                 )
                 yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
+            if odr.roads[key.road].sections[key.section].lanes[key.lane].direction == "both":
+                reason = "open both ways; SUMO has it in one direction only, that of its side"
+                yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
         elif kind not in ("none", ""):
             reason = f"lanes of type {kind} are open to no road user and left out"
+            if kind == BOTH_WAYS:
+                reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
 
 
@@ -173,23 +203,69 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
                 yield ReportEntry(ElementOutcome.LOST, element, "crosswalk without any size")
 
 
-def _signals(odr: OpenDrive, net: Net, control: SignalControl) -> Iterator[ReportEntry]:
-    unplaced = dict(control.unplaced)
+def _signals(
+    odr: OpenDrive, table: RoadTable, net: Net, control: SignalControl
+) -> Iterator[ReportEntry]:
+    unplaced, guessed = dict(control.unplaced), dict(control.guessed)
+    crossed = _lit_crossings(net)
     for road in odr.roads.values():
         for signal in road.signals:
             element = f"road {road.id} > signal {signal.id}"
             kind = signal_kind(signal)
             if element in unplaced:
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
+            elif element in guessed:
+                yield ReportEntry(ElementOutcome.GUESSED, element, guessed[element])
             elif kind in ("traffic_light", "stop", "yield"):
                 word = kind.replace("_", " ")
                 yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
             elif kind == "pedestrian_light":
-                reason = "every crossing of a junction with lights has a light, wherever poles are"
-                yield ReportEntry(ElementOutcome.GUESSED, element, reason)
+                yield _walk_light(element, table.road_index[road.id], signal, table, crossed)
+            elif signal.dynamic:
+                reason = (
+                    f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
+                )
+                yield ReportEntry(ElementOutcome.LOST, element, reason)
+    yield from _bare_controllers(odr, net)
     if net.lights:
         reason = (
             f"{len(net.lights)} traffic lights have programs of odscen's own: OpenDRIVE has no "
             "timing; no two movements that meet have green together"
         )
         yield ReportEntry(ElementOutcome.GUESSED, "map", reason)
+
+
+def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:
+    """Junctions that stay without lights because their controllers name no signal of the file."""
+    lit = {
+        name for one in net.junctions if one.type == "traffic_light" for name in one.xodr.split()
+    }
+    for junction in odr.junctions.values():
+        bare = [key for key in junction.controllers if not odr.controllers[key].controls]
+        if bare and junction.id not in lit:
+            reason = f"no lights: controller {bare[0]} names no signal of the file"
+            yield ReportEntry(ElementOutcome.LOST, f"junction {junction.id}", reason)
+
+
+def _lit_crossings(net: Net) -> FloatArray:
+    """Points of the crossings that a light controls, shape ``(N, 2)``."""
+    lit = {link.target for link in net.links if link.light}
+    points = [
+        lane.shape[:, :2]
+        for edge in net.edges
+        if edge.id in lit and edge.function == CROSSING
+        for lane in edge.lanes
+    ]
+    return np.concatenate(points) if points else np.empty((0, 2))
+
+
+def _walk_light(
+    element: str, road: int, signal: Signal, table: RoadTable, crossed: FloatArray
+) -> ReportEntry:
+    x, y, _ = table.points(np.array([road]), np.array([signal.s]), np.array([signal.t]))
+    gaps = np.hypot(crossed[:, 0] - x, crossed[:, 1] - y)
+    if gaps.min(initial=np.inf) <= CROSSING_REACH:
+        reason = "every crossing of a junction with lights has a light, wherever poles are"
+        return ReportEntry(ElementOutcome.GUESSED, element, reason)
+    reason = f"pedestrian light: no crossing with a light within {CROSSING_REACH:.0f} m"
+    return ReportEntry(ElementOutcome.LOST, element, reason)

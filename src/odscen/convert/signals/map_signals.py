@@ -7,20 +7,25 @@ controls the connections that run over it; on any other road it controls the nex
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.convert.model.right_of_way import Sign
+import numpy as np
+
+from odscen.convert.model.right_of_way import Sign, wrapped
+from odscen.convert.signals.signal_facing import Acting, settle_signals, signal_homes
 from odscen.opendrive.objects import signal_kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Set as AbstractSet
 
     from odscen.base.ids import RoadId
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
     from odscen.convert.model.lane_alignment import LaneAlignment
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference, Validity
+    from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference
 
 REACH = 80.0
 """Metres ahead of a signal on a road within which the junction that it controls must come."""
@@ -28,60 +33,43 @@ REACH = 80.0
 BEHIND = 5.0
 """Metres past the end of an edge where its signals may be, as beyond a stop line."""
 
+STRAIGHT = math.radians(45.0)
+"""A movement that turns by less comes straight towards what stands behind the junction."""
+
 SIGN_KINDS = {"stop": Sign.STOP, "yield": Sign.YIELD}
-
-
-class Acting(NamedTuple):
-    """One place where a signal acts."""
-
-    signal: str
-    kind: str
-    road: RoadId
-    s: float
-    orientation: str
-    validities: tuple[Validity, ...]
-
-    def applies_to(self, lane_id: int) -> bool:
-        """Whether it is valid for a lane; without validity it is for all."""
-        if not self.validities:
-            return True
-        return any(
-            min(v.from_lane, v.to_lane) <= lane_id <= max(v.from_lane, v.to_lane)
-            for v in self.validities
-        )
-
-    def faces(self, *, growing: bool) -> bool:
-        """Whether it faces traffic that runs with growing s, or else against it.
-
-        Where a validity names lanes, these decide: tools write the orientation of the pole.
-        """
-        if self.validities:
-            return True
-        return {"+": growing, "-": not growing}.get(self.orientation, True)
 
 
 class SignalControl(NamedTuple):
     """What controls each connection: ids of traffic lights, and the strongest sign.
 
-    ``unplaced`` are signals that control nothing, with the reason.
+    ``unplaced`` are signals that control nothing, with the reason; ``guessed`` are those that do
+    not control what the file says, but what it must mean.
     """
 
     lights: tuple[tuple[str, ...], ...]
     signs: tuple[Sign, ...]
     unplaced: tuple[tuple[str, str], ...]
+    guessed: tuple[tuple[str, str], ...]
 
 
 def acting(odr: OpenDrive) -> Iterator[Acting]:
     """All places where traffic lights, stop and yield signs act, in the order of the file."""
-    kinds = {
-        signal.id: signal_kind(signal) for road in odr.roads.values() for signal in road.signals
-    }
+    known: dict[str, tuple[str, str]] = {}
+    for road in odr.roads.values():
+        for signal in road.signals:
+            element = f"road {road.id} > signal {signal.id}"
+            known.setdefault(signal.id, (signal_kind(signal), element))
     for road in odr.roads.values():
         signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
-        for one in signals:
-            kind = kinds.get(one.id, "other")
+        for number, one in enumerate(signals):
+            kind, element = known.get(one.id, ("other", ""))
+            if number < len(road.signals):
+                kind, element = (
+                    signal_kind(road.signals[number]),
+                    f"road {road.id} > signal {one.id}",
+                )
             if kind == "traffic_light" or kind in SIGN_KINDS:
-                yield Acting(one.id, kind, road.id, one.s, one.orientation, one.validities)
+                yield Acting(one.id, element, kind, road.id, one.s, one.orientation, one.validities)
 
 
 def signal_control(
@@ -101,38 +89,113 @@ def signal_control(
         Whether an edge (its position) ends at a place where traffic meets, and not only where the
         lanes of one road change.
     """
+    reach = _Reach(odr, table, edges, connections, is_junction)
+    homes = signal_homes(odr, [reach.junctions(number) for number in range(len(connections))])
+    settled = settle_signals(list(acting(odr)), reach, homes)
     lights: list[dict[str, None]] = [{} for _ in connections]
     signs = [Sign.NONE for _ in connections]
-    over: dict[RoadId, list[int]] = {}
-    leaving: dict[int, list[int]] = {}
-    for number, connection in enumerate(connections):
-        leaving.setdefault(connection.source, []).append(number)
-        for road in _roads(connection.alignment, table):
-            over.setdefault(road, []).append(number)
-    by_road: dict[tuple[int, bool], list[int]] = {}
-    for index, edge in enumerate(edges):
-        by_road.setdefault((edge.road, edge.forward), []).append(index)
-    placed: set[str] = set()
-    seen: dict[str, str] = {}
-    for place in acting(odr):
-        seen[place.signal] = f"road {place.road} > signal {place.signal}"
-        inside = odr.roads[place.road].junction is not None
-        if inside:
-            numbers = _on_connecting(place, table, connections, over)
-        else:
-            numbers = _ahead(place, table, edges, connections, by_road, leaving, is_junction)
+    for place, numbers, _ in settled:
         for number in numbers:
-            placed.add(place.signal)
             if place.kind == "traffic_light":
                 lights[number][place.signal] = None
             else:
                 signs[number] = max(signs[number], SIGN_KINDS[place.kind])
+    placed = {one.place.element for one in settled if one.numbers}
     unplaced = [
         (where, "it controls no movement: no lane within its validity leads to a junction near it")
-        for signal, where in seen.items()
-        if signal not in placed
+        for where in dict.fromkeys(one.place.element for one in settled)
+        if where not in placed
     ]
-    return SignalControl(tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced))
+    guessed = {one.place.element: one.guess for one in settled if one.guess}
+    return SignalControl(
+        tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced), tuple(guessed.items())
+    )
+
+
+class _Reach:
+    """Which connections lie before, behind and under signals."""
+
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        edges: Sequence[EdgePlan],
+        connections: Sequence[PlannedConnection],
+        is_junction: Callable[[int], bool],
+    ) -> None:
+        self._odr = odr
+        self._table = table
+        self._edges = edges
+        self._connections = connections
+        self._is_junction = is_junction
+        self._over: dict[RoadId, list[int]] = {}
+        self._leaving: dict[int, list[int]] = {}
+        for number, connection in enumerate(connections):
+            self._leaving.setdefault(connection.source, []).append(number)
+            for road in _roads(connection.alignment, table):
+                self._over.setdefault(road, []).append(number)
+        self._by_road: dict[tuple[int, bool], list[int]] = {}
+        for index, edge in enumerate(edges):
+            self._by_road.setdefault((edge.road, edge.forward), []).append(index)
+
+    def junctions(self, number: int) -> frozenset[str]:
+        """Junctions that a connection leads through."""
+        passed = _roads(self._connections[number].alignment, self._table)
+        return frozenset(str(self._odr.roads[road].junction) for road in passed) - {"None"}
+
+    def controls(self, place: Acting) -> list[int]:
+        """Connections under a place of a signal or, on roads outside junctions, ahead of it."""
+        if self._odr.roads[place.road].junction is not None:
+            return _on_connecting(place, self._table, self._connections, self._over)
+        found: list[int] = []
+        for growing in (True, False):
+            edge, _ = self._ahead(place, growing=growing)
+            if edge is None or not place.faces(growing=growing):
+                continue
+            for number in self._leaving.get(edge, ()):
+                last = self._edges[edge].lanes[self._connections[number].source_lane].alignment[-1]
+                if place.applies_to(int(self._table.lane_id[last.row])):
+                    found.append(number)
+        return found
+
+    def distance(self, place: Acting, *, growing: bool) -> float:
+        """Metres to the next junction, whichever way the signal faces."""
+        if self._odr.roads[place.road].junction is not None:
+            return math.inf
+        return abs(self._ahead(place, growing=growing)[1])
+
+    def _ahead(self, place: Acting, *, growing: bool) -> tuple[int | None, float]:
+        """Edge at the end of which the next junction comes, and metres to there."""
+        sign = 1.0 if growing else -1.0
+        gaps = [
+            (sign * (self._edges[n].end - place.s), n)
+            for n in self._by_road.get((self._table.road_index[place.road], growing), ())
+            if self._is_junction(n)
+        ]
+        gap, edge = min(((gap, n) for gap, n in gaps if gap > -BEHIND), default=(math.inf, None))
+        return (edge, gap) if gap <= REACH else (None, math.inf)
+
+    def before(self, place: Acting, home: AbstractSet[int]) -> list[int]:
+        """Connections of a junction whose edges come straight towards a road that leaves it."""
+        road = self._table.road_index[place.road]
+        straight = {
+            self._connections[number].source
+            for number in home
+            if self._edges[target := self._connections[number].target].road == road
+            and abs(self._edges[target].start - place.s) <= REACH
+            and abs(self._turn(self._connections[number])) < STRAIGHT
+        }
+        return sorted(n for n in home if self._connections[n].source in straight)
+
+    def _turn(self, connection: PlannedConnection) -> float:
+        """Change of heading, radians."""
+        last = self._edges[connection.source].lanes[connection.source_lane].alignment[-1]
+        first = self._edges[connection.target].lanes[connection.target_lane].alignment[0]
+        at = np.array([last.end, first.start])
+        rows = np.array([last.row, first.row])
+        back = ~self._table.lane_forward[rows]
+        headings = self._table.lane_points(rows, at).hdg + np.where(back, math.pi, 0.0)
+        return wrapped(float(headings[1] - headings[0]))
 
 
 def _roads(alignment: LaneAlignment, table: RoadTable) -> Iterator[RoadId]:
@@ -156,30 +219,3 @@ def _on_connecting(
             for stretch in connections[number].alignment
         )
     ]
-
-
-def _ahead(
-    place: Acting,
-    table: RoadTable,
-    edges: Sequence[EdgePlan],
-    connections: Sequence[PlannedConnection],
-    by_road: dict[tuple[int, bool], list[int]],
-    leaving: dict[int, list[int]],
-    is_junction: Callable[[int], bool],
-) -> list[int]:
-    road = table.road_index[place.road]
-    found: list[int] = []
-    for growing in (True, False):
-        if not place.faces(growing=growing):
-            continue
-        sign = 1.0 if growing else -1.0
-        own = sorted(by_road.get((road, growing), ()), key=lambda n: sign * edges[n].end)
-        ahead = [n for n in own if sign * (edges[n].end - place.s) > -BEHIND and is_junction(n)]
-        if not ahead or sign * (edges[ahead[0]].end - place.s) > REACH:
-            continue
-        edge = ahead[0]
-        for number in leaving.get(edge, ()):
-            last = edges[edge].lanes[connections[number].source_lane].alignment[-1]
-            if place.applies_to(int(table.lane_id[last.row])):
-                found.append(number)
-    return found

@@ -35,7 +35,8 @@ from odscen.convert.verify.lane_relations import (
 )
 from odscen.convert.verify.net_reader import read_net
 from odscen.convert.verify.polyline_finder import STEP, Finder, Polylines
-from odscen.convert.verify.signal_safety import compare_signals, unsafe_pairs
+from odscen.convert.verify.signal_coverage import compare_lights
+from odscen.convert.verify.signal_safety import unsafe_pairs
 from odscen.opendrive.objects import crosswalks
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
+    from odscen.base.ids import LaneKey
     from odscen.convert.verify.lane_relations import LanePair, RoadLane
     from odscen.convert.verify.net_reader import NetFile, NetFileLane
     from odscen.opendrive.lanes import RoadTable
@@ -101,7 +103,7 @@ def verify(net_xml: bytes, odr: OpenDrive, table: RoadTable) -> Fidelity:
         crosswalks=shown,
         lost_crosswalks=lost,
         cars_on_sidewalks=_cars_on(walkable, drivable, drives),
-        signals=compare_signals(net, odr, drivable.finder, drivable.junctions()),
+        signals=compare_lights(net, odr, drivable.finder, drivable.keys()),
         unsafe_pairs=unsafe_pairs(net),
         wrong_side=odr.rule != "mixed" and net.left_hand != (odr.rule == "LHT"),
     )
@@ -137,10 +139,9 @@ class _MapLanes:
         self.inside = self.lane_inside[self.places.owner]
         self.everywhere = np.ones_like(self.inside)
 
-    def junctions(self) -> list[str | None]:
-        """Junction of the road of each lane; shape ``(L,)``."""
-        keys = self.table.lane_keys
-        return [self.odr.roads[keys[row].road].junction for row in self.rows]
+    def keys(self) -> list[LaneKey]:
+        """The lanes; shape ``(L,)``."""
+        return [self.table.lane_keys[row] for row in self.rows]
 
     def covered(self, lanes: list[NetFileLane], *, directed: bool) -> BoolArray:
         """Whether each place has one of the lanes beside it."""
@@ -217,7 +218,7 @@ def _relations(
     net: NetFile, odr: OpenDrive, drivable: _MapLanes
 ) -> tuple[int, tuple[LaneRelation, ...], tuple[LaneRelation, ...]]:
     """Count the map's relations; list the missing and the invented ones."""
-    keys = [drivable.table.lane_keys[row] for row in drivable.rows]
+    keys = drivable.keys()
     stated = lane_relations(odr, keys)
     pieces = drivable.finder.pieces
     outer = Finder(pieces.take(~drivable.lane_inside[pieces.owner]))

@@ -106,12 +106,17 @@ class UnsafePair:
 
 @dataclass(frozen=True, slots=True)
 class SignalCoverage:
-    """Junctions with traffic lights: counts, and the ids of those that only one side has."""
+    """Junctions with traffic lights: counts, and the ids of those that only one side has.
+
+    ``lights`` counts the map's traffic lights; ``lost_lights`` control nothing in SUMO.
+    """
 
     opendrive: int
     sumo: int
     lost: tuple[str, ...]
     invented: tuple[str, ...]
+    lights: int = 0
+    lost_lights: tuple[str, ...] = ()
 
 
 class FidelityVerdict(NamedTuple):
@@ -192,6 +197,8 @@ class Fidelity:
             FidelityVerdict("sidewalks covered, share", self.sidewalks.share, MIN_SIDEWALKS, False),
             FidelityVerdict("crosswalks lost", len(self.lost_crosswalks), 0, True),
             FidelityVerdict("car lanes on sidewalks", len(self.cars_on_sidewalks), 0, True),
+            FidelityVerdict("junctions with lights lost", len(self.signals.lost), 0, True),
+            FidelityVerdict("traffic lights lost", len(self.signals.lost_lights), 0, True),
             FidelityVerdict("unsafe greens", len(self.unsafe_pairs), 0, True),
             FidelityVerdict("wrong side of the road", int(self.wrong_side), 0, True),
         )
