@@ -28,7 +28,9 @@ AWAY_FROM_HOME = "it faces away from the junction whose controller names it: tak
 AWAY_THROUGHOUT = (
     "signals of this file face away from the junctions at which they stand: taken reversed"
 )
-FAR_SIDE = "it stands behind the junction whose controller names it: taken for the approach before"
+FAR_SIDE = (
+    "it is placed beyond the junction whose controller names it: taken for the approach before"
+)
 WHOLE_JUNCTION = (
     "no lane leads from it to the junction whose controller names it: taken for all movements there"
 )
