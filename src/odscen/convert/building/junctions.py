@@ -21,7 +21,8 @@ from odscen.convert.model.net import (
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, requests
-from odscen.convert.signals.signal_programs import SignalGroup, plan_stages, program
+from odscen.convert.signals.shared_green import LightLinks, light_stages
+from odscen.convert.signals.signal_programs import program
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -124,11 +125,11 @@ def build_junction(
     conflicts = find_conflicts(movements, [crossing.walkway for crossing in crossings])
     signs = {movement.source[0]: movement.sign for movement in movements}
     all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
-    rules = Rules(around.high_low, lefthand=around.lefthand, all_stop=all_stop)
+    rules = Rules(around.high_low, around.lefthand, all_stop, signalled)
     rights = requests(movements, conflicts, rules)
     light, rows = None, dict[int, int]()
     if signalled:
-        light, rows = _light(name, passages, conflicts, crossings, around.controllers)
+        light, rows = _light(name, passages, conflicts, rights, crossings, around)
     equal = not any(signs.values()) and not around.high_low
     states = [
         _state(m, right, lit=n in rows, all_stop=all_stop, equal=equal)
@@ -283,8 +284,9 @@ def _light(
     name: str,
     passages: Sequence[Passage],
     conflicts: Conflicts,
+    rights: Sequence[Request],
     crossings: Sequence[PlacedCrossing],
-    controllers: Mapping[str, str],
+    around: Surroundings,
 ) -> tuple[TrafficLight, dict[int, int]]:
     """Traffic light of a junction, and the row in it of each link that it rules."""
     controlled = [n for n, passage in enumerate(passages) if passage.lights]
@@ -292,59 +294,19 @@ def _light(
     rows = {
         link: row for row, link in enumerate((*controlled, *range(count, count + len(crossings))))
     }
-    foes = set(conflicts.pairs)
-    foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
-    heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
-    for lane in _lanes_of(passages, controlled):
-        # Who waits for the green of one lane must not be held up by those who wait for another.
-        key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
-        own = heads.setdefault(key, [])
-        fitting = next((group for group in own if not _meet(lane, group, foes)), None)
-        if fitting is None:
-            own.append(lane)
-        else:
-            fitting += lane
-    groups: list[SignalGroup] = []
-    members: list[list[int]] = []
-    for (_, lights), parts in heads.items():
-        for links in parts:
-            groups.append(
-                SignalGroup(
-                    tuple(rows[n] for n in links),
-                    controllers.get(lights[0], ""),
-                    walkers=False,
-                    speed=max(passages[n].movement.speed for n in links),
-                    path=max(passages[n].length for n in links),
-                )
-            )
-            members.append(links)
-    for index, crossing in enumerate(crossings):
-        link = count + index
-        length = crossing.edge.length
-        groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0, path=length))
-        members.append([link])
-    meeting = frozenset(
-        (i, j)
-        for i, one in enumerate(members)
-        for j, other in enumerate(members[i + 1 :], start=i + 1)
-        if _meet(one, other, foes)
+    links = LightLinks(
+        movements=[passage.movement for passage in passages],
+        walkways=[crossing.walkway for crossing in crossings],
+        signals=[passage.lights for passage in passages],
+        controllers=[around.controllers.get(p.lights[0], "") if p.lights else "" for p in passages],
+        bicycles=["passenger" not in p.allowed and "bicycle" in p.allowed for p in passages],
+        conflicts=conflicts,
+        rights=rights,
+        side=-1.0 if around.lefthand else 1.0,
     )
-    phases = program(plan_stages(groups, meeting), len(rows))
+    phases = program(light_stages(links, rows), len(rows))
     signals = tuple(passages[n].lights if n < count else () for n in rows)
     return TrafficLight(name, phases, signals=signals), rows
-
-
-def _lanes_of(passages: Sequence[Passage], controlled: Sequence[int]) -> list[list[int]]:
-    """Links by the lane that they leave and the signals that control them, in order."""
-    found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
-    for link in controlled:
-        passage = passages[link]
-        found.setdefault((passage.movement.source, passage.lights), []).append(link)
-    return list(found.values())
-
-
-def _meet(one: Sequence[int], other: Sequence[int], foes: set[tuple[int, int]]) -> bool:
-    return any((min(a, b), max(a, b)) in foes for a in one for b in other)
 
 
 def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:
