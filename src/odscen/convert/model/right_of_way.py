@@ -9,7 +9,11 @@ meet, the first of these rules that distinguishes them decides:
 4. ``<priority>`` of the OpenDRIVE junction;
 5. where lanes only merge, the faster road goes first, and then the straighter movement;
 6. one who turns across gives way to oncoming traffic that does not;
-7. right before left (left before right where traffic keeps left).
+7. the major road, where there is one: junctions with lights, and large ones, have one
+   (:mod:`odscen.convert.model.major_road`);
+8. right before left (left before right where traffic keeps left).
+
+At lights, and among those from one road, the sixth rule comes before the fourth.
 
 Where all approaches have to stop, everybody waits for everybody else instead.
 """
@@ -187,12 +191,16 @@ def _crossed(
 
 
 class Rules(NamedTuple):
-    """What a junction says on right of way, beyond its movements."""
+    """What a junction says on right of way, beyond its movements.
+
+    ``major`` are the edges of the major road that lead there.
+    """
 
     high_low: frozenset[tuple[str, str]] = frozenset()
     lefthand: bool = False
     all_stop: bool = False
     signalled: bool = False
+    major: frozenset[str] = frozenset()
 
 
 def requests(
@@ -243,7 +251,7 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
             return one.speed < other.speed
         if abs(abs(one.turn) - abs(other.turn)) > 0.05:
             return abs(one.turn) > abs(other.turn)
-    return _waits_by_place(one, other, side)
+    return _waits_by_place(one, other, rules, side)
 
 
 def _stated(one: Movement, other: Movement, rules: Rules) -> bool | None:
@@ -269,11 +277,13 @@ def _turns_across(one: Movement, other: Movement, side: float) -> bool | None:
     return own_turn > their_turn if abs(own_turn - their_turn) > 0.1 else None
 
 
-def _waits_by_place(one: Movement, other: Movement, side: float) -> bool:
-    """Oncoming traffic before those who turn across, then right before left (``side`` 1)."""
+def _waits_by_place(one: Movement, other: Movement, rules: Rules, side: float) -> bool:
+    """Oncoming traffic before turns across it, the major road, then right before left."""
     turning = _turns_across(one, other, side)
     if turning is not None:
         return turning
+    if (one.source[0] in rules.major) != (other.source[0] in rules.major):
+        return other.source[0] in rules.major
     angle = side * wrapped(other.heading_in - one.heading_in)
     if 0.05 < abs(angle) <= OPPOSING:
         return angle > 0.0

@@ -50,6 +50,9 @@ STRAIGHT_SPEED, TURNING_SPEED, BICYCLE_SPEED = 10.0, 7.0, 5.0
 ENTERING_SPEED = 11.1
 """m/s at which the first of the next stage passes its stop line."""
 
+ENTERING_WALKER = 1.5
+"""m/s of the first persons of the next stage."""
+
 VEHICLE = 6.0
 """Metres of a vehicle that must have left."""
 
@@ -266,6 +269,12 @@ class _Sharing:
         if beginning < self._count:
             other = self._lines[beginning]
             seconds -= self._passed(other, self._place(ending), last=False) / ENTERING_SPEED
+        else:
+            axis = shapely.LineString(self._links.walkways[beginning - self._count].axis[:, :2])
+            ways = [
+                self._passed(one, self._place(ending), last=False) for one in (axis, axis.reverse())
+            ]
+            seconds -= min(ways) / ENTERING_WALKER
         return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
 
     def _place(self, link: int) -> shapely.Geometry:

@@ -23,8 +23,11 @@ from odscen.convert.model.net import STAGE, Phase
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-FLOW_RATIO = 0.6
-"""Sum of the critical flow ratios (Webster's Y) that programs are made for."""
+FLOW_RATIO = 0.4
+"""Sum of the critical flow ratios (Webster's Y) that programs are made for.
+
+Moderate traffic: a cycle for saturated roads would let everybody wait long on all others.
+"""
 
 SHORTEST_CYCLE = 40.0
 LONGEST_CYCLE = 120.0
