@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 LEAST_ROOM = 4.0
 """Metres between the stop line and the waiting place, at least."""
 
+WIDEST = 3.0
+"""Metres from the path of others at which one waits, at most; less between narrow lanes."""
+
 BEFORE = 0.5
 """Metres that are left free before the other path."""
 
@@ -68,7 +71,9 @@ def waiting_places(
             continue
         line = lines[number]
         places = [
-            lines[n].buffer(MOST_WIDTH) if n < len(movements) else areas[n - len(movements)]
+            lines[n].buffer(_clear(movement, movements[n]))
+            if n < len(movements)
+            else areas[n - len(movements)]
             for n in sorted(before)
         ]
         ways = [_reached(line, place) for place in places]
@@ -83,6 +88,11 @@ def waiting_places(
         if place >= LEAST_ROOM and line.length - place >= 1.0:
             found[number] = round(place, 2)
     return found
+
+
+def _clear(one: Movement, other: Movement) -> float:
+    """Metres between paths at which even a lorry that waits is not in the way of another."""
+    return max(MOST_WIDTH, min(WIDEST, 0.9 * min(one.width, other.width)))
 
 
 def _comes_towards(one: Movement, other: Movement) -> bool:
