@@ -477,7 +477,7 @@ from odscen.workspace.store import Workspace
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.worker.protocol import Pace
-from odscen.sumo.runner import run_prepared
+from odscen.sumo.runner.run_jobs import run_prepared
 workspace = Workspace.open(Path(sys.argv[1]))
 scenario = read_scenario(workspace.scenarios / f"{sys.argv[2]}.scenario.json")
 entry = workspace.map("signal_crossing")
