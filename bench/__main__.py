@@ -9,7 +9,6 @@ ALL = (
     "startup",
     "lane_graph",
     "maps_add",
-    "capacity",
     "recording",
     "long_run",
     "live_view",

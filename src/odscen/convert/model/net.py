@@ -106,14 +106,10 @@ class NetLink:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Right of way of one link: which links it yields to and which it meets, by index.
-
-    ``waits_inside`` says that it yields at a place inside the junction, not at the stop line.
-    """
+    """Right of way of one link: which links it yields to and which it meets, by index."""
 
     yields_to: frozenset[int]
     foes: frozenset[int]
-    waits_inside: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,10 +163,7 @@ class TrafficLight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """A whole network, in the order in which it is written.
-
-    ``inner_junctions`` are SUMO's internal ones, where vehicles wait within a junction.
-    """
+    """A whole network, in the order in which it is written."""
 
     offset: tuple[float, float]
     lefthand: bool
@@ -180,7 +173,6 @@ class Net:
     lights: tuple[TrafficLight, ...] = ()
     roundabouts: tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...] = ()
     flat: bool = field(default=False)
-    inner_junctions: tuple[NetJunction, ...] = ()
 
     @property
     def boundary(self) -> tuple[float, float, float, float]:
@@ -226,8 +218,6 @@ class Net:
         for light in self.lights:
             lines += light_xml(light)
         for junction in self.junctions:
-            lines += self._junction(junction)
-        for junction in self.inner_junctions:
             lines += self._junction(junction)
         lines += [_link(link) for link in self.links]
         for nodes, edges in self.roundabouts:
@@ -276,7 +266,7 @@ class Net:
         for index, request in enumerate(junction.requests):
             yield (
                 f'        <request index="{index}" response="{_bits(request.yields_to, count)}"'
-                f' foes="{_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
+                f' foes="{_bits(request.foes, count)}" cont="0"/>'
             )
         if junction.xodr:
             yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'
