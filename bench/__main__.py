@@ -9,6 +9,7 @@ ALL = (
     "startup",
     "lane_graph",
     "maps_add",
+    "capacity",
     "recording",
     "long_run",
     "live_view",

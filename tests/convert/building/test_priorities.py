@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from xml.etree.ElementTree import Element
 
 import pytest
 
@@ -24,11 +25,22 @@ def stripped(*what: re.Pattern[str]) -> Converted:
     return of_model(parse(text))
 
 
+def _last(made: Converted, link: Element) -> str:
+    """The last internal lane of a connection: who turns across waits between two of them."""
+    via = link.get("via", "")
+    onwards = [
+        other.get("via")
+        for other in made.xml.iter("connection")
+        if f"{other.get('from')}_{other.get('fromLane')}" == via and other.get("via")
+    ]
+    return onwards[0] if onwards else via
+
+
 def waits(made: Converted, one: tuple[str, str], other: tuple[str, str]) -> bool:
     """Whether the connection between two roads waits for another one; one of both does."""
     links = [link for link in made.xml.iter("connection") if link.get("via")]
     roads = [(link.get("from").split(".")[0], link.get("to").split(".")[0]) for link in links]
-    via, via2 = (links[roads.index(pair)].get("via") for pair in (one, other))
+    via, via2 = (_last(made, links[roads.index(pair)]) for pair in (one, other))
     for junction in made.xml.iter("junction"):
         inner = junction.get("intLanes").split()
         if via in inner:

@@ -10,6 +10,9 @@ import numpy as np
 import shapely
 
 from odscen.base.ids import SumoEdgeId
+from odscen.convert.building.waiting_places import inner_junctions, waiting_places
+from odscen.convert.model.lane_alignment import divided_shape, drawn_length
+from odscen.convert.model.major_road import is_large, major_edges
 from odscen.convert.model.net import (
     INTERNAL,
     LEAST_LENGTH,
@@ -21,7 +24,8 @@ from odscen.convert.model.net import (
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, requests
-from odscen.convert.signals.signal_programs import SignalGroup, plan_stages, program
+from odscen.convert.signals.shared_green import LightLinks, light_stages
+from odscen.convert.signals.signal_programs import program
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,13 +91,20 @@ class Surroundings(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltJunction:
-    """The parts of a junction; ``lanes`` are the internal lanes of its passages, in their order."""
+    """The parts of a junction.
+
+    ``lanes`` are the internal lanes of its passages, in their order; of a passage whose vehicles
+    wait inside, the lane up to there. ``beyond`` has the lane after that place, and how many metres
+    from the stop line it is.
+    """
 
     junction: NetJunction
     inner: tuple[NetEdge, ...]
     links: tuple[NetLink, ...]
     light: TrafficLight | None
     lanes: tuple[NetLane, ...]
+    beyond: Mapping[int, tuple[NetLane, float]]
+    waiting: tuple[NetJunction, ...]
     conflicts: Conflicts
 
 
@@ -124,17 +135,30 @@ def build_junction(
     conflicts = find_conflicts(movements, [crossing.walkway for crossing in crossings])
     signs = {movement.source[0]: movement.sign for movement in movements}
     all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
-    rules = Rules(around.high_low, lefthand=around.lefthand, all_stop=all_stop)
+    cars = ["passenger" in passage.allowed for passage in passages]
+    unruled = not any(signs.values()) and not around.high_low
+    major: frozenset[str] = frozenset()
+    if signalled or (unruled and is_large(movements, cars)):
+        major = major_edges(movements, cars)
+    rules = Rules(around.high_low, around.lefthand, all_stop, signalled, major)
     rights = requests(movements, conflicts, rules)
     light, rows = None, dict[int, int]()
     if signalled:
-        light, rows = _light(name, passages, conflicts, crossings, around.controllers)
-    equal = not any(signs.values()) and not around.high_low
+        light, rows = _light(name, passages, conflicts, rights, crossings, around)
+    equal = unruled and not major
     states = [
-        _state(m, right, lit=n in rows, all_stop=all_stop, equal=equal)
+        _state(m, right, len(movements), lit=n in rows, all_stop=all_stop, equal=equal)
         for n, (m, right) in enumerate(zip(movements, rights, strict=False))
     ]
-    lanes, inner, links = _passages(name, passages, states, rows)
+    places = waiting_places(
+        movements,
+        [crossing.walkway for crossing in crossings],
+        rights,
+        [car and not all_stop and not equal for car in cars],
+        side=-1.0 if around.lefthand else 1.0,
+        lit=signalled,
+    )
+    inside = _Inside(name, passages, states, rows, places)
     walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
     kind = "traffic_light" if signalled else "allway_stop" if all_stop else ""
@@ -142,18 +166,29 @@ def build_junction(
         yielding = Sign.STOP in signs.values()
         kind = "priority_stop" if yielding else "right_before_left" if equal else "priority"
         kind = "priority" if not conflicts.pairs else kind
+    last = [inside.beyond[n][0] if n in places else lane for n, lane in enumerate(inside.lanes)]
     junction = NetJunction(
         name,
         kind if passages or crossings else "dead_end",
         around.place,
         around.outline,
         tuple(dict.fromkeys((*_sources(passages), *around.incoming, *starts))),
-        (*(lane.id for lane in lanes), *(edge.lanes[0].id for edge in walked)),
-        rights,
+        (*(lane.id for lane in last), *(edge.lanes[0].id for edge in walked)),
+        tuple(replace(right, waits_inside=n in places) for n, right in enumerate(rights)),
         around.xodr,
     )
+    waiting = inner_junctions(
+        name, movements, rights, {n: lane for n, (lane, _) in inside.beyond.items()}
+    )
     return BuiltJunction(
-        junction, (*inner, *walked), (*links, *walk_links), light, tuple(lanes), conflicts
+        junction,
+        (*inside.edges, *walked),
+        (*inside.links, *walk_links),
+        light,
+        tuple(inside.lanes),
+        inside.beyond,
+        waiting,
+        conflicts,
     )
 
 
@@ -176,10 +211,13 @@ def _obeying(passages: Sequence[Passage]) -> list[Passage]:
     return result
 
 
-def _state(movement: Movement, right: Request, *, lit: bool, all_stop: bool, equal: bool) -> str:
-    """SUMO's letter for the right of way of a link."""
+def _state(
+    movement: Movement, right: Request, count: int, *, lit: bool, all_stop: bool, equal: bool
+) -> str:
+    """SUMO's letter for the right of way of a link; its first ``count`` links are for vehicles."""
     if lit:
-        return "o" if right.yields_to else "O"
+        # Persons are waited for whatever the letter; it says whether vehicles are.
+        return "o" if any(other < count for other in right.yields_to) else "O"
     if all_stop:
         return "w"
     if movement.sign is Sign.STOP:
@@ -209,46 +247,75 @@ def _swept(passage: Passage) -> float:
     return min(BUS_LENGTH**2 / (8.0 * radius), MOST_SWEPT)
 
 
-def _passages(
-    name: str, passages: Sequence[Passage], states: Sequence[str], rows: Mapping[int, int]
-) -> tuple[list[NetLane], list[NetEdge], list[NetLink]]:
-    lanes: list[NetLane] = []
-    edges: list[NetEdge] = []
-    links: list[NetLink] = []
-    for number, (passage, state) in enumerate(zip(passages, states, strict=True)):
-        movement = passage.movement
-        edge = internal_edge_id(name, number)
-        lane = NetLane(
-            lane_id(edge),
-            0,
-            round(max(passage.length, LEAST_LENGTH), 4),
-            passage.speed,
-            round(movement.width + _swept(passage), 2),
-            passage.allowed,
-            movement.shape,
-            passage.type,
-            xodr=passage.xodr,
-        )
-        lanes.append(lane)
-        edges.append(NetEdge(edge, INTERNAL, (lane,)))
-        (source, source_lane), (target, target_lane) = movement.source, movement.target
-        turn = direction(movement.turn)
-        light = name if number in rows else ""
-        links.append(
+class _Inside:
+    """Internal lanes and links of a junction's passages."""
+
+    def __init__(
+        self,
+        name: str,
+        passages: Sequence[Passage],
+        states: Sequence[str],
+        rows: Mapping[int, int],
+        places: Mapping[int, float],
+    ) -> None:
+        self.lanes: list[NetLane] = []
+        self.edges: list[NetEdge] = []
+        self.links: list[NetLink] = []
+        self.beyond: dict[int, tuple[NetLane, float]] = {}
+        free = len(passages)
+        for number, (passage, state) in enumerate(zip(passages, states, strict=True)):
+            edge = internal_edge_id(name, number)
+            first = _inner_lane(edge, passage)
+            parts = [(edge, first)]
+            if number in places:
+                before, after = divided_shape(passage.movement.shape, places[number])
+                rest = internal_edge_id(name, free)
+                free += 1
+                second = _shaped(_inner_lane(rest, passage), after)
+                parts = [(edge, _shaped(first, before)), (rest, second)]
+                self.beyond[number] = second, places[number]
+            self.lanes.append(parts[0][1])
+            light = (name, rows[number]) if number in rows else ("", -1)
+            self._connect(passage, state, light, parts)
+
+    def _connect(
+        self,
+        passage: Passage,
+        state: str,
+        light: tuple[str, int],
+        parts: Sequence[tuple[SumoEdgeId, NetLane]],
+    ) -> None:
+        first = parts[0][1]
+        movement, turn = passage.movement, direction(passage.movement.turn)
+        (source, source_lane), (edge, target_lane) = movement.source, movement.target
+        target = SumoEdgeId(edge)
+        self.links.append(
             NetLink(
-                SumoEdgeId(source),
-                SumoEdgeId(target),
-                source_lane,
-                target_lane,
-                lane.id,
-                turn,
-                state,
-                light,
-                rows.get(number, -1),
+                SumoEdgeId(source), target, source_lane, target_lane, first.id, turn, state, *light
             )
         )
-        links.append(NetLink(edge, SumoEdgeId(target), 0, target_lane, None, turn))
-    return lanes, edges, links
+        for (inner, lane), (_, after) in zip(parts, (*parts[1:], ("", None)), strict=True):
+            self.edges.append(NetEdge(inner, INTERNAL, (lane,)))
+            onwards, way = (after.id, "m") if after else (None, "M")
+            self.links.append(NetLink(inner, target, 0, target_lane, onwards, turn, way))
+
+
+def _inner_lane(edge: SumoEdgeId, passage: Passage) -> NetLane:
+    return NetLane(
+        lane_id(edge),
+        0,
+        round(max(passage.length, LEAST_LENGTH), 4),
+        passage.speed,
+        round(passage.movement.width + _swept(passage), 2),
+        passage.allowed,
+        passage.movement.shape,
+        passage.type,
+        xodr=passage.xodr,
+    )
+
+
+def _shaped(lane: NetLane, shape: FloatArray) -> NetLane:
+    return replace(lane, shape=shape, length=round(max(drawn_length(shape), LEAST_LENGTH), 4))
 
 
 def _crossings(
@@ -283,8 +350,9 @@ def _light(
     name: str,
     passages: Sequence[Passage],
     conflicts: Conflicts,
+    rights: Sequence[Request],
     crossings: Sequence[PlacedCrossing],
-    controllers: Mapping[str, str],
+    around: Surroundings,
 ) -> tuple[TrafficLight, dict[int, int]]:
     """Traffic light of a junction, and the row in it of each link that it rules."""
     controlled = [n for n, passage in enumerate(passages) if passage.lights]
@@ -292,59 +360,19 @@ def _light(
     rows = {
         link: row for row, link in enumerate((*controlled, *range(count, count + len(crossings))))
     }
-    foes = set(conflicts.pairs)
-    foes |= {(n, count + c) for c, crossed in enumerate(conflicts.crossed) for n in crossed}
-    heads: dict[tuple[str, tuple[str, ...]], list[list[int]]] = {}
-    for lane in _lanes_of(passages, controlled):
-        # Who waits for the green of one lane must not be held up by those who wait for another.
-        key = passages[lane[0]].movement.source[0], passages[lane[0]].lights
-        own = heads.setdefault(key, [])
-        fitting = next((group for group in own if not _meet(lane, group, foes)), None)
-        if fitting is None:
-            own.append(lane)
-        else:
-            fitting += lane
-    groups: list[SignalGroup] = []
-    members: list[list[int]] = []
-    for (_, lights), parts in heads.items():
-        for links in parts:
-            groups.append(
-                SignalGroup(
-                    tuple(rows[n] for n in links),
-                    controllers.get(lights[0], ""),
-                    walkers=False,
-                    speed=max(passages[n].movement.speed for n in links),
-                    path=max(passages[n].length for n in links),
-                )
-            )
-            members.append(links)
-    for index, crossing in enumerate(crossings):
-        link = count + index
-        length = crossing.edge.length
-        groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0, path=length))
-        members.append([link])
-    meeting = frozenset(
-        (i, j)
-        for i, one in enumerate(members)
-        for j, other in enumerate(members[i + 1 :], start=i + 1)
-        if _meet(one, other, foes)
+    links = LightLinks(
+        movements=[passage.movement for passage in passages],
+        walkways=[crossing.walkway for crossing in crossings],
+        signals=[passage.lights for passage in passages],
+        controllers=[around.controllers.get(p.lights[0], "") if p.lights else "" for p in passages],
+        bicycles=["passenger" not in p.allowed and "bicycle" in p.allowed for p in passages],
+        conflicts=conflicts,
+        rights=rights,
+        side=-1.0 if around.lefthand else 1.0,
     )
-    phases = program(plan_stages(groups, meeting), len(rows))
+    phases = program(light_stages(links, rows), len(rows))
     signals = tuple(passages[n].lights if n < count else () for n in rows)
     return TrafficLight(name, phases, signals=signals), rows
-
-
-def _lanes_of(passages: Sequence[Passage], controlled: Sequence[int]) -> list[list[int]]:
-    """Links by the lane that they leave and the signals that control them, in order."""
-    found: dict[tuple[tuple[str, int], tuple[str, ...]], list[int]] = {}
-    for link in controlled:
-        passage = passages[link]
-        found.setdefault((passage.movement.source, passage.lights), []).append(link)
-    return list(found.values())
-
-
-def _meet(one: Sequence[int], other: Sequence[int], foes: set[tuple[int, int]]) -> bool:
-    return any((min(a, b), max(a, b)) in foes for a in one for b in other)
 
 
 def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:

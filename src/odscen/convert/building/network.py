@@ -22,7 +22,7 @@ from odscen.convert.model.access import speed as lane_speed
 from odscen.convert.model.connections import find_connections
 from odscen.convert.model.conversion_report import ConversionReport, ElementOutcome, ReportEntry
 from odscen.convert.model.edge_plan import plan_edges
-from odscen.convert.model.lane_alignment import evaluate
+from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
 from odscen.convert.model.right_of_way import Movement, wrapped
@@ -162,6 +162,7 @@ class _NetworkBuilder:
             self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
         self.control = self._signal_control()
         self._via: dict[int, NetLane] = {}
+        self._beyond: dict[int, tuple[NetLane, float]] = {}
 
     def laid(self) -> list[tuple[NetLane, Line, LaneAlignment]]:
         """SUMO lanes with the lines and the alignments that they are laid on."""
@@ -171,9 +172,13 @@ class _NetworkBuilder:
                 line = self._lane_lines[number][index]
                 found.append((self._net_edges[number].lanes[index], line, lane.alignment))
         for number, inner in sorted(self._via.items()):
-            found.append(
-                (inner, self._connection_lines[number], self._connections[number].alignment)
-            )
+            line, alignment = self._connection_lines[number], self._connections[number].alignment
+            if number not in self._beyond:
+                found.append((inner, line, alignment))
+                continue
+            second, place = self._beyond[number]
+            before, after = divided(line, alignment, place)
+            found += [(inner, *before), (second, *after)]
         return found
 
     def net(self) -> Net:
@@ -194,6 +199,7 @@ class _NetworkBuilder:
             lights=tuple(part.light for part in built if part.light),
             roundabouts=self._roundabouts(),
             flat=not points[:, 2].any(),
+            inner_junctions=tuple(one for part in built for one in part.waiting),
         )
 
     def _names(self) -> list[str]:
@@ -207,8 +213,10 @@ class _NetworkBuilder:
         crossings = self._walks.crossings.get(name, ())
         passages = [self._passage(number) for number in numbers]
         built = build_junction(name, passages, crossings, self._around(name))
-        for number, lane in zip(numbers, built.lanes, strict=True):
+        for position, (number, lane) in enumerate(zip(numbers, built.lanes, strict=True)):
             self._via[number] = lane
+            if position in built.beyond:
+                self._beyond[number] = built.beyond[position]
         return built
 
     def _around(self, name: str) -> Surroundings:

@@ -85,6 +85,52 @@ class Line:
         return float(np.arctan2(first[1], first[0])), float(np.arctan2(last[1], last[0]))
 
 
+def divided(
+    line: Line, alignment: LaneAlignment, at: float
+) -> tuple[tuple[Line, LaneAlignment], tuple[Line, LaneAlignment]]:
+    """Divide a line and its alignment ``at`` metres from the start."""
+    first: list[tuple[Stretch, FloatArray, FloatArray]] = []
+    second: list[tuple[Stretch, FloatArray, FloatArray]] = []
+    for stretch, arc, s in zip(alignment, line.arc, line.s, strict=True):
+        if arc[-1] <= at:
+            first.append((stretch, arc, s))
+        elif arc[0] >= at:
+            second.append((stretch, arc - at, s))
+        else:
+            cut, place = float(np.interp(at, arc, s)), np.array([at])
+            before, after = arc < at, arc > at
+            first.append(
+                (
+                    stretch._replace(end=cut),
+                    np.concatenate((arc[before], place)),
+                    np.concatenate((s[before], [cut])),
+                )
+            )
+            second.append(
+                (
+                    stretch._replace(start=cut),
+                    np.concatenate((place, arc[after])) - at,
+                    np.concatenate(([cut], s[after])),
+                )
+            )
+    shapes = divided_shape(line.shape, at)
+    parts = []
+    for shape, own in zip(shapes, (first, second), strict=True):
+        length = drawn_length(shape)
+        arcs, places = tuple(arc for _, arc, _ in own), tuple(s for _, _, s in own)
+        parts.append((Line(shape, length, arcs, places, line.widths), tuple(x for x, _, _ in own)))
+    return parts[0], parts[1]
+
+
+def divided_shape(shape: FloatArray, at: float) -> tuple[FloatArray, FloatArray]:
+    """Divide a shape ``at`` metres from its start; both parts have the place between them."""
+    steps = np.sqrt((np.diff(shape, axis=0) ** 2).sum(axis=1))
+    along = np.concatenate(([0.0], np.cumsum(steps)))
+    place = np.array([[np.interp(at, along, shape[:, k]) for k in range(3)]])
+    before, after = along < at - _LEAST, along > at + _LEAST
+    return np.concatenate((shape[before], place)), np.concatenate((place, shape[after]))
+
+
 def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line]:
     """Evaluate alignments; each must be longer than a millimetre."""
     if not alignments:

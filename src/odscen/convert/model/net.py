@@ -106,10 +106,14 @@ class NetLink:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Right of way of one link: which links it yields to and which it meets, by index."""
+    """Right of way of one link: which links it yields to and which it meets, by index.
+
+    ``waits_inside`` says that it yields at a place inside the junction, not at the stop line.
+    """
 
     yields_to: frozenset[int]
     foes: frozenset[int]
+    waits_inside: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,7 +167,10 @@ class TrafficLight:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """A whole network, in the order in which it is written."""
+    """A whole network, in the order in which it is written.
+
+    ``inner_junctions`` are SUMO's internal ones, where vehicles wait within a junction.
+    """
 
     offset: tuple[float, float]
     lefthand: bool
@@ -173,6 +180,7 @@ class Net:
     lights: tuple[TrafficLight, ...] = ()
     roundabouts: tuple[tuple[tuple[str, ...], tuple[SumoEdgeId, ...]], ...] = ()
     flat: bool = field(default=False)
+    inner_junctions: tuple[NetJunction, ...] = ()
 
     @property
     def boundary(self) -> tuple[float, float, float, float]:
@@ -218,6 +226,8 @@ class Net:
         for light in self.lights:
             lines += light_xml(light)
         for junction in self.junctions:
+            lines += self._junction(junction)
+        for junction in self.inner_junctions:
             lines += self._junction(junction)
         lines += [_link(link) for link in self.links]
         for nodes, edges in self.roundabouts:
@@ -266,7 +276,7 @@ class Net:
         for index, request in enumerate(junction.requests):
             yield (
                 f'        <request index="{index}" response="{_bits(request.yields_to, count)}"'
-                f' foes="{_bits(request.foes, count)}" cont="0"/>'
+                f' foes="{_bits(request.foes, count)}" cont="{int(request.waits_inside)}"/>'
             )
         if junction.xodr:
             yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'

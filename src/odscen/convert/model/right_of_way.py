@@ -9,7 +9,11 @@ meet, the first of these rules that distinguishes them decides:
 4. ``<priority>`` of the OpenDRIVE junction;
 5. where lanes only merge, the faster road goes first, and then the straighter movement;
 6. one who turns across gives way to oncoming traffic that does not;
-7. right before left (left before right where traffic keeps left).
+7. the major road, where there is one: junctions with lights, and large ones, have one
+   (:mod:`odscen.convert.model.major_road`);
+8. right before left (left before right where traffic keeps left).
+
+At lights, and among those from one road, the sixth rule comes before the fourth.
 
 Where all approaches have to stop, everybody waits for everybody else instead.
 """
@@ -42,6 +46,9 @@ LEVEL = 3.0
 
 WALKER_REACH = 1.0
 """Metres beside a movement's centre line that a vehicle needs free of persons."""
+
+OPPOSING = math.radians(125.0)
+"""Difference of headings from which approaches are opposite each other."""
 
 _FASTER = 2.0
 """m/s by which a road must be faster to go first where lanes merge."""
@@ -184,11 +191,16 @@ def _crossed(
 
 
 class Rules(NamedTuple):
-    """What a junction says on right of way, beyond its movements."""
+    """What a junction says on right of way, beyond its movements.
+
+    ``major`` are the edges of the major road that lead there.
+    """
 
     high_low: frozenset[tuple[str, str]] = frozenset()
     lefthand: bool = False
     all_stop: bool = False
+    signalled: bool = False
+    major: frozenset[str] = frozenset()
 
 
 def requests(
@@ -225,6 +237,12 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
         return other.in_roundabout
     if one.sign != other.sign:
         return one.sign > other.sign
+    side = -1.0 if rules.lefthand else 1.0
+    if rules.signalled or one.source[0] == other.source[0]:
+        # Those who may have green together: what drivers expect comes before what the map says.
+        turning = _turns_across(one, other, side)
+        if turning is not None:
+            return turning
     stated = _stated(one, other, rules)
     if stated is not None:
         return stated
@@ -233,7 +251,7 @@ def _waits(one: Movement, other: Movement, rules: Rules, merge: bool, only_merge
             return one.speed < other.speed
         if abs(abs(one.turn) - abs(other.turn)) > 0.05:
             return abs(one.turn) > abs(other.turn)
-    return _waits_by_place(one, other, -1.0 if rules.lefthand else 1.0)
+    return _waits_by_place(one, other, rules, side)
 
 
 def _stated(one: Movement, other: Movement, rules: Rules) -> bool | None:
@@ -244,13 +262,29 @@ def _stated(one: Movement, other: Movement, rules: Rules) -> bool | None:
     return waits if waits != goes else None
 
 
-def _waits_by_place(one: Movement, other: Movement, side: float) -> bool:
-    """Oncoming traffic before those who turn across, then right before left (``side`` 1)."""
-    angle = side * wrapped(other.heading_in - one.heading_in)
-    if abs(angle) > 0.75 * math.pi:
+def _turns_across(one: Movement, other: Movement, side: float) -> bool | None:
+    """Whether ``one`` turns across ``other``, or the reverse; nothing for crossing roads.
+
+    Oncoming traffic goes before those who turn across it, and what goes straight on before those
+    who turn over its path from beside it.
+    """
+    if one.source[0] == other.source[0]:
+        own_turn, their_turn = abs(one.turn), abs(other.turn)
+    elif abs(wrapped(other.heading_in - one.heading_in)) > OPPOSING:
         own_turn, their_turn = side * one.turn, side * other.turn
-        if abs(own_turn - their_turn) > 0.1:
-            return own_turn > their_turn
-    elif abs(angle) > 0.05:
+    else:
+        return None
+    return own_turn > their_turn if abs(own_turn - their_turn) > 0.1 else None
+
+
+def _waits_by_place(one: Movement, other: Movement, rules: Rules, side: float) -> bool:
+    """Oncoming traffic before turns across it, the major road, then right before left."""
+    turning = _turns_across(one, other, side)
+    if turning is not None:
+        return turning
+    if (one.source[0] in rules.major) != (other.source[0] in rules.major):
+        return other.source[0] in rules.major
+    angle = side * wrapped(other.heading_in - one.heading_in)
+    if 0.05 < abs(angle) <= OPPOSING:
         return angle > 0.0
     return (one.source, one.target) > (other.source, other.target)

@@ -1,56 +1,54 @@
-"""Signal programs: stages without conflicts, and safe changes between them.
+"""Signal programs: stages as practice makes them, and safe changes between them.
 
 OpenDRIVE says which signals there are and which of them a controller switches together, but nothing
-on timing. A program of ours never shows green to two movements that meet, pedestrians included:
-no vehicle turns left through oncoming traffic, and none over a crossing with green. Times follow
-common practice:
+on timing. Opposing approaches go together; who turns across them, or over a crossing that walks in
+parallel, has the green that gives way (``g``), as long as SUMO's right of way says that it does.
+What must not meet never has green together. Times follow common practice:
 
 - yellow by speed: 3 s up to 50 km/h, 4 s up to 60, 5 s above (RiLSA 2015, section 2.4);
-- all-red until the last vehicle has left, (path through the junction + 6 m) / speed, but for the
-  second that the next ones need to start; whole seconds, from 1 to 8;
-- a crossing turns red so early that one who has just started walks over at 1.2 m/s.
+- all-red by the paths of those that end and of those that begin next, to where they meet
+  (:mod:`odscen.convert.signals.shared_green`);
+- crossings turn red, while their stage goes on, so early that one who has just started walks over;
+- the cycle by Webster, (1.5 L + 5) / (1 - Y), and green in proportion to the flow ratios. No
+  demand is known when a map is converted: the flow ratios of all lanes are taken as equal.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.model.net import STAGE, Phase
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-CYCLE = 90.0
-"""Seconds that the stages share, within the bounds of green."""
+FLOW_RATIO = 0.4
+"""Sum of the critical flow ratios (Webster's Y) that programs are made for.
+
+Moderate traffic: a cycle for saturated roads would let everybody wait long on all others.
+"""
+
+SHORTEST_CYCLE = 40.0
+LONGEST_CYCLE = 120.0
+"""Seconds; HCM advises against longer ones."""
 
 LEAST_GREEN = 8.0
-MOST_GREEN = 40.0
 WALK_GREEN = 7.0
-"""Seconds of green of a stage only for pedestrians, at least."""
+"""Seconds of green of a crossing, at least."""
+
+TURNING_SHARE = 0.5
+"""Flow ratio of a stage only for protected turns, as a share of that of others."""
 
 REST = 15.0
 """Seconds of red where a light has nothing to take turns with."""
-
-WALKER = 1.2
-"""m/s."""
-
-CLEARING = 14.0
-"""m/s at which vehicles are taken to leave a junction, at most."""
-
-STARTING = 1.0
-"""Seconds after the change to green before any road user moves."""
-
-VEHICLE = 6.0
-"""Metres of a vehicle that must have left."""
 
 PROLONGED = 2.0
 """An actuated green may last this many times its planned duration."""
 
 
 class SignalGroup(NamedTuple):
-    """Links of one light that always show the same.
+    """Links of one light that are green in the same stages.
 
     Attributes
     ----------
@@ -62,15 +60,15 @@ class SignalGroup(NamedTuple):
         Whether it is a crossing.
     speed
         m/s of the approach.
-    path
-        Metres through the junction, or of the crossing.
+    turning
+        Whether all that it serves are protected turns across oncoming traffic.
     """
 
     links: tuple[int, ...]
     controller: str
     walkers: bool
     speed: float
-    path: float
+    turning: bool = False
 
     @property
     def yellow(self) -> float:
@@ -80,13 +78,31 @@ class SignalGroup(NamedTuple):
         kmh = self.speed * 3.6
         return 3.0 if kmh <= 51.0 else 4.0 if kmh <= 61.0 else 5.0
 
-    @property
-    def clearance(self) -> float:
-        """Seconds after yellow, or after the crossing's green, until others may go."""
-        if self.walkers:
-            return math.ceil(self.path / WALKER)
-        pace = min(max(self.speed, 3.0), CLEARING)
-        return min(max(math.ceil((self.path + VEHICLE) / pace - STARTING), 1.0), 8.0)
+
+@dataclass(frozen=True, slots=True)
+class GroupConflicts:
+    """What keeps groups apart.
+
+    Attributes
+    ----------
+    apart
+        Pairs of groups (smaller first) that never have green together.
+    yielding
+        Pairs of links that may have it: the first gives way to the second.
+    clearing
+        For groups that are apart, as (ending, beginning): whole seconds from the end of yellow, or
+        of a crossing's green, until the other may begin.
+    """
+
+    apart: frozenset[tuple[int, int]] = frozenset()
+    yielding: frozenset[tuple[int, int]] = frozenset()
+    clearing: Mapping[tuple[int, int], float] | None = None
+
+    def seconds(self, ending: int, beginning: int) -> float:
+        """Seconds of :attr:`clearing`; 0 for groups that are not apart."""
+        if (min(ending, beginning), max(ending, beginning)) not in self.apart:
+            return 0.0
+        return (self.clearing or {}).get((ending, beginning), 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,19 +111,17 @@ class Stages:
 
     groups: tuple[SignalGroup, ...]
     green: tuple[frozenset[int], ...]
+    conflicts: GroupConflicts
 
 
-def plan_stages(groups: Sequence[SignalGroup], foes: frozenset[tuple[int, int]]) -> Stages:
-    """Divide groups into stages so that no two in a stage are foes.
+def plan_stages(groups: Sequence[SignalGroup], conflicts: GroupConflicts) -> Stages:
+    """Divide groups into stages so that none in a stage are to be kept apart.
 
-    Every group has a stage; groups of one controller share one if they can; what else fits into a
-    stage is added to it.
-
-    Parameters
-    ----------
-    foes
-        Pairs of groups (smaller first) that meet.
+    Every group has a stage. Groups of one controller share one if they can, else those before in
+    ``groups`` choose first; what else fits into a stage is added to it. Crossings that fit into no
+    stage share a last one.
     """
+    apart = conflicts.apart
     vehicles = [n for n, group in enumerate(groups) if not group.walkers]
     walkers = [n for n, group in enumerate(groups) if group.walkers]
     stages: list[set[int]] = []
@@ -117,24 +131,32 @@ def plan_stages(groups: Sequence[SignalGroup], foes: frozenset[tuple[int, int]])
         controller = groups[number].controller
         mates = [n for n in vehicles if controller and groups[n].controller == controller]
         left = [n for n in (*mates, *vehicles) if not any(n in stage for stage in stages)]
-        stages.append(_filled({number}, left, foes))
-    stages = [_filled(stage, walkers, foes) for stage in stages]
+        stages.append(_filled({number}, left, apart))
+    stages = [_filled(stage, walkers, apart) for stage in stages]
     waiting = {n for n in walkers if not any(n in stage for stage in stages)}
     if waiting:
         stages.append(waiting)
-    full = [_filled(stage, (*vehicles, *walkers), foes) for stage in stages]
-    return Stages(tuple(groups), tuple(frozenset(stage) for stage in full))
+    full = [_filled(stage, (*vehicles, *walkers), apart) for stage in stages]
+    return Stages(tuple(groups), tuple(frozenset(stage) for stage in full), conflicts)
 
 
 def _filled(
-    stage: set[int], candidates: Sequence[int], foes: frozenset[tuple[int, int]]
+    stage: set[int], candidates: Sequence[int], apart: frozenset[tuple[int, int]]
 ) -> set[int]:
-    """Add to a stage what meets nothing in it, in the order given."""
+    """Add to a stage what may go with all in it, in the order given."""
     result = set(stage)
     for one in candidates:
-        if all((min(one, other), max(one, other)) not in foes for other in result):
+        if all((min(one, other), max(one, other)) not in apart for other in result):
             result.add(one)
     return result
+
+
+class _Change(NamedTuple):
+    """Seconds at the end of a stage: pedestrian clearance in the green, yellow, all-red."""
+
+    walk: float
+    yellow: float
+    red: float
 
 
 def program(stages: Stages, links: int) -> tuple[Phase, ...]:
@@ -145,56 +167,93 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
     links
         Number of links of the light.
     """
-    groups, order = stages.groups, stages.green
-    if len(order) == 1:
-        order = (*order, frozenset())
-    losses = [_loss(groups, order[k], order[(k + 1) % len(order)]) for k in range(len(order))]
-    lost = sum(sum(part) for part in losses)
-    share = (CYCLE - lost) / len(order)
+    order = stages.green if len(stages.green) > 1 else (*stages.green, frozenset[int]())
+    turns = [(stage, order[(k + 1) % len(order)]) for k, stage in enumerate(order)]
+    changes = [_change(stages, stage, following) for stage, following in turns]
+    greens = _greens(stages.groups, order, changes)
     phases: list[Phase] = []
-    for number, stage in enumerate(order):
-        following = order[(number + 1) % len(order)]
-        walk, yellow, red = losses[number]
-        vehicles = any(not groups[g].walkers for g in stage)
-        green = float(round(min(max(share, LEAST_GREEN), MOST_GREEN))) if vehicles else WALK_GREEN
-        if not stage:
-            green = REST
-        name = f"{STAGE}{number + 1}"
-        bounds = (LEAST_GREEN, PROLONGED * green) if vehicles else (0.0, 0.0)
-        phases.append(Phase(green, _state(groups, stage, "G", links), name, *bounds))
+    for number, (stage, following) in enumerate(turns):
+        green, change = greens[number], changes[number]
+        vehicles = any(not stages.groups[g].walkers for g in stage)
+        bounds = (min(LEAST_GREEN, green), PROLONGED * green) if vehicles else (0.0, 0.0)
+        shown = _state(stages, stage, links)
+        phases.append(Phase(green, shown, f"{STAGE}{number + 1}", *bounds))
         ending = stage - following
-        if walk:
-            still = frozenset(g for g in stage if not (g in ending and groups[g].walkers))
-            phases.append(Phase(walk, _state(groups, still, "G", links), "pedestrian clearance"))
-        staying = _state(groups, stage & following, "G", links)
-        if yellow:
-            state = _state(
-                groups, frozenset(g for g in ending if not groups[g].walkers), "y", links
-            )
-            phases.append(Phase(yellow, _over(staying, state), "yellow"))
-        if red:
-            phases.append(Phase(red, staying, "all red"))
+        walking = frozenset(g for g in ending if stages.groups[g].walkers)
+        if change.walk:
+            still = _darkened(shown, stages.groups, walking)
+            phases.append(Phase(change.walk, still, "pedestrian clearance"))
+        staying = _careful(
+            _darkened(shown, stages.groups, ending), _state(stages, following, links)
+        )
+        if change.yellow:
+            state = _darkened(staying, stages.groups, ending - walking, "y")
+            phases.append(Phase(change.yellow, state, "yellow"))
+        if change.red:
+            phases.append(Phase(change.red, staying, "all red"))
     return tuple(phases)
 
 
-def _loss(
-    groups: Sequence[SignalGroup], stage: frozenset[int], following: frozenset[int]
-) -> tuple[float, float, float]:
-    """Seconds of pedestrian clearance, of yellow, and of all-red, at the end of a stage."""
-    ending = [groups[g] for g in sorted(stage - following)]
-    yellow = max((group.yellow for group in ending), default=0.0)
-    red = max((group.clearance for group in ending if not group.walkers), default=0.0)
-    walk = max((group.clearance for group in ending if group.walkers), default=0.0)
-    return max(walk - yellow - red, 0.0), yellow, red
+def _change(stages: Stages, stage: frozenset[int], following: frozenset[int]) -> _Change:
+    groups, seconds = stages.groups, stages.conflicts.seconds
+    ending, beginning = stage - following, following - stage
+    cars = [g for g in ending if not groups[g].walkers]
+    yellow = max((groups[g].yellow for g in cars), default=0.0)
+    red = max((seconds(g, b) for g in cars for b in beginning), default=0.0)
+    others = beginning or frozenset(range(len(groups))) - stage
+    walk = max((seconds(g, b) for g in ending if groups[g].walkers for b in others), default=0.0)
+    return _Change(max(walk - yellow - red, 0.0), yellow, red)
 
 
-def _state(groups: Sequence[SignalGroup], chosen: frozenset[int], sign: str, links: int) -> str:
-    letters = ["r"] * links
-    for group in chosen:
-        for link in groups[group].links:
-            letters[link] = sign
-    return "".join(letters)
+def _greens(
+    groups: Sequence[SignalGroup], order: Sequence[frozenset[int]], changes: Sequence[_Change]
+) -> list[float]:
+    """Seconds of green of each stage, without those of its pedestrian clearance."""
+    shares = [_share(groups, stage) for stage in order]
+    walks = sum(
+        WALK_GREEN + change.walk for share, change in zip(shares, changes, strict=True) if not share
+    )
+    lost = walks + sum(change.yellow + change.red for change in changes)
+    cycle = (1.5 * lost + 5.0) / (1.0 - FLOW_RATIO)
+    cycle = min(max(cycle, SHORTEST_CYCLE), LONGEST_CYCLE)
+    unit = (cycle - lost) / max(sum(shares), 1e-9)
+    greens = []
+    for stage, share, change in zip(order, shares, changes, strict=True):
+        if not stage:
+            greens.append(REST)
+        elif not share:
+            greens.append(WALK_GREEN)
+        else:
+            greens.append(float(max(round(share * unit - change.walk), LEAST_GREEN)))
+    return greens
 
 
-def _over(below: str, above: str) -> str:
-    return "".join(b if a == "r" else a for b, a in zip(below, above, strict=True))
+def _share(groups: Sequence[SignalGroup], stage: frozenset[int]) -> float:
+    """Flow ratio of a stage against that of one for a whole approach; 0 without vehicles."""
+    cars = [groups[g] for g in stage if not groups[g].walkers]
+    if not cars:
+        return 0.0
+    return TURNING_SHARE if all(group.turning for group in cars) else 1.0
+
+
+def _state(stages: Stages, stage: frozenset[int], links: int) -> str:
+    """Letters of a stage: who gives way to another that is green has ``g``."""
+    green = {link for group in stage for link in stages.groups[group].links}
+    waiting = {one for one, other in stages.conflicts.yielding if other in green}
+    return "".join(
+        ("g" if link in waiting else "G") if link in green else "r" for link in range(links)
+    )
+
+
+def _darkened(
+    state: str, groups: Sequence[SignalGroup], ending: frozenset[int], letter: str = "r"
+) -> str:
+    """State with another letter for the links of some groups."""
+    links = {link for group in ending for link in groups[group].links}
+    return "".join(letter if n in links else one for n, one in enumerate(state))
+
+
+def _careful(state: str, following: str) -> str:
+    """State between two stages: what gives way in the next one does so already."""
+    pairs = zip(state, following, strict=True)
+    return "".join("g" if one == "G" and other == "g" else one for one, other in pairs)

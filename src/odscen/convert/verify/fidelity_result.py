@@ -93,7 +93,8 @@ class LostCrosswalk:
 class UnsafePair:
     """Two links that conflict and are green in the same phase; ``links`` are link indices.
 
-    ``yields`` says that one of both at least has the green that gives way (``g``).
+    ``yields`` says that one of both at least has the green that gives way (``g``), but does not
+    give way to the other by the junction's right of way.
     """
 
     tl: str

@@ -49,12 +49,16 @@ class NetFileLink(NamedTuple):
 
 
 class NetFileJunction(NamedTuple):
-    """One ``<junction>`` but the internal ones; ``foes[i]`` are the links that conflict with i."""
+    """One ``<junction>`` but the internal ones.
+
+    ``foes[i]`` are the links that conflict with i, ``yields[i]`` those that it gives way to.
+    """
 
     id: str
     type: str
     incoming: tuple[str, ...]
     foes: dict[int, frozenset[int]]
+    yields: dict[int, frozenset[int]]
 
 
 class NetFileProgram(NamedTuple):
@@ -202,16 +206,16 @@ def _junctions(root: etree._Element) -> Iterator[NetFileJunction]:
     for junction in root.iterfind("junction"):
         if junction.get("type") == "internal":
             continue
-        foes = {
-            # The last letter stands for link 0.
-            int(_text(r, "index")): frozenset(
-                k for k, letter in enumerate(reversed(_text(r, "foes"))) if letter == "1"
-            )
-            for r in junction.iterfind("request")
-        }
+        requests = list(junction.iterfind("request"))
         yield NetFileJunction(
             _text(junction, "id"),
             junction.get("type", ""),
             tuple(junction.get("incLanes", "").split()),
-            foes,
+            {int(_text(r, "index")): _links_of(_text(r, "foes")) for r in requests},
+            {int(_text(r, "index")): _links_of(_text(r, "response")) for r in requests},
         )
+
+
+def _links_of(bits: str) -> frozenset[int]:
+    """Links that a row of a request names; the last letter stands for link 0."""
+    return frozenset(k for k, letter in enumerate(reversed(bits)) if letter == "1")

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def unsafe_pairs(net: NetFile) -> tuple[UnsafePair, ...]:
-    """Pairs of links that conflict and are green in the same phase of the same program."""
+    """Pairs of links that conflict and have green together without one of them giving way.
+
+    One gives way if its green is ``g`` and its request says that it yields to the other.
+    """
     rows = net.request_rows()
     return tuple(
         pair for junction in net.junctions for pair in _unsafe_at(net, junction, rows[junction.id])
@@ -37,10 +40,13 @@ def _unsafe_at(
                 continue
             indices = (links[a].link_index, links[b].link_index)
             for phase, state in enumerate(program.states):
-                colors = {state[index : index + 1] for index in indices}
-                if colors <= {"G", "g"}:
+                one, other = (state[index : index + 1] for index in indices)
+                if not {one, other} <= {"G", "g"}:
+                    continue
+                waits = one == "g" and b in junction.yields.get(a, ())
+                if not waits and not (other == "g" and a in junction.yields.get(b, ())):
                     x, y = _middle(net, links[a], links[b])
-                    yield UnsafePair(program.tl, phase, indices, "g" in colors, x, y)
+                    yield UnsafePair(program.tl, phase, indices, "g" in (one, other), x, y)
 
 
 def _middle(net: NetFile, *links: NetFileLink) -> tuple[float, float]:

@@ -1,0 +1,238 @@
+"""What a network carries, against what netconvert makes of the same map: arrivals and delay.
+
+Cars only, the same trips on both networks, an hour each with SUMO defaults (0.5 s steps). Trips
+join places on driving lanes outside junctions, drawn with a fixed seed from the waypoints of
+``carla.Map``, that both networks have a lane for; those that either cannot route are left out. A
+level is trips per hour and kilometre of lane. Delay is SUMO's time loss and insertion delay, the
+time until the end for those that never entered. ``ODSCEN_BENCH_LEVELS`` (100,300,500) and
+``ODSCEN_BENCH_SEEDS`` (1) widen or narrow it. With lights as programmed, and with all of them off.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import statistics
+import subprocess
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.etree import ElementTree as ET
+
+from bench.common import shared_maps
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+HOUR = 3600.0
+SPACING = 2.0
+FROM_ENDS = 15.0
+NARROWEST = 2.5
+REACH = 3.0
+LEAST_LANES = 1.0
+"""Kilometres of lanes of a map that is measured."""
+
+VTYPE = '<vType id="car" vClass="passenger" length="4.6" width="1.8" speedDev="0.1"/>'
+HIGH_LEVELS = {"signal_crossing": (2500, 5000, 8000)}
+
+
+class _Place(NamedTuple):
+    """A place on a lane of one network."""
+
+    edge: str
+    pos: float
+
+
+class _Outcome(NamedTuple):
+    """Means over seeds."""
+
+    arrived: float
+    delay: float
+    teleports: float
+    collisions: float
+
+
+def main() -> None:
+    try:
+        import carla  # noqa: F401
+    except ImportError:
+        print("capacity: the package carla is not installed")
+        return
+    levels = [int(v) for v in os.environ.get("ODSCEN_BENCH_LEVELS", "100,300,500").split(",")]
+    seeds = [int(v) for v in os.environ.get("ODSCEN_BENCH_SEEDS", "1").split(",")]
+    print("| map | lights | per hour and km | arrived | delay, s | teleports | collisions |")
+    print("|---|---|---|---|---|---|---|")
+    ratios = []
+    for path in _maps():
+        with tempfile.TemporaryDirectory() as folder:
+            bench = _MapBench(path, Path(folder))
+            if bench.kilometres < LEAST_LANES and path.stem not in HIGH_LEVELS:
+                continue
+            for level in HIGH_LEVELS.get(path.stem, levels):
+                ratios += bench.measure(level, seeds)
+    print(f"median ratio of delays {statistics.median(ratios):.2f} (aim below 1, each at most 1.2)")
+
+
+def _maps() -> list[Path]:
+    own = sorted((Path(__file__).parents[1] / "maps").glob("*.xodr"))
+    shared = shared_maps()
+    return own + (sorted(shared.rglob("*.xodr")) if shared else [])
+
+
+class _MapBench:
+    """One map with both of its networks."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        import carla
+        import sumolib
+
+        self._path, self._folder = path, folder
+        self._files = {"ours": folder / "ours.net.xml", "netconvert": folder / "peer.net.xml"}
+        _build(path, self._files["ours"])
+        _tool("netconvert", "--opendrive-files", path, "-o", self._files["netconvert"],
+              "--no-turnarounds", "--no-warnings")  # fmt: skip
+        text = path.read_text(encoding="utf-8", errors="replace")
+        lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
+        self._waypoints = [
+            w
+            for w in carla.Map(path.stem, text).generate_waypoints(SPACING)
+            if not w.is_junction
+            and w.lane_width >= NARROWEST
+            and FROM_ENDS < w.s < lengths.get(str(w.road_id), 0.0) - FROM_ENDS
+        ]
+        self.kilometres = len(self._waypoints) * SPACING / 1000.0
+        self._nets = {name: sumolib.net.readNet(str(f)) for name, f in self._files.items()}
+        self._known: dict[int, dict[str, _Place] | None] = {}
+
+    def measure(self, level: int, seeds: Sequence[int]) -> list[float]:
+        """Print a row with lights and one without; ratios of the delays."""
+        departs = self._trips(max(20, int(level * self.kilometres)))
+        lit = bool(
+            self._nets["ours"].getTrafficLights() or self._nets["netconvert"].getTrafficLights()
+        )
+        ratios = []
+        for lights in ("on", "off") if lit else ("none",):
+            ours, peer = (self._run(name, departs, seeds, lights) for name in self._files)
+            values = [f"{a:.0f} / {b:.0f}" for a, b in zip(ours, peer, strict=True)]
+            print(f"| {self._path.stem} | {lights} | {level} | {' | '.join(values)} |", flush=True)
+            ratios.append(ours.delay / max(peer.delay, 0.1))
+        return ratios
+
+    def _trips(self, count: int) -> dict[str, float]:
+        """Departures of trips that both networks can route, which are left in the folder."""
+        rng = random.Random(1)
+        number = len(self._waypoints)
+        trips: list[tuple[int, int, float]] = []
+        for _ in range(50 * count):
+            one, other = rng.randrange(number), rng.randrange(number)
+            if one != other and self._places(one) and self._places(other):
+                trips.append((one, other, rng.uniform(0.0, HOUR)))
+            if len(trips) == count:
+                break
+        trips.sort(key=lambda trip: trip[2])
+        routed = {name: self._routed(name, trips) for name in self._files}
+        both = [key for key in routed["ours"] if key in routed["netconvert"]]
+        for name, vehicles in routed.items():
+            text = "".join(ET.tostring(vehicles[key], encoding="unicode") for key in both)
+            (self._folder / f"{name}.rou.xml").write_text(f"<routes>{VTYPE}{text}</routes>")
+        return {key: trips[int(key)][2] for key in both}
+
+    def _routed(self, name: str, trips: Sequence[tuple[int, int, float]]) -> dict[str, ET.Element]:
+        rows = [VTYPE]
+        for number, (one, other, depart) in enumerate(trips):
+            start, end = (self._places(p) or {} for p in (one, other))
+            rows.append(
+                f'<trip id="{number}" type="car" depart="{depart:.1f}" from="{start[name].edge}"'
+                f' departLane="best" departSpeed="max" departPos="{start[name].pos:.1f}"'
+                f' to="{end[name].edge}" arrivalPos="{end[name].pos:.1f}"/>'
+            )
+        source, target = self._folder / "trips.xml", self._folder / "routed.xml"
+        source.write_text(f"<routes>{''.join(rows)}</routes>")
+        _tool("duarouter", "-n", self._files[name], "-r", source, "-o", target,
+              "--ignore-errors", "--no-warnings", "--no-step-log")  # fmt: skip
+        return {v.get("id", ""): v for v in ET.parse(target).getroot().iter("vehicle")}
+
+    def _places(self, number: int) -> dict[str, _Place] | None:
+        if number not in self._known:
+            transform = self._waypoints[number].transform
+            x, y = transform.location.x, -transform.location.y
+            heading = math.radians(-transform.rotation.yaw)
+            found = {name: _nearest(net, x, y, heading) for name, net in self._nets.items()}
+            whole = {name: place for name, place in found.items() if place}
+            self._known[number] = whole if len(whole) == len(found) else None
+        return self._known[number]
+
+    def _run(
+        self, name: str, departs: dict[str, float], seeds: Sequence[int], lights: str
+    ) -> _Outcome:
+        outcomes = []
+        info, stats = self._folder / "info.xml", self._folder / "stats.xml"
+        off = ["--tls.all-off"] if lights == "off" else []
+        for seed in seeds:
+            _tool("sumo", "-n", self._files[name], "-r", self._folder / f"{name}.rou.xml",
+                  "--end", "3600", "--step-length", "0.5", "--seed", str(seed),
+                  "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
+                  "--statistic-output", stats, "--no-warnings", "--no-step-log", *off)  # fmt: skip
+            seen = {t.get("id"): t for t in ET.parse(info).getroot().iter("tripinfo")}
+            root = ET.parse(stats).getroot()
+            counts = [root.find("teleports"), root.find("safety")]
+            delays = [_delay(seen.get(key), depart) for key, depart in departs.items()]
+            outcomes.append(
+                _Outcome(
+                    sum(float(t.get("arrival", -1)) >= 0 for t in seen.values()),
+                    statistics.fmean(delays),
+                    float(counts[0].get("total", 0)) if counts[0] is not None else 0.0,
+                    float(counts[1].get("collisions", 0)) if counts[1] is not None else 0.0,
+                )
+            )
+        return _Outcome(*(statistics.fmean(values) for values in zip(*outcomes, strict=True)))
+
+
+def _delay(trip: ET.Element | None, depart: float) -> float:
+    if trip is None:
+        return HOUR - depart
+    return float(trip.get("timeLoss", 0)) + max(0.0, float(trip.get("departDelay", 0)))
+
+
+def _nearest(net: Any, x: float, y: float, heading: float) -> _Place | None:
+    """The nearest car lane that points the same way."""
+    from sumolib.geomhelper import polygonOffsetAndDistanceToPoint, positionAtShapeOffset
+
+    dx, dy = net.getLocationOffset()
+    point = (x + dx, y + dy)
+    for lane, _ in sorted(net.getNeighboringLanes(*point, REACH), key=lambda found: found[1]):
+        if lane.getEdge().getFunction() or not lane.allows("passenger"):
+            continue
+        shape = lane.getShape()
+        drawn = sum(math.dist(a, b) for a, b in pairwise(shape))
+        way, _ = polygonOffsetAndDistanceToPoint(point, shape)
+        before = positionAtShapeOffset(shape, max(way - 0.5, 0.0))
+        after = positionAtShapeOffset(shape, min(way + 0.5, drawn - 1e-3))
+        direction = math.atan2(after[1] - before[1], after[0] - before[0])
+        if math.cos(direction - heading) > 0.7:
+            return _Place(lane.getEdge().getID(), way / drawn * lane.getLength())
+    return None
+
+
+def _build(path: Path, target: Path) -> None:
+    from odscen.convert.building.network import build_network
+    from odscen.lanegraph.build_graphs import build_map_graph
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.parse import parse
+
+    odr = parse(path.read_bytes(), file=path.name)
+    table = RoadTable.of(odr)
+    graph = build_map_graph(odr, name=path.stem, sha256="0" * 64, table=table)
+    target.write_bytes(build_network(odr, table, graph.walks).net_xml)
+
+
+def _tool(name: str, *arguments: object) -> None:
+    import sumo
+
+    home = Path(sumo.SUMO_HOME)
+    subprocess.run(
+        [home / "bin" / name, *map(str, arguments)],
+        check=True, capture_output=True, env={**os.environ, "SUMO_HOME": str(home)},
+    )  # fmt: skip

@@ -1,0 +1,293 @@
+"""Which links of a traffic light may have green together, and how long one clears for another.
+
+Two that meet may share green only where one of them gives way by the junction's right of way, and
+only as drivers expect it (RiLSA 2015, section 2.3; HCM 7th edition, chapter 19):
+
+- a turn across oncoming traffic, unless that has three lanes or more that go on, or is faster than
+  70 km/h, or two lanes or more make the turn: then the turn is protected;
+- a turn over a crossing at its far end, with those who walk in parallel;
+- a turn over the path of others from the same approach, as of bicycles beside it.
+
+Clearing times (RiLSA 2015, section 2.5): all-red lasts until the last vehicle has passed the place
+where the paths meet, less what the first one from the other stop line needs to get there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import shapely
+
+from odscen.convert.model.right_of_way import MOST_WIDTH, OPPOSING, wrapped
+from odscen.convert.signals.signal_programs import GroupConflicts, SignalGroup, plan_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.convert.model.net import Request
+    from odscen.convert.model.right_of_way import Conflicts, Movement, Walkway
+    from odscen.convert.signals.signal_programs import Stages
+
+TURN = math.radians(30.0)
+"""Less is straight on."""
+
+PROTECTED_LANES = 3
+"""Oncoming lanes that go straight on from which a turn across them is protected."""
+
+PROTECTED_SPEED = 70.0 / 3.6 + 0.1
+"""m/s of oncoming traffic above which a turn across it is protected."""
+
+TURNING_LANES = 2
+"""Lanes for one turn across from which it is protected."""
+
+WALKER = 1.2
+"""m/s."""
+
+STRAIGHT_SPEED, TURNING_SPEED, BICYCLE_SPEED = 10.0, 7.0, 5.0
+"""m/s at which vehicles are taken to clear a junction, at most."""
+
+ENTERING_SPEED = 11.1
+"""m/s at which the first of the next stage passes its stop line."""
+
+ENTERING_WALKER = 1.5
+"""m/s of the first persons of the next stage."""
+
+VEHICLE = 6.0
+"""Metres of a vehicle that must have left."""
+
+TURNING_HEAD_START, BICYCLE_HEAD_START = 1.0, 2.0
+"""Seconds of yellow in which no more of those who turn, or of bicycles, cross the stop line."""
+
+MOST_STAGES = 4
+"""Stages from which on turns across are not protected: waiting is no safer than gaps."""
+
+MOST_RED = 6.0
+"""Seconds of all-red, at most."""
+
+
+class LightLinks(NamedTuple):
+    """Links of a junction with a light: its movements, then its crossings.
+
+    Attributes
+    ----------
+    signals
+        OpenDRIVE signals that control each movement; those without are not controlled.
+    controllers
+        The OpenDRIVE controller of each movement, or empty.
+    bicycles
+        Whether a movement is only for bicycles.
+    rights
+        Right of way of all links.
+    side
+        1 where traffic keeps right, -1 where it keeps left.
+    """
+
+    movements: Sequence[Movement]
+    walkways: Sequence[Walkway]
+    signals: Sequence[tuple[str, ...]]
+    controllers: Sequence[str]
+    bicycles: Sequence[bool]
+    conflicts: Conflicts
+    rights: Sequence[Request]
+    side: float
+
+
+def light_stages(links: LightLinks, rows: dict[int, int]) -> Stages:
+    """Find signal groups, what keeps them apart and who gives way, and divide them into stages.
+
+    Parameters
+    ----------
+    rows
+        Position at the light of each controlled link.
+    """
+    stages = plan_stages(*_Sharing(links, protect=True).grouped(rows))
+    if len(stages.green) > MOST_STAGES:
+        stages = plan_stages(*_Sharing(links, protect=False).grouped(rows))
+    return stages
+
+
+class _Sharing:
+    """What may share green at one light."""
+
+    def __init__(self, links: LightLinks, *, protect: bool) -> None:
+        self._links = links
+        self._count = len(links.movements)
+        self._lines = [shapely.LineString(m.shape[:, :2]) for m in links.movements]
+        self._areas = [
+            shapely.LineString(w.axis[:, :2]).buffer(w.width / 2.0, cap_style="flat")
+            for w in links.walkways
+        ]
+        pairs = links.conflicts.pairs
+        crossed = enumerate(links.conflicts.crossed)
+        walked = [(n, self._count + c) for c, over in crossed for n in over]
+        self._pairs = [*pairs, *walked]
+        self._protected = self._protected_turns() if protect else set()
+        self._never = {pair for pair in self._pairs if not self._may_share(*pair)}
+
+    def grouped(self, rows: dict[int, int]) -> tuple[tuple[SignalGroup, ...], GroupConflicts]:
+        """Groups: the links of one approach and signal, with protected turns apart."""
+        links = self._links
+        heads: dict[tuple[str, tuple[str, ...], bool], list[int]] = {}
+        for n in rows:
+            if n < self._count:
+                lane = links.movements[n].source
+                key = (lane[0], links.signals[n], lane in self._protected)
+                heads.setdefault(key, []).append(n)
+        groups: list[SignalGroup] = []
+        members: list[tuple[int, ...]] = []
+        for (_, _, turning), own in self._ordered(heads):
+            speed = max(links.movements[n].speed for n in own)
+            place = tuple(rows[n] for n in own)
+            controller = links.controllers[own[0]]
+            groups.append(
+                SignalGroup(place, controller, walkers=False, speed=speed, turning=turning)
+            )
+            members.append(tuple(own))
+        for index in range(len(links.walkways)):
+            link = self._count + index
+            groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0))
+            members.append((link,))
+        return tuple(groups), self._conflicts(members, rows)
+
+    def _ordered(
+        self, heads: dict[tuple[str, tuple[str, ...], bool], list[int]]
+    ) -> list[tuple[tuple[str, tuple[str, ...], bool], list[int]]]:
+        """Each approach followed by what is opposite it: who comes first chooses company first."""
+        left = list(heads.items())
+        result = []
+        while left:
+            result.append(left.pop(0))
+            heading = self._links.movements[result[-1][1][0]].heading_in
+            left.sort(key=lambda item: item[0][2])
+            opposite = [
+                item
+                for item in left
+                if item[0][2] == result[-1][0][2]
+                and self._apart_by(heading, self._links.movements[item[1][0]].heading_in) > OPPOSING
+            ]
+            for item in opposite:
+                left.remove(item)
+                result.append(item)
+        return result
+
+    def _conflicts(self, members: Sequence[Sequence[int]], rows: dict[int, int]) -> GroupConflicts:
+        group_of = {link: g for g, own in enumerate(members) for link in own}
+        apart: set[tuple[int, int]] = set()
+        clearing: dict[tuple[int, int], float] = {}
+        for i, j in self._pairs:
+            if i not in group_of or j not in group_of:
+                continue
+            a, b = group_of[i], group_of[j]
+            if (i, j) in self._never and a != b:
+                apart.add((min(a, b), max(a, b)))
+            for (one, link), (other, link2) in (((a, i), (b, j)), ((b, j), (a, i))):
+                seconds = self._clearing(link, link2)
+                clearing[one, other] = max(clearing.get((one, other), 0.0), seconds)
+        yielding = frozenset(
+            (rows[i], rows[j])
+            for one, other in self._pairs
+            for i, j in ((one, other), (other, one))
+            if i in rows and j in rows and j in self._links.rights[i].yields_to
+        )
+        return GroupConflicts(frozenset(apart), yielding, clearing)
+
+    # Rules
+
+    @staticmethod
+    def _apart_by(heading: float, other: float) -> float:
+        return abs(wrapped(other - heading))
+
+    def _across(self, link: int) -> bool:
+        return self._links.side * self._links.movements[link].turn > TURN
+
+    def _may_share(self, i: int, j: int) -> bool:
+        """Whether two that meet may both have green, given that one gives way."""
+        movements = self._links.movements
+        one = movements[i]
+        if j >= self._count:
+            return abs(one.turn) > TURN and self._at_far_end(i, j)
+        other = movements[j]
+        if one.source[0] == other.source[0]:
+            return True
+        if self._apart_by(one.heading_in, other.heading_in) < OPPOSING:
+            return False
+        turning = [n for n in (i, j) if abs(movements[n].turn) > TURN]
+        if {movements[n].source for n in (i, j) if self._across(n)} & self._protected:
+            return False
+        return bool(turning)
+
+    def _at_far_end(self, link: int, crossing: int) -> bool:
+        line, area = self._lines[link], self._areas[crossing - self._count]
+        return bool(line.project(area.centroid) > line.length / 2.0)
+
+    def _protected_turns(self) -> set[tuple[str, int]]:
+        """Lanes from which all traffic turns across, and which need protection."""
+        movements = self._links.movements
+        cars = [n for n in range(self._count) if not self._links.bicycles[n]]
+        lanes: dict[tuple[str, int], list[int]] = {}
+        for n in cars:
+            lanes.setdefault(movements[n].source, []).append(n)
+        turning = {lane for lane, own in lanes.items() if all(self._across(n) for n in own)}
+        return {
+            lane
+            for lane in turning
+            if sum(other[0] == lane[0] for other in turning) >= TURNING_LANES
+            or self._oncoming(movements[lanes[lane][0]], cars)
+        }
+
+    def _oncoming(self, turn: Movement, cars: Sequence[int]) -> bool:
+        """Whether oncoming traffic is more than one can find gaps in."""
+        found = [
+            movement
+            for movement in (self._links.movements[n] for n in cars)
+            if self._apart_by(turn.heading_in, movement.heading_in) > OPPOSING
+            and abs(movement.turn) < TURN
+        ]
+        lanes = {movement.source for movement in found}
+        fast = any(movement.speed > PROTECTED_SPEED for movement in found)
+        return fast or len(lanes) >= PROTECTED_LANES
+
+    # Clearing
+
+    def _clearing(self, ending: int, beginning: int) -> float:
+        """Whole seconds from yellow's end, or a crossing's red, until ``beginning`` may go."""
+        if ending >= self._count:
+            length = shapely.LineString(
+                self._links.walkways[ending - self._count].axis[:, :2]
+            ).length
+            return float(math.ceil(length / WALKER))
+        movement, line = self._links.movements[ending], self._lines[ending]
+        way = self._passed(line, self._place(beginning), last=True)
+        if self._links.bicycles[ending]:
+            seconds = way / BICYCLE_SPEED - BICYCLE_HEAD_START
+        else:
+            straight = abs(movement.turn) < TURN
+            pace = STRAIGHT_SPEED if straight else TURNING_SPEED
+            seconds = (way + VEHICLE) / min(max(movement.speed, 3.0), pace)
+            seconds -= 0.0 if straight else TURNING_HEAD_START
+        if beginning < self._count:
+            other = self._lines[beginning]
+            seconds -= self._passed(other, self._place(ending), last=False) / ENTERING_SPEED
+        else:
+            axis = shapely.LineString(self._links.walkways[beginning - self._count].axis[:, :2])
+            ways = [
+                self._passed(one, self._place(ending), last=False) for one in (axis, axis.reverse())
+            ]
+            seconds -= min(ways) / ENTERING_WALKER
+        return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
+
+    def _place(self, link: int) -> shapely.Geometry:
+        """Where a link's users are."""
+        if link >= self._count:
+            return self._areas[link - self._count]
+        return self._lines[link].buffer(MOST_WIDTH)
+
+    @staticmethod
+    def _passed(line: shapely.LineString, place: shapely.Geometry, *, last: bool) -> float:
+        """Metres along a line to the last, or first, of it in a place."""
+        shared = line.intersection(place)
+        if shared.is_empty:
+            return float(line.project(place.centroid))
+        ways = [line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)]
+        return float(max(ways) if last else min(ways))

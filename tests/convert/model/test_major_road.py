@@ -1,0 +1,57 @@
+"""The major road of a junction: who goes first where signs and lights do not say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from odscen.convert.model.major_road import is_large, major_edges
+from odscen.convert.model.right_of_way import Movement, Sign
+from tests.convert.maps import converted, named
+
+
+def approach(edge: str, degrees: float, *, lane: int = 0, speed: float = 13.9) -> Movement:
+    """A movement straight on from one direction."""
+    heading = math.radians(degrees)
+    step = np.array([math.cos(heading), math.sin(heading), 0.0])
+    shape = np.vstack((-10.0 * step, 10.0 * step))
+    return Movement(
+        (edge, lane), (f"{edge} out", lane), shape, 3.5, heading, heading, speed, Sign.NONE,
+        in_roundabout=False, roads=frozenset(),
+    )  # fmt: skip
+
+
+def major(*movements: Movement) -> frozenset[str]:
+    return major_edges(movements, [True] * len(movements))
+
+
+def test_the_faster_road_goes_first() -> None:
+    slow = approach("n", 90, speed=8.3), approach("s", -90, speed=8.3)
+    assert major(*slow, approach("w", 0), approach("e", 180)) == {"w", "e"}
+
+
+def test_of_equally_fast_roads_the_wider_one_goes_first() -> None:
+    wide = approach("n", 90), approach("n", 90, lane=1), approach("s", -90)
+    assert major(approach("w", 0), approach("e", 180), *wide) == {"n", "s"}
+
+
+def test_a_road_that_ends_in_another_is_not_major() -> None:
+    assert major(approach("n", -90), approach("w", 0), approach("e", 180)) == {"w", "e"}
+
+
+def test_three_roads_of_a_star_have_none() -> None:
+    assert major(approach("a", 0), approach("b", 120), approach("c", 240)) == frozenset()
+
+
+def test_two_lanes_on_an_approach_make_a_junction_large() -> None:
+    assert not is_large([approach("a", 0), approach("b", 90)], [True, True])
+    assert is_large([approach("a", 0), approach("a", 0, lane=1)], [True, True])
+    assert not is_large([approach("a", 0), approach("a", 0, lane=1)], [True, False])
+
+
+def test_with_the_lights_off_a_crossing_has_a_major_road() -> None:
+    links = converted(named("signal_crossing")).xml.findall("connection[@tl]")
+    states = [link.get("state") for link in links if link.get("via")]
+    assert states.count("O") >= 6
+    assert set(states) == {"O", "o"}
