@@ -244,8 +244,8 @@ def test_the_light_shows_each_stage_as_long_as_the_scenario_says(tmp_path: Path)
 
 def test_an_offset_lets_the_first_stage_begin_later(tmp_path: Path) -> None:
     (light,) = crossing().table.lights
-    before, first = lengths(states(tmp_path, timed(offset=5), until=30.0))[:2]
-    assert before == (light.phases[-1].state, 5)
+    before, first = lengths(states(tmp_path, timed(offset=3), until=30.0))[:2]
+    assert before == (light.phases[-1].state, 3)
     assert first == (light.phases[0].state, light.phases[0].duration)
 
 

@@ -136,7 +136,8 @@ def build_junction(
     signs = {movement.source[0]: movement.sign for movement in movements}
     all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
     cars = ["passenger" in passage.allowed for passage in passages]
-    unruled = not any(signs.values()) and not around.high_low
+    # Signs that are the same everywhere rule no more than none at all.
+    unruled = len(set(signs.values())) <= 1 and not around.high_low
     major: frozenset[str] = frozenset()
     if signalled or (unruled and is_large(movements, cars)):
         major = major_edges(movements, cars)
@@ -145,7 +146,7 @@ def build_junction(
     light, rows = None, dict[int, int]()
     if signalled:
         light, rows = _light(name, passages, conflicts, rights, crossings, around)
-    equal = unruled and not major
+    equal = unruled and not major and not all_stop
     states = [
         _state(m, right, len(movements), lit=n in rows, all_stop=all_stop, equal=equal)
         for n, (m, right) in enumerate(zip(movements, rights, strict=False))

@@ -257,37 +257,45 @@ class _Sharing:
                 self._links.walkways[ending - self._count].axis[:, :2]
             ).length
             return float(math.ceil(length / WALKER))
-        movement, line = self._links.movements[ending], self._lines[ending]
-        way = self._passed(line, self._place(beginning), last=True)
-        if self._links.bicycles[ending]:
-            seconds = way / BICYCLE_SPEED - BICYCLE_HEAD_START
-        else:
-            straight = abs(movement.turn) < TURN
-            pace = STRAIGHT_SPEED if straight else TURNING_SPEED
-            seconds = (way + VEHICLE) / min(max(movement.speed, 3.0), pace)
-            seconds -= 0.0 if straight else TURNING_HEAD_START
+        line = self._lines[ending]
         if beginning < self._count:
             other = self._lines[beginning]
-            seconds -= self._passed(other, self._place(ending), last=False) / ENTERING_SPEED
+            seconds = max(
+                self._left(ending, line.project(place)) - other.project(place) / ENTERING_SPEED
+                for place in _meeting_places(line, other)
+            )
         else:
-            axis = shapely.LineString(self._links.walkways[beginning - self._count].axis[:, :2])
-            ways = [
-                self._passed(one, self._place(ending), last=False) for one in (axis, axis.reverse())
-            ]
-            seconds -= min(ways) / ENTERING_WALKER
+            walk = self._links.walkways[beginning - self._count].axis[:, :2]
+            path = line.buffer(MOST_WIDTH)
+            ways = [_passed(shapely.LineString(axis), path)[0] for axis in (walk, walk[::-1])]
+            last = _passed(line, self._areas[beginning - self._count])[1]
+            seconds = self._left(ending, last) - min(ways) / ENTERING_WALKER
         return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
 
-    def _place(self, link: int) -> shapely.Geometry:
-        """Where a link's users are."""
-        if link >= self._count:
-            return self._areas[link - self._count]
-        return self._lines[link].buffer(MOST_WIDTH)
+    def _left(self, ending: int, way: float) -> float:
+        """Seconds from the end of yellow until the last vehicle has left a place on its path."""
+        if self._links.bicycles[ending]:
+            return way / BICYCLE_SPEED - BICYCLE_HEAD_START
+        movement = self._links.movements[ending]
+        straight = abs(movement.turn) < TURN
+        pace = STRAIGHT_SPEED if straight else TURNING_SPEED
+        start = 0.0 if straight else TURNING_HEAD_START
+        return (way + VEHICLE) / min(max(movement.speed, 3.0), pace) - start
 
-    @staticmethod
-    def _passed(line: shapely.LineString, place: shapely.Geometry, *, last: bool) -> float:
-        """Metres along a line to the last, or first, of it in a place."""
-        shared = line.intersection(place)
-        if shared.is_empty:
-            return float(line.project(place.centroid))
-        ways = [line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)]
-        return float(max(ways) if last else min(ways))
+
+def _meeting_places(one: shapely.LineString, other: shapely.LineString) -> list[shapely.Point]:
+    """Where two paths meet, or are nearest to each other."""
+    shared = one.intersection(other)
+    if shared.is_empty:
+        return [shapely.Point(shapely.shortest_line(one, other).coords[0])]
+    return [shapely.Point(xy) for xy in shapely.get_coordinates(shared)]
+
+
+def _passed(line: shapely.LineString, place: shapely.Geometry) -> tuple[float, float]:
+    """Metres along a line to the first and the last of it in a place."""
+    shared = line.intersection(place)
+    if shared.is_empty:
+        way = float(line.project(place.centroid))
+        return way, way
+    ways = [line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)]
+    return float(min(ways)), float(max(ways))

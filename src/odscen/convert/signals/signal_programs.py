@@ -16,6 +16,7 @@ What must not meet never has green together. Times follow common practice:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.model.net import STAGE, Phase
@@ -23,7 +24,7 @@ from odscen.convert.model.net import STAGE, Phase
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-FLOW_RATIO = 0.4
+FLOW_RATIO = 0.45
 """Sum of the critical flow ratios (Webster's Y) that programs are made for.
 
 Moderate traffic: a cycle for saturated roads would let everybody wait long on all others.
@@ -152,15 +153,36 @@ def _filled(
 
 
 class _Change(NamedTuple):
-    """Seconds at the end of a stage: pedestrian clearance in the green, yellow, all-red."""
+    """End of a stage, in seconds.
+
+    Attributes
+    ----------
+    walk
+        Pedestrian clearance within the green: crossings are red before vehicles are.
+    yellow
+        Of the vehicles that end.
+    starts
+        From the end of the vehicles' green until each group of the next stage begins.
+    lost
+        From there until the last vehicles begin.
+    """
 
     walk: float
     yellow: float
-    red: float
+    starts: Mapping[int, float]
+    lost: float
+
+    @property
+    def late(self) -> float:
+        """Seconds from when the vehicles have begun until the last crossing begins."""
+        return max(*self.starts.values(), self.lost) - self.lost if self.starts else 0.0
 
 
 def program(stages: Stages, links: int) -> tuple[Phase, ...]:
     """Phases of a program: for each stage green, then what its end needs.
+
+    A group begins as soon as those that it waits for have cleared: mostly vehicles, and persons
+    some seconds later, for whom vehicles have to clear the whole junction.
 
     Parameters
     ----------
@@ -178,53 +200,80 @@ def program(stages: Stages, links: int) -> tuple[Phase, ...]:
         bounds = (min(LEAST_GREEN, green), PROLONGED * green) if vehicles else (0.0, 0.0)
         shown = _state(stages, stage, links)
         phases.append(Phase(green, shown, f"{STAGE}{number + 1}", *bounds))
-        ending = stage - following
-        walking = frozenset(g for g in ending if stages.groups[g].walkers)
         if change.walk:
-            still = _darkened(shown, stages.groups, walking)
+            ending = frozenset(g for g in stage - following if stages.groups[g].walkers)
+            still = _darkened(shown, stages.groups, ending)
             phases.append(Phase(change.walk, still, "pedestrian clearance"))
-        staying = _careful(
-            _darkened(shown, stages.groups, ending), _state(stages, following, links)
-        )
-        if change.yellow:
-            state = _darkened(staying, stages.groups, ending - walking, "y")
-            phases.append(Phase(change.yellow, state, "yellow"))
-        if change.red:
-            phases.append(Phase(change.red, staying, "all red"))
+        phases += _ending(stages, stage, following, change, links)
     return tuple(phases)
+
+
+def _ending(
+    stages: Stages,
+    stage: frozenset[int],
+    following: frozenset[int],
+    change: _Change,
+    links: int,
+) -> list[Phase]:
+    """Phases from the end of the vehicles' green to where all of the next stage have begun."""
+    groups, ending = stages.groups, stage - following
+    after = _state(stages, following, links)
+    staying = _careful(_darkened(_state(stages, stage, links), groups, ending), after)
+    times = sorted({0.0, change.yellow, *change.starts.values()})
+    phases = []
+    for start, end in pairwise(times):
+        begun = [g for g, seconds in change.starts.items() if seconds <= start]
+        state = _begun(staying, after, groups, begun)
+        cars = any(not groups[g].walkers for g in begun)
+        name = "vehicles first" if cars else "crossings first" if begun else "all red"
+        if start < change.yellow:
+            vehicles = frozenset(g for g in ending if not groups[g].walkers)
+            state, name = _darkened(state, groups, vehicles, "y"), "yellow"
+        phases.append(Phase(end - start, state, name))
+    return phases
 
 
 def _change(stages: Stages, stage: frozenset[int], following: frozenset[int]) -> _Change:
     groups, seconds = stages.groups, stages.conflicts.seconds
     ending, beginning = stage - following, following - stage
     cars = [g for g in ending if not groups[g].walkers]
+    walkers = [g for g in ending if groups[g].walkers]
     yellow = max((groups[g].yellow for g in cars), default=0.0)
-    red = max((seconds(g, b) for g in cars for b in beginning), default=0.0)
-    others = beginning or frozenset(range(len(groups))) - stage
-    walk = max((seconds(g, b) for g in ending if groups[g].walkers for b in others), default=0.0)
-    return _Change(max(walk - yellow - red, 0.0), yellow, red)
+    starts = {
+        b: max((yellow + seconds(g, b) for g in cars if seconds(g, b)), default=0.0)
+        for b in sorted(beginning)
+    }
+    lost = max((starts[b] for b in starts if not groups[b].walkers), default=yellow)
+    latest = max((*starts.values(), lost))
+    others = frozenset(range(len(groups))) - stage
+    walk = max(
+        (seconds(g, o) - starts.get(o, latest + WALK_GREEN) for g in walkers for o in others),
+        default=0.0,
+    )
+    return _Change(max(walk, 0.0), yellow, starts, lost)
 
 
 def _greens(
     groups: Sequence[SignalGroup], order: Sequence[frozenset[int]], changes: Sequence[_Change]
 ) -> list[float]:
-    """Seconds of green of each stage, without those of its pedestrian clearance."""
+    """Seconds in which all of a stage are green."""
     shares = [_share(groups, stage) for stage in order]
     walks = sum(
         WALK_GREEN + change.walk for share, change in zip(shares, changes, strict=True) if not share
     )
-    lost = walks + sum(change.yellow + change.red for change in changes)
+    lost = walks + sum(change.lost for change in changes)
     cycle = (1.5 * lost + 5.0) / (1.0 - FLOW_RATIO)
     cycle = min(max(cycle, SHORTEST_CYCLE), LONGEST_CYCLE)
     unit = (cycle - lost) / max(sum(shares), 1e-9)
     greens = []
-    for stage, share, change in zip(order, shares, changes, strict=True):
+    for number, (stage, share, change) in enumerate(zip(order, shares, changes, strict=True)):
         if not stage:
             greens.append(REST)
         elif not share:
             greens.append(WALK_GREEN)
         else:
-            greens.append(float(max(round(share * unit - change.walk), LEAST_GREEN)))
+            only_cars = change.walk + changes[number - 1].late
+            greens.append(float(max(round(share * unit - only_cars), LEAST_GREEN)))
     return greens
 
 
@@ -251,6 +300,13 @@ def _darkened(
     """State with another letter for the links of some groups."""
     links = {link for group in ending for link in groups[group].links}
     return "".join(letter if n in links else one for n, one in enumerate(state))
+
+
+def _begun(state: str, after: str, groups: Sequence[SignalGroup], begun: Sequence[int]) -> str:
+    """State in which some groups show already what they do in the next stage."""
+    links = {link for group in begun for link in groups[group].links}
+    pairs = zip(state, after, strict=True)
+    return "".join(new if n in links else old for n, (old, new) in enumerate(pairs))
 
 
 def _careful(state: str, following: str) -> str:
