@@ -14,6 +14,7 @@ from tests.convert.maps import Converted, named, of_model
 SIGNALS = re.compile(r"<signals>.*?</signals>", re.DOTALL)
 OBJECTS = re.compile(r"<objects>.*?</objects>", re.DOTALL)
 PRIORITY = re.compile(r"<priority [^>]*>")
+SLOW = re.compile(r'(?<=<speed max=")30(?=")')
 
 
 @cache
@@ -75,8 +76,17 @@ def test_side_streets_yield_by_sign_or_by_priority(
     assert waits(stripped(*without), side, main)
 
 
-def test_without_both_right_goes_before_left() -> None:
+def test_without_both_the_faster_road_goes_first() -> None:
     bare = stripped(SIGNALS, PRIORITY)
+    for side, main in YIELDS[:4]:
+        assert waits(bare, side, main)
+
+
+def test_of_equally_fast_roads_right_goes_before_left() -> None:
+    text = named("t_junction_signs").read_text(encoding="utf-8")
+    for pattern in (SIGNALS, PRIORITY):
+        text = pattern.sub("", text)
+    bare = of_model(parse(SLOW.sub("50", text)))
     assert waits(bare, ("4", "1"), ("5", "4")), "the side street is on the right"
     assert waits(bare, ("5", "4"), ("1", "4"))
     assert {j.get("type") for j in bare.xml.iter("junction")} >= {"right_before_left"}

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from odscen.convert.model.major_road import is_large, major_edges
+from odscen.convert.model.major_road import major_edges, stands_out
 from odscen.convert.model.right_of_way import Movement, Sign
 from tests.convert.maps import converted, named
 
@@ -44,10 +44,17 @@ def test_three_roads_of_a_star_have_none() -> None:
     assert major(approach("a", 0), approach("b", 120), approach("c", 240)) == frozenset()
 
 
-def test_two_lanes_on_an_approach_make_a_junction_large() -> None:
-    assert not is_large([approach("a", 0), approach("b", 90)], [True, True])
-    assert is_large([approach("a", 0), approach("a", 0, lane=1)], [True, True])
-    assert not is_large([approach("a", 0), approach("a", 0, lane=1)], [True, False])
+def test_a_road_stands_out_where_an_approach_has_two_lanes_for_cars() -> None:
+    assert not stands_out([approach("a", 0), approach("b", 90)], [True, True])
+    assert stands_out([approach("a", 0), approach("a", 0, lane=1)], [True, True])
+    assert not stands_out([approach("a", 0), approach("a", 0, lane=1)], [True, False])
+
+
+def test_a_road_stands_out_that_is_faster_than_all_others() -> None:
+    fast = approach("w", 0, speed=13.9), approach("e", 180, speed=13.9)
+    assert stands_out([*fast, approach("n", -90, speed=8.3)], [True] * 3)
+    assert not stands_out([*fast, approach("n", -90, speed=13.9)], [True] * 3)
+    assert not stands_out([*fast, approach("n", -90, speed=16.7)], [True] * 3)
 
 
 def test_with_the_lights_off_a_crossing_has_a_major_road() -> None:

@@ -16,6 +16,7 @@ from odscen.convert.model.right_of_way import (
     Sign,
     Walkway,
     find_conflicts,
+    in_turn,
     requests,
     wrapped,
 )
@@ -130,10 +131,24 @@ def test_a_ramp_gives_way_to_the_faster_road() -> None:
     assert not waits(road, ramp)
 
 
-def test_of_two_roads_as_fast_as_each_other_the_straighter_goes_first() -> None:
+def test_two_roads_as_fast_as_each_other_that_only_merge_go_in_turn() -> None:
+    pair = [movement(EAST, EAST), movement(0.4, EAST)]
+    found = find_conflicts(pair, [])
+    one, other = requests(pair, found, Rules())
+    assert one.yields_to == {1}
+    assert other.yields_to == {0}
+    assert in_turn(pair, found, Rules()) == {(0, 1)}
+
+
+def test_nobody_goes_in_turn_where_lanes_cross_or_somebody_must_wait() -> None:
     road, bending = movement(EAST, EAST), movement(0.4, EAST)
-    assert waits(bending, road)
-    assert not waits(road, bending)
+    across = [road, bending, movement(NORTH, NORTH)]
+    assert in_turn(across, find_conflicts(across, []), Rules()) == frozenset()
+    sign = [road, replace(bending, sign=Sign.YIELD)]
+    assert in_turn(sign, find_conflicts(sign, []), Rules()) == frozenset()
+    fast = [replace(road, speed=33.3), bending]
+    assert in_turn(fast, find_conflicts(fast, []), Rules()) == frozenset()
+    assert waits(bending, fast[0])
 
 
 def test_where_all_must_stop_each_waits_for_each() -> None:
@@ -203,7 +218,7 @@ all_rules = st.builds(
 
 
 @given(st.lists(movements, max_size=8), st.lists(crossings, max_size=3), all_rules)
-def test_of_two_that_meet_exactly_one_waits_and_all_wait_for_persons(
+def test_of_two_that_meet_one_waits_or_both_in_turn_and_all_wait_for_persons(
     listed: list[Movement], walkways: list[Walkway], rules: Rules
 ) -> None:
     found = find_conflicts(listed, walkways)
@@ -212,8 +227,10 @@ def test_of_two_that_meet_exactly_one_waits_and_all_wait_for_persons(
     for number, right in enumerate(rights):
         assert right.yields_to <= right.foes
         assert all(number in rights[foe].foes for foe in right.foes)
+    turns = in_turn(listed, found, rules)
     for i, j in found.pairs:
-        assert (j in rights[i].yields_to) != (i in rights[j].yields_to)
+        waiting = {j in rights[i].yields_to, i in rights[j].yields_to}
+        assert waiting == ({True} if (i, j) in turns else {True, False})
     for number, crossed in enumerate(found.crossed, start=len(listed)):
         assert rights[number].yields_to == frozenset()
         assert rights[number].foes == set(crossed)
@@ -226,7 +243,8 @@ def test_who_waits_does_not_depend_on_the_order(listed: list[Movement], rules: R
         for other in listed[i + 1 :]:
             if (one.source, one.target) == (other.source, other.target):
                 continue
-            if not find_conflicts([one, other], []).pairs:
+            found = find_conflicts([one, other], [])
+            if not found.pairs or in_turn([one, other], found, rules):
                 continue
             both_ways = [("a", "b"), ("b", "a"), ("a", "c"), ("c", "a"), ("b", "c"), ("c", "b")]
             if any((b, a) in rules.high_low for a, b in both_ways if (a, b) in rules.high_low):

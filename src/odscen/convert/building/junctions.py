@@ -12,7 +12,7 @@ import shapely
 from odscen.base.ids import SumoEdgeId
 from odscen.convert.building.waiting_places import inner_junctions, waiting_places
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
-from odscen.convert.model.major_road import is_large, major_edges
+from odscen.convert.model.major_road import major_edges, stands_out
 from odscen.convert.model.net import (
     INTERNAL,
     LEAST_LENGTH,
@@ -23,7 +23,7 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, requests
+from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, in_turn, requests
 from odscen.convert.signals.shared_green import LightLinks, light_stages
 from odscen.convert.signals.signal_programs import program
 
@@ -136,19 +136,22 @@ def build_junction(
     signs = {movement.source[0]: movement.sign for movement in movements}
     all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
     cars = ["passenger" in passage.allowed for passage in passages]
-    # Signs that are the same everywhere rule no more than none at all.
     unruled = len(set(signs.values())) <= 1 and not around.high_low
     major: frozenset[str] = frozenset()
-    if signalled or (unruled and is_large(movements, cars)):
+    # Signs to give way on all approaches distinguish none, but say that there is a major road.
+    if signalled or (unruled and (any(signs.values()) or stands_out(movements, cars))):
         major = major_edges(movements, cars)
     rules = Rules(around.high_low, around.lefthand, all_stop, signalled, major)
     rights = requests(movements, conflicts, rules)
     light, rows = None, dict[int, int]()
     if signalled:
         light, rows = _light(name, passages, conflicts, rights, crossings, around)
-    equal = unruled and not major and not all_stop
+    zipped = {n for pair in in_turn(movements, conflicts, rules) for n in pair}
+    equal = unruled and not major and not all_stop and not zipped
     states = [
-        _state(m, right, len(movements), lit=n in rows, all_stop=all_stop, equal=equal)
+        "Z"
+        if n in zipped
+        else _state(m, right, len(movements), lit=n in rows, all_stop=all_stop, equal=equal)
         for n, (m, right) in enumerate(zip(movements, rights, strict=False))
     ]
     places = waiting_places(
@@ -166,7 +169,7 @@ def build_junction(
     if not kind:
         yielding = Sign.STOP in signs.values()
         kind = "priority_stop" if yielding else "right_before_left" if equal else "priority"
-        kind = "priority" if not conflicts.pairs else kind
+        kind = "priority" if not conflicts.pairs else "zipper" if zipped else kind
     last = [inside.beyond[n][0] if n in places else lane for n, lane in enumerate(inside.lanes)]
     junction = NetJunction(
         name,

@@ -24,6 +24,9 @@ BESIDE = 0.5
 LARGE_LANES = 2
 """Lanes for cars on one approach that make a junction large."""
 
+FASTER = 2.0
+"""m/s by which a road must be faster than others to go first in a small junction."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Approach:
@@ -61,9 +64,19 @@ def major_edges(movements: Sequence[Movement], cars: Sequence[bool]) -> frozense
     )
 
 
-def is_large(movements: Sequence[Movement], cars: Sequence[bool]) -> bool:
-    """Whether a junction is so large that equal right for all would lock it."""
-    return any(one.lanes >= LARGE_LANES for one in _approaches(movements, cars))
+def stands_out(movements: Sequence[Movement], cars: Sequence[bool]) -> bool:
+    """Whether a road goes first though no sign says so.
+
+    It does in junctions so large that equal right for all would lock them, and where one road is
+    faster than the others.
+    """
+    approaches = _approaches(movements, cars)
+    major = major_edges(movements, cars)
+    slowest = min((one.speed for one in approaches if one.edge in major), default=0.0)
+    others = [one.speed for one in approaches if one.edge not in major]
+    return any(one.lanes >= LARGE_LANES for one in approaches) or (
+        bool(others) and slowest - max(others) > FASTER
+    )
 
 
 def _approaches(movements: Sequence[Movement], cars: Sequence[bool]) -> list[_Approach]:

@@ -7,9 +7,9 @@ meet, the first of these rules that distinguishes them decides:
 2. in a roundabout, what comes from outside gives way to what is inside;
 3. stop gives way to yield and yield to all others;
 4. ``<priority>`` of the OpenDRIVE junction;
-5. where lanes only merge, the faster road goes first, and then the straighter movement;
+5. where lanes only merge, the faster road goes first; of equally fast ones vehicles go in turn;
 6. one who turns across gives way to oncoming traffic that does not;
-7. the major road, where there is one: junctions with lights, and large ones, have one
+7. the major road, where there is one: junctions with lights, large ones and some others have
    (:mod:`odscen.convert.model.major_road`);
 8. right before left (left before right where traffic keeps left).
 
@@ -52,6 +52,9 @@ OPPOSING = math.radians(125.0)
 
 _FASTER = 2.0
 """m/s by which a road must be faster to go first where lanes merge."""
+
+_BESIDE = math.radians(75.0)
+"""Difference of headings up to which two roads run into each other rather than meet."""
 
 
 class Sign(IntEnum):
@@ -211,10 +214,11 @@ def requests(
     foes: list[set[int]] = [set() for _ in range(count + len(conflicts.crossed))]
     yields: list[set[int]] = [set() for _ in foes]
     only_merges = len(conflicts.merging) == len(conflicts.pairs)
+    turns = in_turn(movements, conflicts, rules)
     for i, j in conflicts.pairs:
         foes[i].add(j)
         foes[j].add(i)
-        if rules.all_stop:
+        if rules.all_stop or (i, j) in turns:
             yields[i].add(j)
             yields[j].add(i)
         elif _waits(movements[i], movements[j], rules, (i, j) in conflicts.merging, only_merges):
@@ -228,6 +232,34 @@ def requests(
             yields[link].add(count + number)
     return tuple(
         Request(frozenset(before), frozenset(met)) for before, met in zip(yields, foes, strict=True)
+    )
+
+
+def in_turn(
+    movements: Sequence[Movement], conflicts: Conflicts, rules: Rules
+) -> frozenset[tuple[int, int]]:
+    """Pairs of movements into one lane that go in turn, like the teeth of a zipper.
+
+    So they do where a junction has no other conflicts and nothing says who goes first: otherwise
+    one of two roads that are full would never get in, and ramps in a ring lock for good.
+    """
+    if rules.all_stop or rules.signalled or len(conflicts.merging) < len(conflicts.pairs):
+        return frozenset()
+    return frozenset(
+        (i, j)
+        for i, j in conflicts.merging
+        if not conflicts.crossed and _are_equal(movements[i], movements[j], rules)
+    )
+
+
+def _are_equal(one: Movement, other: Movement, rules: Rules) -> bool:
+    return (
+        one.in_roundabout == other.in_roundabout
+        and one.sign == other.sign
+        and one.source[0] != other.source[0]
+        and _stated(one, other, rules) is None
+        and abs(one.speed - other.speed) <= _FASTER
+        and abs(wrapped(one.heading_in - other.heading_in)) < _BESIDE
     )
 
 

@@ -164,7 +164,7 @@ class _Change(NamedTuple):
     starts
         From the end of the vehicles' green until each group of the next stage begins.
     lost
-        From there until the last vehicles begin.
+        From there until vehicles begin, all at a time.
     """
 
     walk: float
@@ -181,8 +181,8 @@ class _Change(NamedTuple):
 def program(stages: Stages, links: int) -> tuple[Phase, ...]:
     """Phases of a program: for each stage green, then what its end needs.
 
-    A group begins as soon as those that it waits for have cleared: mostly vehicles, and persons
-    some seconds later, for whom vehicles have to clear the whole junction.
+    Vehicles begin as soon as all that they wait for have cleared, and persons when those have that
+    they wait for: mostly some seconds later, as for them vehicles clear the whole junction.
 
     Parameters
     ----------
@@ -239,11 +239,12 @@ def _change(stages: Stages, stage: frozenset[int], following: frozenset[int]) ->
     cars = [g for g in ending if not groups[g].walkers]
     walkers = [g for g in ending if groups[g].walkers]
     yellow = max((groups[g].yellow for g in cars), default=0.0)
-    starts = {
+    cleared = {
         b: max((yellow + seconds(g, b) for g in cars if seconds(g, b)), default=0.0)
         for b in sorted(beginning)
     }
-    lost = max((starts[b] for b in starts if not groups[b].walkers), default=yellow)
+    lost = max((cleared[b] for b in cleared if not groups[b].walkers), default=yellow)
+    starts = {b: cleared[b] if groups[b].walkers else lost for b in cleared}
     latest = max((*starts.values(), lost))
     others = frozenset(range(len(groups))) - stage
     walk = max(
