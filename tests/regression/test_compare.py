@@ -50,7 +50,7 @@ def sides(tmp_path_factory):
     store = Workspace.open(root / "workspace")
     store.add_map(ROOT / "maps" / "signal_crossing.xodr")
     changed = json.loads(SCENARIO.read_text())
-    changed["signals"] = {"junctions": [{"junction": "10001", "green": [60, 8, 8, 8, 8, 8, 7]}]}
+    changed["signals"] = {"junctions": [{"junction": "10001", "green": [60, 8]}]}
     other = root / "signal_crossing.scenario.json"
     other.write_text(json.dumps(changed))
     for side, path in (("a", SCENARIO), ("b", other)):

@@ -166,7 +166,8 @@ def test_emissions_and_fuel_are_those_of_every_vehicle_and_step(run, ours, their
 
 
 def test_speed_and_density_of_a_segment_are_those_of_its_vehicles(run):
-    on = run.steps.filter(col("vehicle_lane").str.starts_with("3."))
+    # Between its two edges lies a lane of 0.1 m on which one can stop, too.
+    on = run.steps.filter(col("vehicle_lane").str.contains(r"^3\.|^:N3\."))
     segment = of(run.figures.segments, segment="r3")
     assert segment["speed"] == pytest.approx(on["vehicle_speed"].mean(), rel=2 * CLOSE)
     number = on.height * STEP / UNTIL
@@ -201,7 +202,7 @@ def test_queues_are_those_who_stand_at_one_time(run):
     )
     row = of(run.figures.junctions, junction="j10001")
     assert row["queue_max"] == standing["len"].max()
-    assert row["standing"] == pytest.approx(standing["len"].sum() * STEP / UNTIL, rel=0.05)
+    assert row["standing"] == pytest.approx(standing["len"].sum() * STEP / UNTIL, rel=0.02)
     junction = run.figures.junctions.filter(col("junction") == "j10001")
     assert (junction["queue_p95"] <= junction["queue_max"]).all()
 

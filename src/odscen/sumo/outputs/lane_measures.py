@@ -21,11 +21,14 @@ SUMO also gives, per lane, travel time and distance of the fronts, from which
 
     seconds   = traveltime * distance / length
     time_loss = seconds - distance * (sampled - timeLoss) / (speed * sampled)
-    waiting   = waitingTime * seconds / sampled
+    waiting   = waitingTime - of_rears, where, of the rears whose fronts are further on,
+    of_rears  = (sampled - seconds) - (speed * sampled - distance) * (sampled - waitingTime)
+                / (speed * sampled)
 
 with ``sampled`` for its seconds. The second is exact if all who were on the lane wished to drive
 equally fast; where it was held against the trips, the sum was less than 2 % below theirs. The third
-takes rears to stand as much as fronts do; held against every step, it was off by 1 %.
+is exact if rears that move are as fast as all who move; held against every step, the sum was less
+than 2 % below.
 """
 
 from __future__ import annotations
@@ -96,16 +99,19 @@ def lane_table(
     loss = pl.when(moved > 0.0).then(
         col("seconds") - col("distance") * (sampled - col("timeLoss")) / moved
     )
+    waited = col("waitingTime")
+    rears = (
+        pl.when(moved > 0.0)
+        .then(sampled - col("seconds") - (moved - col("distance")) * (sampled - waited) / moved)
+        .otherwise(sampled - col("seconds"))
+    )
     return (
         rows.join(here, on=["begin", "lane"], how="left")
         .with_columns(length=col("lane").replace_strict(by_lane, return_dtype=pl.Float64))
         .with_columns(seconds=fronts.fill_null(0.0))
         .with_columns(
             time_loss=loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds")),
-            waiting=pl.when(sampled > 0.0)
-            .then(col("waitingTime") * col("seconds") / sampled)
-            .fill_null(0.0)
-            .clip(0.0, col("seconds")),
+            waiting=(waited - rears.clip(0.0, waited)).fill_null(0.0).clip(0.0, col("seconds")),
             entered=(col("entered") - col("present").fill_null(0)).clip(0),
         )
         .select(
