@@ -40,6 +40,8 @@ LEAST_LANES = 1.0
 """Kilometres of lanes of a map that is measured."""
 
 VTYPE = '<vType id="car" vClass="passenger" length="4.6" width="1.8" speedDev="0.1"/>'
+PERSONS = 800
+WALKED = f"on, {PERSONS} walking on ours"
 HIGH_LEVELS = {"signal_crossing": (2500, 5000, 8000)}
 
 
@@ -161,7 +163,11 @@ class _MapBench:
             self._nets["ours"].getTrafficLights() or self._nets["netconvert"].getTrafficLights()
         )
         ratios = []
-        for lights in ("on", "off") if lit else ("none",):
+        modes = ["on", "off"] if lit else ["none"]
+        if lit and level == HIGH_LEVELS.get(self._label, (0,))[-1]:
+            self._walks()
+            modes.append(WALKED)
+        for lights in modes:
             ours, peer = (self._run(name, departs, seeds, lights) for name in self._files)
             values = [f"{a:.0f} / {b:.0f}" for a, b in zip(ours, peer, strict=True)]
             print(f"| {self._label} | {lights} | {level} | {' | '.join(values)} |", flush=True)
@@ -186,6 +192,23 @@ class _MapBench:
             text = "".join(ET.tostring(vehicles[key], encoding="unicode") for key in both)
             (self._folder / f"{name}.rou.xml").write_text(f"<routes>{VTYPE}{text}</routes>")
         return {key: trips[int(key)][2] for key in both}
+
+    def _walks(self) -> None:
+        """Write persons who walk from pavement to pavement, over all crossings."""
+        rng = random.Random(1)
+        pavements = [
+            edge.getID()
+            for edge in self._nets["ours"].getEdges(withInternal=False)
+            if edge.allows("pedestrian") and not edge.allows("passenger")
+        ]
+        rows = []
+        for number, depart in enumerate(sorted(rng.uniform(0.0, HOUR) for _ in range(PERSONS))):
+            one, other = rng.sample(pavements, 2)
+            rows.append(
+                f'<person id="p{number}" depart="{depart:.1f}">'
+                f'<walk from="{one}" to="{other}"/></person>'
+            )
+        (self._folder / "walks.xml").write_text(f"<routes>{''.join(rows)}</routes>")
 
     def _routed(self, name: str, trips: Sequence[tuple[int, int, float]]) -> dict[str, ET.Element]:
         rows = [VTYPE]
@@ -218,8 +241,13 @@ class _MapBench:
         outcomes = []
         info, stats = self._folder / "info.xml", self._folder / "stats.xml"
         off = ["--tls.all-off"] if lights == "off" else []
+        routes = [
+            f"{name}.rou.xml",
+            *(["walks.xml"] if lights == WALKED and name == "ours" else []),
+        ]
+        files = ",".join(str(self._folder / file) for file in routes)
         for seed in seeds:
-            _tool("sumo", "-n", self._files[name], "-r", self._folder / f"{name}.rou.xml",
+            _tool("sumo", "-n", self._files[name], "-r", files,
                   "--end", "3600", "--step-length", "0.5", "--seed", str(seed),
                   "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
                   "--statistic-output", stats, "--no-warnings", "--no-step-log", *off)  # fmt: skip
