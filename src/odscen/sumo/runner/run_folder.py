@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.lane_places import LanePlaces
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.realize.forecast import Forecast
     from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.sumo.runner.forecast import Forecast
     from odscen.sumo.runner.worker_process import Ended
 
 Finish = Callable[["Path", Mapping[str, Any]], None]
