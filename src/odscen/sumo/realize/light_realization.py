@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
 """``type`` of a ``<tlLogic>``."""
 
-NETWORKS_OWN = "0"
-"""``programID`` of the network's program."""
+GROUP_PARAM = "odscen.group."
+"""How parameters begin that name signal groups; their values are places in the states."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +223,10 @@ class _Realizing:
         phases = plan_phases(program, plan, ends=ends, calls=calls)
         free = self._control == "fixed" and not phases.chooses
         params = self._params(() if free else loops)
+        params |= {
+            f"{GROUP_PARAM}{group.id}": " ".join(map(str, group.movements))
+            for group in program.groups.values()
+        }
         if program.timing.plans:
             params["GSP"] = "1"
         offset = plan.offset

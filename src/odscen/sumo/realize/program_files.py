@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
     from odscen.sumo.realize.stage_phases import SumoPhase
 
+DETECTOR_PARAM = "odscen.detector"
+"""Parameter of a loop that has the detector's name in the scenario."""
+
 _PERIOD = 86_400
 """Seconds over which SUMO would aggregate what a loop counts; nothing of it is written."""
 
@@ -33,10 +36,13 @@ def signals_xml(lights: Iterable[RealizedLight]) -> str | None:
 
 def _loop_xml(loop: PlacedLoop) -> str:
     walking = ' detectPersons="walk"' if loop.walk else ""
-    return (
+    text = (
         f'    <inductionLoop id="{loop.id}" lane="{loop.lane}" pos="{loop.pos:.4f}"'
-        f' length="{loop.length:.4f}"{walking} file="NUL" period="{_PERIOD}"/>'
+        f' length="{loop.length:.4f}"{walking} file="NUL" period="{_PERIOD}"'
     )
+    if not loop.name:
+        return text + "/>"
+    return f'{text}><param key="{DETECTOR_PARAM}" value="{loop.name}"/></inductionLoop>'
 
 
 def _program_xml(light: str, program: SumoProgram) -> Iterator[str]:
