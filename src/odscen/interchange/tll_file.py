@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError
+from odscen.sumo.realize.program_files import DETECTOR_PARAM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,7 +18,10 @@ _LETTERS = frozenset("GgyrYRu")
 
 @dataclass(frozen=True, slots=True)
 class FilePhase:
-    """One ``<phase>``; ``least`` and ``most`` are equal where nothing prolongs it."""
+    """One ``<phase>``; ``least`` and ``most`` are equal where nothing prolongs it.
+
+    ``held`` says whether it lasts until a place in the cycle, as the first stage of a coordination.
+    """
 
     seconds: float
     state: str
@@ -27,6 +31,7 @@ class FilePhase:
     following: tuple[int, ...]
     early: str
     final: str
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +161,7 @@ def _phase(element: etree._Element, place: str, *, actuated: bool) -> FilePhase:
         following,
         element.get("earlyTarget", ""),
         element.get("finalTarget", ""),
+        element.get("earliestEnd") is not None,
     )
 
 
@@ -163,7 +169,7 @@ def _loop(element: etree._Element) -> FileLoop:
     names = [
         one.get("value", "")
         for one in element.iterfind("param")
-        if "detector" in one.get("key", "")
+        if one.get("key") == DETECTOR_PARAM
     ]
     return FileLoop(
         element.get("id", ""),

@@ -28,6 +28,7 @@ from odscen.scenario.signals.stage_sequence import (
     change_steps,
     stage_state,
 )
+from odscen.sumo.realize.light_realization import CONTROL_PARAM, GROUP_PARAM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from odscen.interchange.tll_loops import TakenLoop
     from odscen.interchange.tll_stages import FileStage
     from odscen.scenario.signals.light import Light
-
-GROUP_PARAM = "odscen.group."
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,9 @@ class _Taking:
         return timing, tuple(dict.fromkeys(self._notes))
 
     def _actuated(self) -> bool:
-        return any(stage.most > stage.least for stages in self._cycles for stage in stages)
+        said = self._plans[0].program.params.get(CONTROL_PARAM)
+        longer = any(stage.most > stage.least for stages in self._cycles for stage in stages)
+        return longer if said is None else said == "actuated"
 
     def _ended_by(self) -> dict[str, dict[str, float]]:
         """Gaps of the loops that prolong each stage, by the stage's id."""
@@ -109,7 +110,8 @@ class _Taking:
             for stage in stages:
                 gaps = found.setdefault(stage.id, {})
                 gaps.update(stage.gaps)
-                if stage.most > stage.least and not stage.gaps:
+                prolonged = stage.most > stage.least or (stage.held and self._actuated())
+                if prolonged and not stage.gaps:
                     green = {n for n, letter in enumerate(stage.state) if letter in "Gg"}
                     for name, loop in self._loops.items():
                         if own.get(loop.lane) == name and green & set(loop.movements):
@@ -228,8 +230,9 @@ class _Taking:
         program, stages = self._plans[number].program, self._cycles[number]
         cycle = sum(s.seconds + sum(step.seconds for step in s.steps) for s in stages)
         if program.params.get("coordinated") == "true":
-            cycle = float(program.params.get("cycleTime", cycle))
-            return {"cycle": cycle, "offset": (program.offset - stages[0].seconds) % cycle}
+            kept = float(program.params.get("cycleTime", cycle))
+            offset = {"offset": (program.offset - stages[0].seconds) % kept}
+            return offset | ({"cycle": kept} if self._actuated() else {})
         total = sum(phase.seconds for phase in program.phases)
         start = -program.offset % total
         return {"offset": (first_stage_at(program) - start) % cycle}

@@ -32,7 +32,15 @@ class FileStage:
     most: float
     on_call: bool
     gaps: dict[str, float]
+    held: bool
     steps: list[FilePhase] = field(default_factory=list)
+
+    def lengthen(self, phase: FilePhase) -> None:
+        """Add a phase that goes on showing the same."""
+        self.seconds += phase.seconds
+        self.least += phase.least
+        self.most += phase.most
+        self.held |= phase.held
 
 
 def shown_need(links: Sequence[int], stage: FileStage) -> float:
@@ -94,7 +102,13 @@ def _begins(before: str, after: str) -> bool:
 
 
 def file_stages(program: FileProgram) -> list[FileStage]:
-    """Stages of a program, each with the steps that follow."""
+    """Stages of a program, each with the steps that follow.
+
+    Raises
+    ------
+    InputError
+        If nothing begins in it, or it does not come back to its first phase.
+    """
     order = _main(program)
     phases = [program.phases[n] for n in order]
     states = [phase.state for phase in phases]
@@ -102,7 +116,9 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     if not firsts:
         msg = f"{program.place}: nothing ever begins to have green"
         raise InputError(msg)
-    turned = [*range(firsts[0], len(phases)), *range(firsts[0])]
+    held = next((n for n, phase in enumerate(phases) if phase.held), firsts[0])
+    start = max((n for n in firsts if n <= held), default=firsts[-1])
+    turned = [*range(start, len(phases)), *range(start)]
     stages: list[FileStage] = []
     for n in turned:
         phase = phases[n]
@@ -117,13 +133,20 @@ def file_stages(program: FileProgram) -> list[FileStage]:
                     phase.most,
                     _called(program, order, n),
                     _gaps(program, order[(n + 1) % len(order)]),
+                    phase.held,
                 )
             )
+        elif phase.state == stages[-1].state and not stages[-1].steps:
+            stages[-1].lengthen(phase)
+            stages[-1].gaps = _gaps(program, order[(n + 1) % len(order)])
         elif phase.most > phase.least:
             msg = f"{program.place}: phase {order[n]} is prolonged, but nothing begins in it"
             raise InputError(msg)
         else:
             stages[-1].steps.append(phase)
+    for stage in stages:
+        if stage.held:  # how long is a matter of the cycle
+            stage.least = stage.most = stage.seconds
     return stages
 
 

@@ -141,8 +141,9 @@ def test_an_actuated_program_with_a_cycle_keeps_to_it(tmp_path: Path) -> None:
     junction = one_plan(stages=[*bounds, program()["stages"][3]], cycle=85, detectors=None)
     seen = shown(tmp_path, scenario(junction, control="actuated", walkers=0.0))
     ends = [one.begin + one.seconds for one in seen[:-1] if one.name == "stage 1"]
-    assert len(ends) > 4
-    assert {round(b - a, 3) for a, b in pairwise(ends[1:])} == {85.0}
+    assert len(ends) > 5
+    assert {round(b - a, 3) for a, b in pairwise(ends)} == {85.0}
+    assert ends[0] == 20.0
     assert len({one.seconds for one in seen if one.name == "stage 3"}) > 1
 
 

@@ -30,14 +30,17 @@ class ProgramPhase(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ShownGroup:
-    """A signal group: its letters in the states, what it is for, and its lanes before the light."""
+    """A signal group: its letters in the states, and what it is for.
+
+    ``lanes`` are SUMO's: for each link that before the light, then those inside the junction; of
+    crossings none.
+    """
 
     id: str
     links: tuple[int, ...]
     movements: tuple[str, ...]
     walk: bool
-    lanes: tuple[tuple[str, str], ...] = ()
-    """Lanes before and behind, SUMO's ids, one pair a link; of a crossing none."""
+    lanes: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,6 +128,12 @@ def vehicle_loops(
     return tuple(loops)
 
 
+def idle_loop(light: SumoLight, net: RoadNet, movement: int) -> PlacedLoop:
+    """Make a loop that prolongs nothing: without any SUMO could not load the state of a light."""
+    lane = light.links[movement].source
+    return _placed(net, f"{light.id}.idle", lane, (movement,), ahead=LOOP, stages=())
+
+
 def waiting_places(
     light: SumoLight, net: RoadNet, crossings: Mapping[str, Iterable[int]]
 ) -> tuple[PlacedLoop, ...]:

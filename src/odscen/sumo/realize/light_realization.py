@@ -22,9 +22,15 @@ from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.plan_times import active_plans
 from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
-from odscen.sumo.realize.light_detectors import called, may_end, vehicle_loops, waiting_places
+from odscen.sumo.realize.light_detectors import (
+    called,
+    idle_loop,
+    may_end,
+    vehicle_loops,
+    waiting_places,
+)
 from odscen.sumo.realize.light_views import scenario_lights
-from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase, plan_phases
+from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase, kept_cycle, plan_phases
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,6 +44,9 @@ if TYPE_CHECKING:
 
 TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
 """``type`` of a ``<tlLogic>``."""
+
+CONTROL_PARAM = "odscen.control"
+"""Parameter that says whether the program is meant to be fixed-time or actuated."""
 
 GROUP_PARAM = "odscen.group."
 """How parameters begin that name signal groups; their values are places in the states."""
@@ -66,6 +75,11 @@ class RealizedLight:
     programs: tuple[SumoProgram, ...] = ()
     loops: tuple[PlacedLoop, ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def watched(self) -> bool:
+        """Whether SUMO runs detectors of it."""
+        return any(program.kind == "actuated" for program in self.programs)
 
 
 def realized_lights(
@@ -164,6 +178,11 @@ class _Realizing:
         active = active_plans(plans, clock=clock, until=until)
         calling = self._calling(program)
         loops = waiting_places(self._light, self._net, calling)
+        if loops and self._control == "fixed":
+            first = program.plans()[0].stages[0]
+            shown = [n for g in sorted(first.groups) for n in program.groups[g].movements]
+            cars = [n for n in shown if not self._view.movements[n].walk]
+            loops = (*loops, *(idle_loop(self._light, self._net, n) for n in cars[:1]))
         if self._control == "actuated":
             stages = {s.id: s for plan in plans for s in plan.stages}
             loops = (
@@ -179,18 +198,19 @@ class _Realizing:
                 ),
                 *loops,
             )
-        made, shown = [], []
+        made: list[SumoProgram] = []
+        shown_plans: list[ShownPlan] = []
         for plan in plans:
             if plan.id in {name for _, name in active}:
                 one = self._program(program, plan, loops)
                 made.append(one)
                 begins = tuple(time for time, name in active if name == plan.id)
-                shown.append(self._shown_plan(plan.id, plan.offset, one.plan, begins))
+                shown_plans.append(self._shown_plan(plan.id, plan.offset, one.plan, begins))
         groups = tuple(
             self._shown_group(group.id, group.movements) for group in program.groups.values()
         )
         return RealizedLight(
-            self._shown(groups, tuple(shown), loops, own=True), tuple(made), loops, active
+            self._shown(groups, tuple(shown_plans), loops, own=True), tuple(made), loops, active
         )
 
     def _calling(self, program: DesignedProgram) -> dict[str, set[int]]:
@@ -220,19 +240,24 @@ class _Realizing:
             if stage.on_call:
                 calls[stage.id] = f"call{stage.id}"
                 conditions[calls[stage.id]] = called(loops, stage.id)
-        phases = plan_phases(program, plan, ends=ends, calls=calls)
+        switched = bool(program.timing.plans) and (bool(loops) or self._control == "actuated")
+        phases = plan_phases(program, plan, ends=ends, calls=calls, switched=switched)
         free = self._control == "fixed" and not phases.chooses
         params = self._params(() if free else loops)
         params |= {
             f"{GROUP_PARAM}{group.id}": " ".join(map(str, group.movements))
             for group in program.groups.values()
         }
+        params[CONTROL_PARAM] = self._control
         if program.timing.plans:
-            params["GSP"] = "1"
+            before = sum(phase.seconds for phase in phases.phases[: phases.first])
+            params["GSP"] = f"{before + 1:g}"
         offset = plan.offset
-        if self._control == "actuated" and plan.cycle is not None:
-            params |= {"coordinated": "true", "cycleTime": f"{plan.cycle:g}"}
-            offset += plan.stages[0].green  # the cycle is counted from the end of the first stage
+        cycle = kept_cycle(program, plan)
+        if cycle is not None:
+            params |= {"coordinated": "true", "cycleTime": f"{cycle:g}"}
+            # The cycle is counted from the end of the first stage; SUMO errs before a positive one.
+            offset = -(-(offset + plan.stages[0].green) % cycle)
         else:
             offset = _started(phases, offset)
         return SumoProgram(
@@ -289,7 +314,9 @@ class _Realizing:
         own: bool,
     ) -> LightProgram:
         detectors = tuple(
-            ShownDetector(loop.id, loop.name, loop.stages, loop.walk) for loop in loops
+            ShownDetector(loop.id, loop.name, loop.stages, loop.walk)
+            for loop in loops
+            if loop.stages
         )
         light = self._light
         return LightProgram(
@@ -301,16 +328,31 @@ class _Realizing:
     ) -> ShownPlan:
         phases = tuple(
             ProgramPhase(p.seconds, p.state, p.name, p.stage, p.least, p.most, p.on_call)
-            for p in plan.phases[: plan.main]
+            for p in plan.cycle
         )
         return ShownPlan(name, offset, phases, begins)
 
     def _shown_group(self, name: str, links: tuple[int, ...]) -> ShownGroup:
         movements = self._view.movements
         walk = bool(movements) and all(movements[n].walk for n in links)
-        lanes = tuple((self._light.links[n].source, self._light.links[n].target) for n in links)
+        lanes = tuple(self._inside(n) for n in links)
         names = shortest_names(links, movements) if movements else ()
         return ShownGroup(name, links, names, walk, () if walk else lanes)
+
+    def _inside(self, n: int) -> tuple[str, ...]:
+        """Lane before the light, and the lanes of a link inside the junction."""
+        link = self._light.links[n]
+        onto = next(
+            (
+                one.via
+                for one in self._net.links_from.get(link.source, ())
+                if one.target == link.target
+            ),
+            None,
+        )
+        if onto is None:
+            return link.source, link.target
+        return link.source, onto, *(lane.id for lane in self._net.leaving(onto)[:-1])
 
     def _own_groups(self) -> tuple[ShownGroup, ...]:
         """Groups of the network's program: links that always show the same, but for who yields."""
@@ -333,6 +375,6 @@ def _green(state: str) -> set[int]:
 
 def _started(plan: PhasePlan, offset: float) -> float:
     """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
-    cycle = sum(phase.seconds for phase in plan.phases[: plan.main])
+    cycle = sum(phase.seconds for phase in plan.cycle)
     total = sum(phase.seconds for phase in plan.phases)
     return offset if total == cycle else (total - (-offset % cycle)) % total

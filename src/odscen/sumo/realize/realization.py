@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from odscen.results.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Environment, Scenario
     from odscen.sumo.realize.driving import Driver
+    from odscen.sumo.realize.light_realization import RealizedLight
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.realize.sumo_map import SumoMap
@@ -142,7 +143,7 @@ def realize(
     )
     lights = realized_lights(scenario, sumo_map, until=until)
     signals = signals_xml(lights)
-    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals)}
+    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals, lights)}
     return Realization(
         files,
         plan,
@@ -152,7 +153,9 @@ def realize(
     )
 
 
-def _run_files(plan: Plan, settings: RunSettings, signals: str | None) -> dict[str, str]:
+def _run_files(
+    plan: Plan, settings: RunSettings, signals: str | None, lights: Sequence[RealizedLight]
+) -> dict[str, str]:
     """What SUMO reads beside network and routes; ``signals`` are programs that differ."""
     recording = settings.recorded
     sumocfg = SumocfgSettings(
@@ -168,7 +171,12 @@ def _run_files(plan: Plan, settings: RunSettings, signals: str | None) -> dict[s
     interval = interval_of(plan.until, plan.slice_length)
     files = {
         CONFIG_FILE: sumo_config(sumocfg),
-        MEASURES_FILE: measures_xml(interval, emissions=recording.emissions),
+        MEASURES_FILE: measures_xml(
+            interval,
+            emissions=recording.emissions,
+            lights=bool(lights),
+            watched=[light.shown.id for light in lights if light.watched],
+        ),
     }
     if signals is not None:
         files[SIGNALS_FILE] = signals

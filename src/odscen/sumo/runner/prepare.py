@@ -64,6 +64,7 @@ def prepare(
         problems=realization.problems,
         notes=((MESO_NOTE,) if settings.meso else ()) + realization.notes,
         places=lane_places(sumo_map),
+        lights=realization.lights,
         about={
             "map": scenario.map.name,
             "map_sha256": scenario.map.sha256,
