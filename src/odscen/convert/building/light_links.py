@@ -14,8 +14,12 @@ from odscen.convert.model.net_ids import lane_id
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.model.right_of_way import Movement
     from odscen.convert.model.walk_net import PlacedCrossing
+
+POINTS = 9
+"""Points of a link's path, at most."""
 
 _STRAIGHT = math.radians(30.0)
 _AROUND = math.radians(150.0)
@@ -68,10 +72,18 @@ def _moving(movement: Movement) -> LightLink:
         lane_id(*movement.target),
         direction(movement.turn),
         movement.speed,
+        path=_points(movement.shape),
     )
+
+
+def _points(shape: FloatArray) -> tuple[tuple[float, float], ...]:
+    """At most :data:`POINTS` points of a line, in centimetres."""
+    rows = np.unique(np.linspace(0, len(shape) - 1, POINTS).round().astype(int))
+    return tuple((round(float(x), 2), round(float(y), 2)) for x, y in shape[rows, :2])
 
 
 def _walking(crossing: PlacedCrossing, movements: Sequence[Movement]) -> LightLink:
     edges = dict.fromkeys(nearer_edge(movement, crossing) for movement in movements)
     ends = lane_id(crossing.start), lane_id(crossing.link.target)
-    return LightLink(*ends, CROSSED, crossed=tuple(edges))
+    path = _points(crossing.walkway.axis)
+    return LightLink(*ends, CROSSED, crossed=tuple(edges), path=path)

@@ -94,7 +94,10 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
                 "offset": light.offset,
                 "phases": [[p.duration, p.state, p.name, p.least, p.most] for p in light.phases],
                 "signals": [list(signals) for signals in light.signals],
-                "links": [[*link[:-1], list(link.crossed)] for link in light.links],
+                "links": [
+                    [*link[:4], list(link.crossed), [list(point) for point in link.path]]
+                    for link in light.links
+                ],
                 "conflicts": [list(conflict) for conflict in light.conflicts],
             }
             for light in table.lights
@@ -140,8 +143,10 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
                 light["offset"],
                 tuple(tuple(signals) for signals in light["signals"]),
                 tuple(
-                    LightLink(source, target, turn, speed, tuple(crossed))
-                    for source, target, turn, speed, crossed in light["links"]
+                    LightLink(
+                        source, target, turn, speed, tuple(crossed), tuple((x, y) for x, y in path)
+                    )
+                    for source, target, turn, speed, crossed, path in light["links"]
                 ),
                 tuple(LinkConflict(*conflict) for conflict in light["conflicts"]),
             )

@@ -169,6 +169,8 @@ class LightLink(NamedTuple):
         m/s of the approach; 0 for a crossing.
     crossed
         Edges that a crossing leads over.
+    path
+        Some points of its way, x and y in the OpenDRIVE frame, metres.
     """
 
     source: SumoLaneId
@@ -176,6 +178,7 @@ class LightLink(NamedTuple):
     turn: str
     speed: float = 0.0
     crossed: tuple[SumoEdgeId, ...] = ()
+    path: tuple[tuple[float, float], ...] = ()
 
 
 class LinkConflict(NamedTuple):

@@ -241,6 +241,14 @@ def write_signal_use(table: pl.DataFrame, folder: Path) -> None:
     table.with_columns(cs.float().round(_DIGITS)).write_csv(folder / SIGNALS_TABLE)
 
 
+def read_signal_use_table(file: Path) -> pl.DataFrame:
+    """Inverse of :func:`write_signal_use`."""
+    import polars as pl
+
+    texts = dict.fromkeys(("junction", "group", "movements"), pl.String)
+    return pl.read_csv(file, schema_overrides=texts)
+
+
 def _share(run: RunData, part: str, whole: str) -> float | None:
     if run.signals is None:
         return None

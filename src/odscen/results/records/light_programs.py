@@ -33,7 +33,7 @@ class ShownGroup:
     """A signal group: its letters in the states, and what it is for.
 
     ``lanes`` are SUMO's: for each link that before the light, then those inside the junction; of
-    crossings none.
+    crossings none. ``paths`` are points of each link's way, x and y in metres.
     """
 
     id: str
@@ -41,6 +41,7 @@ class ShownGroup:
     movements: tuple[str, ...]
     walk: bool
     lanes: tuple[tuple[str, ...], ...] = ()
+    paths: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

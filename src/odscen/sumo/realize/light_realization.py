@@ -8,6 +8,7 @@ Either the stages of the network are timed anew, and yellow, clearing of crossin
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import STAGE
@@ -326,18 +327,20 @@ class _Realizing:
     def _shown_plan(
         self, name: str, offset: float, plan: PhasePlan, begins: tuple[float, ...] = ()
     ) -> ShownPlan:
-        phases = tuple(
-            ProgramPhase(p.seconds, p.state, p.name, p.stage, p.least, p.most, p.on_call)
-            for p in plan.cycle
-        )
-        return ShownPlan(name, offset, phases, begins)
+        phases = []
+        for p in plan.cycle:
+            free = self._control == "actuated" and p.prolonged and p.earliest_end is None
+            least, most = (p.least, p.most) if free else (0.0, 0.0)
+            phases.append(ProgramPhase(p.seconds, p.state, p.name, p.stage, least, most, p.on_call))
+        return ShownPlan(name, offset, tuple(phases), begins)
 
     def _shown_group(self, name: str, links: tuple[int, ...]) -> ShownGroup:
         movements = self._view.movements
         walk = bool(movements) and all(movements[n].walk for n in links)
         lanes = tuple(self._inside(n) for n in links)
         names = shortest_names(links, movements) if movements else ()
-        return ShownGroup(name, links, names, walk, () if walk else lanes)
+        paths = tuple(self._light.links[n].path for n in links)
+        return ShownGroup(name, links, names, walk, () if walk else lanes, paths)
 
     def _inside(self, n: int) -> tuple[str, ...]:
         """Lane before the light, and the lanes of a link inside the junction."""
@@ -363,10 +366,13 @@ class _Realizing:
             shown = tuple(phase.state[n].lower() for phase in self._light.phases)
             approach = self._view.movements[n].approach
             columns.setdefault((approach, str(self._view.movements[n].walk), *shown), []).append(n)
-        return tuple(
-            self._shown_group(f"{number + 1}", tuple(links))
-            for number, links in enumerate(columns.values())
-        )
+        names = {True: count(1), False: count(1)}
+        groups = []
+        for links in columns.values():
+            walk = self._view.movements[links[0]].walk
+            name = f"{'F' if walk else 'K'}{next(names[walk])}"
+            groups.append(self._shown_group(name, tuple(links)))
+        return tuple(groups)
 
 
 def _green(state: str) -> set[int]:
