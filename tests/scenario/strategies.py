@@ -10,14 +10,13 @@ from odscen.scenario.document.scenario_document import (
     Demand,
     Environment,
     Flow,
-    JunctionTiming,
     MapReference,
     Matrix,
     Profile,
     Scenario,
-    Signals,
     Zone,
 )
+from odscen.scenario.document.signals_document import JunctionTiming, Signals
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text(

@@ -15,8 +15,9 @@ from odscen.app.scenarios import SUFFIX, check_scenario
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario import edits
+from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.json_form import dumps, loads
-from odscen.scenario.document.scenario_document import Actor, Flow, Matrix, Part
+from odscen.scenario.document.scenario_document import Actor, Flow, Matrix
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of

@@ -1372,6 +1372,86 @@ export interface components {
             capacity: number;
         };
         /**
+         * DayPlan
+         * @description One of several plans of a day: what differs in it from the program.
+         *
+         *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
+         *     leaves out those that do not come; the times of stages are by their ids.
+         */
+        "DayPlan-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Times
+             * @default []
+             */
+            times?: string[];
+            /** Cycle */
+            cycle?: number | null;
+            /**
+             * Offset
+             * @default 0
+             */
+            offset?: number;
+            /**
+             * Stages
+             * @default []
+             */
+            stages?: string[];
+            /** Green */
+            green?: {
+                [key: string]: number;
+            };
+            /** Min Green */
+            min_green?: {
+                [key: string]: number;
+            };
+            /** Max Green */
+            max_green?: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * DayPlan
+         * @description One of several plans of a day: what differs in it from the program.
+         *
+         *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
+         *     leaves out those that do not come; the times of stages are by their ids.
+         */
+        "DayPlan-Output": {
+            /** Id */
+            id: string;
+            /**
+             * Times
+             * @default []
+             */
+            times: string[];
+            /** Cycle */
+            cycle: number | null;
+            /**
+             * Offset
+             * @default 0
+             */
+            offset: number;
+            /**
+             * Stages
+             * @default []
+             */
+            stages: string[];
+            /** Green */
+            green: {
+                [key: string]: number;
+            };
+            /** Min Green */
+            min_green: {
+                [key: string]: number;
+            };
+            /** Max Green */
+            max_green: {
+                [key: string]: number;
+            };
+        };
+        /**
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          */
@@ -1944,13 +2024,16 @@ export interface components {
         };
         /**
          * JunctionTiming
-         * @description Timing of the traffic light of one junction, where it differs from the map's program.
+         * @description The traffic light of one junction, where it differs from the map's program.
          *
          *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
-         *     ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-         *     order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
-         *     cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
-         *     before.
+         *     ``control`` ``None`` is the scenario's. Either the map's stages are kept, and ``green`` has the
+         *     seconds of green of each in order; or ``groups`` and ``stages`` are a program of its own.
+         *     ``intergreens`` are rows of the group that ends, the one that begins, and the seconds from the
+         *     end of green to the begin of green; pairs without a row have what their paths need. With
+         *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
+         *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
+         *     ``coordination`` have one cycle.
          */
         JunctionTiming: {
             /** Junction */
@@ -1967,6 +2050,39 @@ export interface components {
              * @default []
              */
             green: number[];
+            /** Cycle */
+            cycle: number | null;
+            /** Coordination */
+            coordination: string | null;
+            /**
+             * Groups
+             * @default []
+             */
+            groups: components["schemas"]["ProgramGroup-Output"][];
+            /**
+             * Stages
+             * @default []
+             */
+            stages: components["schemas"]["ProgramStage-Output"][];
+            /**
+             * Intergreens
+             * @default []
+             */
+            intergreens: [
+                string,
+                string,
+                number
+            ][];
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors: components["schemas"]["SignalDetector-Output"][];
+            /**
+             * Plans
+             * @default []
+             */
+            plans: components["schemas"]["DayPlan-Output"][];
         };
         /**
          * LightInfo
@@ -2312,6 +2428,114 @@ export interface components {
             id: string;
             /** Shares */
             shares: number[];
+        };
+        /**
+         * ProgramGroup
+         * @description A signal group: movements that always show the same.
+         *
+         *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
+         *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
+         *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
+         *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
+         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         */
+        "ProgramGroup-Input": {
+            /** Id */
+            id: string;
+            /** Movements */
+            movements: string[];
+            /** Yellow */
+            yellow?: number | null;
+            /** All Red */
+            all_red?: number | null;
+        };
+        /**
+         * ProgramGroup
+         * @description A signal group: movements that always show the same.
+         *
+         *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
+         *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
+         *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
+         *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
+         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         */
+        "ProgramGroup-Output": {
+            /** Id */
+            id: string;
+            /** Movements */
+            movements: string[];
+            /** Yellow */
+            yellow: number | null;
+            /** All Red */
+            all_red: number | null;
+        };
+        /**
+         * ProgramStage
+         * @description Groups that have green together, and for how long.
+         *
+         *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
+         *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
+         *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
+         *     if somebody waits at one of its crossings.
+         */
+        "ProgramStage-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Protected
+             * @default []
+             */
+            protected?: string[];
+            /**
+             * Permissive
+             * @default []
+             */
+            permissive?: string[];
+            /** Green */
+            green: number;
+            /** Min Green */
+            min_green?: number | null;
+            /** Max Green */
+            max_green?: number | null;
+            /**
+             * On Call
+             * @default false
+             */
+            on_call?: boolean;
+        };
+        /**
+         * ProgramStage
+         * @description Groups that have green together, and for how long.
+         *
+         *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
+         *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
+         *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
+         *     if somebody waits at one of its crossings.
+         */
+        "ProgramStage-Output": {
+            /** Id */
+            id: string;
+            /**
+             * Protected
+             * @default []
+             */
+            protected: string[];
+            /**
+             * Permissive
+             * @default []
+             */
+            permissive: string[];
+            /** Green */
+            green: number;
+            /** Min Green */
+            min_green: number | null;
+            /** Max Green */
+            max_green: number | null;
+            /**
+             * On Call
+             * @default false
+             */
+            on_call: boolean;
         };
         /**
          * RemoveActorsEdit
@@ -3087,6 +3311,24 @@ export interface components {
             offset?: number;
             /** Green */
             green?: number[];
+            /** Cycle */
+            cycle?: number | null;
+            /** Coordination */
+            coordination?: string | null;
+            /** Groups */
+            groups?: components["schemas"]["ProgramGroup-Input"][];
+            /** Stages */
+            stages?: components["schemas"]["ProgramStage-Input"][];
+            /** Intergreens */
+            intergreens?: [
+                string,
+                string,
+                number
+            ][];
+            /** Detectors */
+            detectors?: components["schemas"]["SignalDetector-Input"][];
+            /** Plans */
+            plans?: components["schemas"]["DayPlan-Input"][];
         };
         /**
          * SetZoneEdit
@@ -3120,6 +3362,68 @@ export interface components {
              * @default false
              */
             with_actors?: boolean;
+        };
+        /**
+         * SignalDetector
+         * @description A loop in the road, and the stages that it prolongs.
+         *
+         *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
+         *     metres from its front end to the stop line. A stage goes on while fewer than ``gap`` seconds
+         *     pass between vehicles.
+         */
+        "SignalDetector-Input": {
+            /** Id */
+            id: string;
+            /** At */
+            at: string;
+            /**
+             * Before
+             * @default 30
+             */
+            before?: number;
+            /**
+             * Length
+             * @default 2
+             */
+            length?: number;
+            /** Stages */
+            stages: string[];
+            /**
+             * Gap
+             * @default 3
+             */
+            gap?: number;
+        };
+        /**
+         * SignalDetector
+         * @description A loop in the road, and the stages that it prolongs.
+         *
+         *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
+         *     metres from its front end to the stop line. A stage goes on while fewer than ``gap`` seconds
+         *     pass between vehicles.
+         */
+        "SignalDetector-Output": {
+            /** Id */
+            id: string;
+            /** At */
+            at: string;
+            /**
+             * Before
+             * @default 30
+             */
+            before: number;
+            /**
+             * Length
+             * @default 2
+             */
+            length: number;
+            /** Stages */
+            stages: string[];
+            /**
+             * Gap
+             * @default 3
+             */
+            gap: number;
         };
         /**
          * SignalInfo
@@ -3607,6 +3911,49 @@ export interface components {
             ][];
         };
         /**
+         * DayPlan
+         * @description One of several plans of a day: what differs in it from the program.
+         *
+         *     It runs from each time in ``times`` until another plan begins. ``stages`` has their order, and
+         *     leaves out those that do not come; the times of stages are by their ids.
+         */
+        "DayPlan-File": {
+            /** Id */
+            id: string;
+            /**
+             * Times
+             * @default []
+             */
+            times?: string[];
+            /**
+             * Cycle
+             * @default null
+             */
+            cycle?: number | null;
+            /**
+             * Offset
+             * @default 0
+             */
+            offset?: number;
+            /**
+             * Stages
+             * @default []
+             */
+            stages?: string[];
+            /** Green */
+            green?: {
+                [key: string]: number;
+            };
+            /** Min Green */
+            min_green?: {
+                [key: string]: number;
+            };
+            /** Max Green */
+            max_green?: {
+                [key: string]: number;
+            };
+        };
+        /**
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          */
@@ -3714,13 +4061,16 @@ export interface components {
         };
         /**
          * JunctionTiming
-         * @description Timing of the traffic light of one junction, where it differs from the map's program.
+         * @description The traffic light of one junction, where it differs from the map's program.
          *
          *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
-         *     ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-         *     order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
-         *     cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
-         *     before.
+         *     ``control`` ``None`` is the scenario's. Either the map's stages are kept, and ``green`` has the
+         *     seconds of green of each in order; or ``groups`` and ``stages`` are a program of its own.
+         *     ``intergreens`` are rows of the group that ends, the one that begins, and the seconds from the
+         *     end of green to the begin of green; pairs without a row have what their paths need. With
+         *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
+         *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
+         *     ``coordination`` have one cycle.
          */
         "JunctionTiming-File": {
             /** Junction */
@@ -3740,6 +4090,45 @@ export interface components {
              * @default []
              */
             green?: number[];
+            /**
+             * Cycle
+             * @default null
+             */
+            cycle?: number | null;
+            /**
+             * Coordination
+             * @default null
+             */
+            coordination?: string | null;
+            /**
+             * Groups
+             * @default []
+             */
+            groups?: components["schemas"]["ProgramGroup-File"][];
+            /**
+             * Stages
+             * @default []
+             */
+            stages?: components["schemas"]["ProgramStage-File"][];
+            /**
+             * Intergreens
+             * @default []
+             */
+            intergreens?: [
+                string,
+                string,
+                number
+            ][];
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors?: components["schemas"]["SignalDetector-File"][];
+            /**
+             * Plans
+             * @default []
+             */
+            plans?: components["schemas"]["DayPlan-File"][];
         };
         /**
          * MapReference
@@ -3805,6 +4194,103 @@ export interface components {
             id: string;
             /** Shares */
             shares: number[];
+        };
+        /**
+         * ProgramGroup
+         * @description A signal group: movements that always show the same.
+         *
+         *     A movement is named ``r12>r8`` (segment before, segment behind), ``r12 left`` (``straight``,
+         *     ``right``, ``turnaround``), ``r12`` (all of the approach), ``12.0.-1>8.1.-1`` (from lane to
+         *     lane) or ``walk r12`` (the crossings over a leg). ``yellow`` ``None`` follows from the speed
+         *     limit: 3 s up to 50 km/h, 4 s up to 60 km/h, 5 s above. With ``all_red``, what begins after this
+         *     group waits for yellow and all-red; otherwise as long as the paths need.
+         */
+        "ProgramGroup-File": {
+            /** Id */
+            id: string;
+            /** Movements */
+            movements: string[];
+            /**
+             * Yellow
+             * @default null
+             */
+            yellow?: number | null;
+            /**
+             * All Red
+             * @default null
+             */
+            all_red?: number | null;
+        };
+        /**
+         * ProgramStage
+         * @description Groups that have green together, and for how long.
+         *
+         *     ``protected`` groups meet nobody else who has green; ``permissive`` ones give way to those they
+         *     meet. ``green`` is what the stage lasts with fixed-time control; actuated control keeps it
+         *     between ``min_green`` and ``max_green`` (``None``: ``green``). A stage ``on_call`` comes only
+         *     if somebody waits at one of its crossings.
+         */
+        "ProgramStage-File": {
+            /** Id */
+            id: string;
+            /**
+             * Protected
+             * @default []
+             */
+            protected?: string[];
+            /**
+             * Permissive
+             * @default []
+             */
+            permissive?: string[];
+            /** Green */
+            green: number;
+            /**
+             * Min Green
+             * @default null
+             */
+            min_green?: number | null;
+            /**
+             * Max Green
+             * @default null
+             */
+            max_green?: number | null;
+            /**
+             * On Call
+             * @default false
+             */
+            on_call?: boolean;
+        };
+        /**
+         * SignalDetector
+         * @description A loop in the road, and the stages that it prolongs.
+         *
+         *     ``at`` is an approach (``r12``: a loop in each lane) or a lane (``12.0.-1``); ``before`` the
+         *     metres from its front end to the stop line. A stage goes on while fewer than ``gap`` seconds
+         *     pass between vehicles.
+         */
+        "SignalDetector-File": {
+            /** Id */
+            id: string;
+            /** At */
+            at: string;
+            /**
+             * Before
+             * @default 30
+             */
+            before?: number;
+            /**
+             * Length
+             * @default 2
+             */
+            length?: number;
+            /** Stages */
+            stages: string[];
+            /**
+             * Gap
+             * @default 3
+             */
+            gap?: number;
         };
         /**
          * Signals

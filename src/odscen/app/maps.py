@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from odscen.sumo.realize.program_files import scenario_lights
+from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
     from odscen.drawing.map_drawing import MapDrawing
-    from odscen.scenario.checks.signal_timing import Light
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.signals.light import Light
     from odscen.workspace.store import MapEntry, Workspace
 
 
@@ -47,7 +47,7 @@ class LoadedMap:
 def load_map(entry: MapEntry) -> LoadedMap:
     """Load a map; the last few stay in memory."""
     sumo = SumoMap.of(entry.graph(), entry.lane_table())
-    lights = scenario_lights(sumo.lights)
+    lights = scenario_lights(sumo)
     return LoadedMap(entry, sumo, usable_places(sumo), entry.drawing(), lights)
 
 

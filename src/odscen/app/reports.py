@@ -10,15 +10,18 @@ from odscen.app.maps import load_map
 from odscen.base.errors import NotFoundError
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
+from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.traffic_files import read_tables
+from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.run_records import Plan, events_from_json
 from odscen.results.report.place_shapes import place_shapes
+from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.recorded import read_conflicts, read_trajectories
+from odscen.sumo.folder.recorded import read_conflicts, read_light_states, read_trajectories
 from odscen.sumo.outputs.corridor_traces import corridor_traces
 
 if TYPE_CHECKING:
@@ -85,10 +88,21 @@ def write_report(
         shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
         corridor=followed,
         conflicts=read_conflicts(folder),
+        lights=_lights(folder),
     )
     report = out or folder / layout.REPORT_FILE
     report.write_text(page, encoding="utf-8")
     return report
+
+
+def _lights(folder: Path) -> LightsOfRun | None:
+    """What lights were told to show, what they showed, and what came of it."""
+    file, table = folder / layout.LIGHTS_FILE, folder / layout.FIGURES_FOLDER / SIGNALS_TABLE
+    states = read_light_states(folder)
+    if states is None or not file.is_file() or not table.is_file():
+        return None
+    programs = programs_from_json(file.read_text(encoding="utf-8"))
+    return LightsOfRun(programs, states, read_signal_use_table(table))
 
 
 def renew_report(

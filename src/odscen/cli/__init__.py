@@ -25,6 +25,7 @@ from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate
 from odscen.cli.serve_command import serve
+from odscen.cli.signal_commands import app as signals
 
 app = typer.Typer(
     name="odscen",
@@ -37,6 +38,7 @@ maps.command()(pull)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.add_typer(demand, name="demand")
+app.add_typer(signals, name="signals")
 app.command()(generate)
 app.command()(check)
 app.command()(export)

@@ -13,7 +13,7 @@ from odscen.base.errors import InputError, ScenarioError
 from odscen.regression.tolerance import Tolerances, parse_tolerance
 from odscen.results.measures.expectations import parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
-from odscen.scenario.document.scenario_document import Label, Part
+from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validation_problems
 
 if TYPE_CHECKING:

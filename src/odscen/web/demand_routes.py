@@ -8,7 +8,8 @@ from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen.app import demands
 from odscen.base.errors import InputError
-from odscen.scenario.document.scenario_document import Identifier, Scenario
+from odscen.scenario.document.document_parts import Identifier
+from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.messages import DayMade, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared

@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hi
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from odscen.scenario.document import scenario_document
+from odscen.scenario.document import document_parts, scenario_document, signals_document
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.app.maps import LoadedMap
-    from odscen.scenario.document.scenario_document import Part, Scenario
+    from odscen.scenario.document.document_parts import Part
+    from odscen.scenario.document.scenario_document import Scenario
 
 _KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
 """Arguments that the server has itself, and the names of their types, which need no message."""
@@ -65,7 +66,9 @@ def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenari
 
 
 def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
-    names = {**vars(scenario_document), **dict.fromkeys(_KNOWN.values(), object), **_JSON}
+    documents = (document_parts, signals_document, scenario_document)
+    known = {name: one for document in documents for name, one in vars(document).items()}
+    names = {**known, **dict.fromkeys(_KNOWN.values(), object), **_JSON}
     hints = get_type_hints(function, localns=names, include_extras=True)
     fields: dict[str, Any] = {"kind": (Literal[name], ...)}
     for parameter in inspect.signature(function).parameters.values():

@@ -15,7 +15,6 @@ from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import ConflictError
 from odscen.scenario.demand.day_profiles import BUILT_IN
-from odscen.sumo.realize.program_files import scenario_lights
 from odscen.web.messages import (
     AssetsInfo,
     BlueprintInfo,
@@ -61,7 +60,7 @@ def list_maps(shared: Shared) -> list[MapInfo]:
 def show_map(name: str, shared: Shared) -> MapDetails:
     """One map, with what it means and its traffic lights."""
     entry = shared.workspace.map(name)
-    lights = load_map(entry).sumo.lights
+    loaded = load_map(entry)
     known = [
         LightInfo(
             id=light.id,
@@ -69,7 +68,7 @@ def show_map(name: str, shared: Shared) -> MapDetails:
             green=list(seen.green),
             signals=[list(names) for names in light.signals],
         )
-        for light, seen in zip(lights, scenario_lights(lights), strict=True)
+        for light, seen in zip(loaded.sumo.lights, loaded.lights, strict=True)
     ]
     semantics = SemanticsInfo.model_validate(entry.info["semantics"])
     return MapDetails(**dict(_map_info(entry)), semantics=semantics, lights=known)

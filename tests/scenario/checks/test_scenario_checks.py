@@ -6,7 +6,6 @@ import pytest
 from odscen.base.categories import Body, Category
 from odscen.lanegraph.graphs import MapGraph
 from odscen.scenario.checks.scenario_checks import check
-from odscen.scenario.checks.signal_timing import Light
 from odscen.scenario.document.problems import Problem
 from odscen.scenario.document.scenario_document import (
     Actor,
@@ -15,6 +14,7 @@ from odscen.scenario.document.scenario_document import (
     MapReference,
     Scenario,
 )
+from odscen.scenario.signals.light import Light
 from tests.graphs import SHA256, fork, line_of_segments, two_lane_road
 
 GRAPH = fork()

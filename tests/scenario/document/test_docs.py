@@ -5,6 +5,7 @@ from pathlib import Path
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.document.scenario_document import Demand
+from odscen.scenario.document.signals_document import JunctionTiming
 
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
@@ -43,3 +44,8 @@ def test_the_example_of_demand_is_one() -> None:
     example = json.loads("{" + block("demand.md", "json") + "}")["demand"]
     demand = Demand.model_validate_json(json.dumps(example), strict=True)
     assert [part.id for _, part in demand.parts] == ["commuters", "survey", "others"]
+
+
+def test_the_example_of_a_signal_program_is_one() -> None:
+    timing = JunctionTiming.model_validate_json(block("signals.md", "json"), strict=True)
+    assert [plan.id for plan in timing.plans] == ["day", "evening"]

@@ -8,13 +8,8 @@ from hypothesis import given
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.json_form import dumps, loads, schema
-from odscen.scenario.document.scenario_document import (
-    Actor,
-    JunctionTiming,
-    MapReference,
-    Scenario,
-    Signals,
-)
+from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
+from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.forms.any_form import read_any
 from tests.scenario.strategies import scenarios
 
@@ -85,6 +80,21 @@ def test_what_is_not_a_scenario_says_so(text: str, reason: str) -> None:
 def test_bytes_that_are_not_text_are_refused() -> None:
     with pytest.raises(ScenarioError, match="byte 1 is not UTF-8"):
         read_any(b"{\xff")
+
+
+def test_a_signal_program_has_a_line_for_each_group_and_stage() -> None:
+    plain = Scenario(name="one", map=MAP, roi=("r1",))
+    timing = JunctionTiming.model_validate(
+        {
+            "junction": "54",
+            "groups": [{"id": "K1", "movements": ["r1"]}, {"id": "K2", "movements": ["r2"]}],
+            "stages": [{"id": "1", "protected": ["K1"], "green": 20}],
+        }
+    )
+    scenario = plain.model_copy(update={"signals": Signals(junctions=(timing,))})
+    text = dumps(scenario)
+    assert '        {"id": "K2", "movements": ["r2"]}' in text.splitlines()
+    assert loads(text) == scenario
 
 
 def test_numbers_in_quotes_are_not_numbers() -> None:

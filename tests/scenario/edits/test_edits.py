@@ -4,8 +4,9 @@ from odscen.base.categories import Category
 from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.lanegraph.graphs import MapGraph
 from odscen.scenario import edits
-from odscen.scenario.checks.signal_timing import Light
-from odscen.scenario.document.scenario_document import JunctionTiming, Scenario
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.signals_document import JunctionTiming
+from odscen.scenario.signals.light import Light
 from tests.graphs import fork, line_of_segments
 
 GRAPH = fork()

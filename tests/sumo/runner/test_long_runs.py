@@ -16,9 +16,8 @@ from odscen.sumo.folder import checkpoint, layout, run_status
 from odscen.sumo.folder.layout import RECORDED
 from odscen.sumo.folder.parts import check_room
 from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
-from odscen.sumo.realize import forecast
 from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner import worker_process
+from odscen.sumo.runner import forecast, worker_process
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.long_runs import resume

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 import shapely
 
 from odscen.base.ids import SumoEdgeId
+from odscen.convert.building.light_links import direction, light_links, nearer_edge
 from odscen.convert.building.waiting_places import inner_junctions, waiting_places
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
 from odscen.convert.model.major_road import major_edges, stands_out
@@ -24,7 +24,7 @@ from odscen.convert.model.net import (
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
 from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, in_turn, requests
-from odscen.convert.signals.shared_green import LightLinks, light_stages
+from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
 
 if TYPE_CHECKING:
@@ -42,9 +42,6 @@ BUS_LENGTH = 12.0
 
 MOST_SWEPT = 2.5
 """Metres that are added to the width of an internal lane, at most."""
-
-_STRAIGHT = math.radians(30.0)
-_AROUND = math.radians(150.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,15 +228,6 @@ def _state(
     return "=" if equal else "m"
 
 
-def direction(turn: float) -> str:
-    """SUMO's letter for a change of heading, radians, left positive."""
-    if abs(turn) < _STRAIGHT:
-        return "s"
-    if abs(turn) > _AROUND:
-        return "t"
-    return "l" if turn > 0.0 else "r"
-
-
 def _swept(passage: Passage) -> float:
     """Metres that a bus takes up beside its lane in a turn: SUMO keeps others off a lane's width.
 
@@ -334,20 +322,12 @@ def _crossings(
     links: list[NetLink] = []
     for index, (crossing, crossed) in enumerate(zip(crossings, conflicts.crossed, strict=True)):
         row = rows.get(first + index, -1)
-        over = dict.fromkeys(_nearer_edge(passages[n].movement, crossing) for n in crossed)
+        over = dict.fromkeys(nearer_edge(passages[n].movement, crossing) for n in crossed)
         edges.append(replace(crossing.edge, crosses=tuple(over)))
         light = name if row >= 0 else ""
         links.append(NetLink(crossing.start, crossing.edge.id, light=light, light_index=row))
         links.append(crossing.link)
     return edges, links
-
-
-def _nearer_edge(movement: Movement, crossing: PlacedCrossing) -> SumoEdgeId:
-    """Edge whose end or start a crossing is nearer to: what SUMO calls the crossed edge."""
-    middle = crossing.walkway.axis[:, :2].mean(axis=0)
-    ends = movement.shape[[0, -1], :2]
-    gaps = np.hypot(*(ends - middle).T)
-    return SumoEdgeId(movement.source[0] if gaps[0] <= gaps[1] else movement.target[0])
 
 
 def _light(
@@ -374,9 +354,14 @@ def _light(
         rights=rights,
         side=-1.0 if around.lefthand else 1.0,
     )
-    phases = program(light_stages(links, rows), len(rows))
-    signals = tuple(passages[n].lights if n < count else () for n in rows)
-    return TrafficLight(name, phases, signals=signals), rows
+    light = TrafficLight(
+        name,
+        program(light_stages(links, rows), len(rows)),
+        signals=tuple(passages[n].lights if n < count else () for n in rows),
+        links=light_links(rows, links.movements, crossings, conflicts.crossed),
+        conflicts=link_conflicts(links, rows),
+    )
+    return light, rows
 
 
 def outline(lanes: Sequence[tuple[FloatArray, float, bool]]) -> FloatArray:

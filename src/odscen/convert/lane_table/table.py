@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.base.ids import JunctionId, LaneKey, Roadside, SumoEdgeId, SumoLaneId
-    from odscen.convert.model.net import Phase
+    from odscen.convert.model.net import LightLink, LinkConflict, Phase
 
 
-VERSION = 3
+VERSION = 4
 
 
 class SumoPlace(NamedTuple):
@@ -133,6 +133,10 @@ class SumoLight(NamedTuple):
         Seconds.
     signals
         For each link the OpenDRIVE signals behind it; none for crossings.
+    links
+        What each link is.
+    conflicts
+        Links that meet.
     """
 
     id: str
@@ -140,6 +144,8 @@ class SumoLight(NamedTuple):
     phases: tuple[Phase, ...]
     offset: float
     signals: tuple[tuple[str, ...], ...]
+    links: tuple[LightLink, ...] = ()
+    conflicts: tuple[LinkConflict, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,7 +86,15 @@ def build_table(
         counts=net.counts(),
         elevation=not net.flat,
         lights=tuple(
-            SumoLight(light.id, xodr.get(light.id, ()), light.phases, light.offset, light.signals)
+            SumoLight(
+                light.id,
+                xodr.get(light.id, ()),
+                light.phases,
+                light.offset,
+                light.signals,
+                light.links,
+                light.conflicts,
+            )
             for light in net.lights
         ),
     )

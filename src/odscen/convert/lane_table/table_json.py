@@ -18,7 +18,7 @@ from odscen.convert.lane_table.table import (
     SumoLight,
     SumoLink,
 )
-from odscen.convert.model.net import Phase
+from odscen.convert.model.net import LightLink, LinkConflict, Phase
 
 _DIGITS = 4
 
@@ -94,6 +94,11 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
                 "offset": light.offset,
                 "phases": [[p.duration, p.state, p.name, p.least, p.most] for p in light.phases],
                 "signals": [list(signals) for signals in light.signals],
+                "links": [
+                    [*link[:4], list(link.crossed), [list(point) for point in link.path]]
+                    for link in light.links
+                ],
+                "conflicts": [list(conflict) for conflict in light.conflicts],
             }
             for light in table.lights
         ],
@@ -137,6 +142,13 @@ def _from_data(data: dict[str, Any]) -> LaneTable:
                 tuple(Phase(*phase) for phase in light["phases"]),
                 light["offset"],
                 tuple(tuple(signals) for signals in light["signals"]),
+                tuple(
+                    LightLink(
+                        source, target, turn, speed, tuple(crossed), tuple((x, y) for x, y in path)
+                    )
+                    for source, target, turn, speed, crossed, path in light["links"]
+                ),
+                tuple(LinkConflict(*conflict) for conflict in light["conflicts"]),
             )
             for light in data["lights"]
         ),

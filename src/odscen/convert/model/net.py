@@ -7,7 +7,7 @@ in the OpenDRIVE frame: :attr:`Net.offset` is added when the file is written.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -32,6 +32,9 @@ LEAST_LENGTH = 0.1
 
 VERSION = "1.20"
 """Version of the network format."""
+
+CROSSED = "c"
+"""The turn of a link that is a crossing."""
 
 STAGE = "stage "
 """How the names of phases begin that give green; a number follows, from 1."""
@@ -153,9 +156,59 @@ class Phase:
         return self.name.startswith(STAGE)
 
 
+class LightLink(NamedTuple):
+    """What one letter of a light's states is for.
+
+    Attributes
+    ----------
+    source, target
+        Lanes of a movement; of a crossing the walking areas at its ends.
+    turn
+        SUMO's letter (``s``, ``l``, ``r``, ``t``), :data:`CROSSED` for a crossing.
+    speed
+        m/s of the approach; 0 for a crossing.
+    crossed
+        Edges that a crossing leads over.
+    path
+        Some points of its way, x and y in the OpenDRIVE frame, metres.
+    """
+
+    source: SumoLaneId
+    target: SumoLaneId
+    turn: str
+    speed: float = 0.0
+    crossed: tuple[SumoEdgeId, ...] = ()
+    path: tuple[tuple[float, float], ...] = ()
+
+
+class LinkConflict(NamedTuple):
+    """Two links of a light that meet, by index.
+
+    Attributes
+    ----------
+    yields
+        The one that gives way to the other by the junction's right of way; -1 if neither does.
+    shares
+        Whether drivers expect the two to have green together, so that one may give way.
+    clearing, clearing_back
+        Whole seconds from the end of yellow (of a crossing: of green) of ``one`` until ``other``
+        may begin, and of ``other`` until ``one`` may.
+    """
+
+    one: int
+    other: int
+    yields: int
+    shares: bool
+    clearing: float
+    clearing_back: float
+
+
 @dataclass(frozen=True, slots=True)
 class TrafficLight:
-    """One ``<tlLogic>``; ``signals`` are the OpenDRIVE signals behind each link."""
+    """One ``<tlLogic>``; ``signals`` are the OpenDRIVE signals behind each link.
+
+    ``links`` and ``conflicts`` say what its links are; they are not written.
+    """
 
     id: str
     phases: tuple[Phase, ...]
@@ -163,6 +216,8 @@ class TrafficLight:
     offset: float = 0.0
     program: str = "0"
     signals: tuple[tuple[str, ...], ...] = ()
+    links: tuple[LightLink, ...] = ()
+    conflicts: tuple[LinkConflict, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import shapely
 
+from odscen.convert.model.net import LinkConflict
 from odscen.convert.model.right_of_way import MOST_WIDTH, OPPOSING, wrapped
 from odscen.convert.signals.signal_programs import GroupConflicts, SignalGroup, plan_stages
 
@@ -107,6 +108,17 @@ def light_stages(links: LightLinks, rows: dict[int, int]) -> Stages:
     return stages
 
 
+def link_conflicts(links: LightLinks, rows: dict[int, int]) -> tuple[LinkConflict, ...]:
+    """All controlled links that meet, with who gives way and the clearing times of both.
+
+    Parameters
+    ----------
+    rows
+        Position at the light of each controlled link.
+    """
+    return _Sharing(links, protect=False).met(rows)
+
+
 class _Sharing:
     """What may share green at one light."""
 
@@ -149,6 +161,25 @@ class _Sharing:
             groups.append(SignalGroup((rows[link],), "", walkers=True, speed=0.0))
             members.append((link,))
         return tuple(groups), self._conflicts(members, rows)
+
+    def met(self, rows: dict[int, int]) -> tuple[LinkConflict, ...]:
+        """Pairs of links that meet, by their positions at the light."""
+        found = []
+        for i, j in self._pairs:
+            if i in rows and j in rows:
+                gives_way = j in self._links.rights[i].yields_to
+                back = i in self._links.rights[j].yields_to
+                found.append(
+                    LinkConflict(
+                        rows[i],
+                        rows[j],
+                        rows[i] if gives_way else rows[j] if back else -1,
+                        (i, j) not in self._never,
+                        self._clearing(i, j),
+                        self._clearing(j, i),
+                    )
+                )
+        return tuple(sorted(found))
 
     def _ordered(
         self, heads: dict[tuple[str, tuple[str, ...], bool], list[int]]

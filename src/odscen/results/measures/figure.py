@@ -40,6 +40,7 @@ class Basis(StrEnum):
     ROADS = "roads"
     TRIPS = "trips"
     CONFLICTS = "conflicts"
+    SIGNALS = "signals"
 
 
 class SummaryPart(StrEnum):
@@ -56,6 +57,7 @@ class ReportSection(StrEnum):
     KEY_FIGURES = "key figures"
     PEDESTRIANS = "pedestrians"
     CONFLICTS = "conflicts"
+    SIGNALS = "traffic lights"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +97,9 @@ class RunData:
         not measured.
     end
         Simulated seconds; ``None`` if unknown.
+    signals
+        One row per signal group, from :func:`odscen.results.measures.signal_use.signal_use`;
+        ``None`` if the map has no lights.
     """
 
     outcomes: Sequence[ActorOutcome] = ()
@@ -102,6 +107,7 @@ class RunData:
     trips: pl.DataFrame | None = None
     conflicts: pl.DataFrame | None = None
     end: float | None = None
+    signals: pl.DataFrame | None = None
 
     @cached_property
     def vehicles(self) -> Sequence[ActorOutcome]:
@@ -125,6 +131,7 @@ class RunData:
             Basis.ROADS: self.traffic is not None,
             Basis.TRIPS: self.trips is not None,
             Basis.CONFLICTS: self.conflicts is not None,
+            Basis.SIGNALS: self.signals is not None,
         }[basis]
 
 

@@ -15,6 +15,7 @@ from odscen.results.measures import (
     place_figures,
     reliability,
     safety,
+    signal_use,
     table_columns,
     throughput,
     travel,
@@ -41,6 +42,7 @@ RUN_FIGURES: tuple[RunFigure, ...] = (
     *reliability.FIGURES,
     *throughput.FIGURES,
     *safety.FIGURES,
+    *signal_use.FIGURES,
 )
 """Figures of a whole run, in the order in which ``summary.json`` has them."""
 

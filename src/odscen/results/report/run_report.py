@@ -25,6 +25,7 @@ from odscen.results.report.report_flow import diagram_section, flow_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_service import service_section
+from odscen.results.report.report_signals import signal_section
 from odscen.results.report.report_tables import (
     actor_table,
     event_list,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
+    from odscen.results.report.report_signals import LightsOfRun
 
 
 def render_report(
@@ -61,6 +63,7 @@ def render_report(
     shapes: PlaceShapes | None = None,
     corridor: CorridorTraces | str | None = None,
     conflicts: pl.DataFrame | None = None,
+    lights: LightsOfRun | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -89,6 +92,8 @@ def render_report(
         Vehicles along a corridor, or why there is no diagram of them.
     conflicts
         Traffic conflicts, if they were measured.
+    lights
+        Programs of traffic lights and what they showed, if the map has any.
 
     Returns
     -------
@@ -111,6 +116,7 @@ def render_report(
         incident_section(incidents),
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
         corridor_section(corridor) if corridor is not None else None,
+        signal_section(lights, given) if lights is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
         conflict_section(conflicts) if conflicts is not None else None,

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.checks.signal_timing import Light
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.signals.light import Light
 
 SAME_TIME = 1.0
 """Actors that depart within this many seconds of each other are on the road together."""
@@ -69,7 +69,8 @@ def check(
         found += flow_problems(scenario, region, index)
     found += demand_problems(scenario, region)
     if lights is not None:
-        found += signal_problems(scenario.signals, lights)
+        clock, until = scenario.demand.clock, scenario.simulation.duration
+        found += signal_problems(scenario.signals, lights, clock=clock, until=until)
     found += shared_nodes(scenario)
     found += _overlaps(scenario, region, assets)
     return tuple(found)

@@ -1,16 +1,19 @@
-"""Traffic lights as a scenario sees them, and the rules on their timing."""
+"""The rules on how a scenario times traffic lights."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from odscen.scenario.checks.program_checks import program_problems
 from odscen.scenario.document.problems import error
+from odscen.scenario.signals.light import find_light
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from odscen.scenario.document.problems import Problem
-    from odscen.scenario.document.scenario_document import Signals
+    from odscen.scenario.document.signals_document import JunctionTiming, Signals
+    from odscen.scenario.signals.light import Light
 
 LEAST_GREEN = 5.0
 """Seconds of green of a stage, at least: drivers who see less of it stop taking it for green."""
@@ -19,29 +22,19 @@ _LISTED = 10
 """Names in a message, at most."""
 
 
-class Light(NamedTuple):
-    """A traffic light of the map.
+def signal_problems(
+    signals: Signals, lights: Sequence[Light], *, clock: float = 0.0, until: float | None = None
+) -> Iterator[Problem]:
+    """Yield what is wrong with the timing of traffic lights.
 
-    Attributes
+    Parameters
     ----------
-    names
-        What a scenario may call it: its OpenDRIVE junctions, or the SUMO id of a light in none.
-    green
-        Seconds of green of each stage in the map's program.
+    clock
+        Time of day at which the scenario begins, seconds.
+    until
+        Seconds that it lasts, for the plans that it does not come to.
     """
-
-    names: tuple[str, ...]
-    green: tuple[float, ...]
-
-
-def find_light(lights: Sequence[Light], junction: str) -> Light | None:
-    """Light that a scenario means by ``junction``, if there is one."""
-    return next((light for light in lights if junction in light.names), None)
-
-
-def signal_problems(signals: Signals, lights: Sequence[Light]) -> Iterator[Problem]:
-    """Yield what is wrong with the timing of traffic lights."""
-    timed: dict[Light, str] = {}
+    timed: dict[tuple[str, ...], str] = {}
     for index, timing in enumerate(signals.junctions):
         where = f"signals.junctions[{index}]"
         light = find_light(lights, timing.junction)
@@ -49,27 +42,56 @@ def signal_problems(signals: Signals, lights: Sequence[Light]) -> Iterator[Probl
             message = f"there is no traffic light in junction {timing.junction!r}; {_known(lights)}"
             yield error("unknown_light", f"{where}.junction", message)
             continue
-        if light in timed:
+        if light.names in timed:
             message = (
-                f"the light of junction {timing.junction!r} is timed by {timed[light]} already; "
-                "keep one of them"
+                f"the light of junction {timing.junction!r} is timed by {timed[light.names]} "
+                "already; keep one of them"
             )
             yield error("light_twice", f"{where}.junction", message)
-        timed.setdefault(light, where)
-        if timing.green and len(timing.green) != len(light.green):
-            program = ", ".join(f"{seconds:g}" for seconds in light.green)
+        timed.setdefault(light.names, where)
+        yield from _green_problems(timing, light, where)
+        control = timing.control or signals.control
+        yield from program_problems(timing, light, control, where, clock=clock, until=until)
+    yield from _coordination_problems(signals)
+
+
+def _green_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator[Problem]:
+    if timing.green and len(timing.green) != len(light.green):
+        program = ", ".join(f"{seconds:g}" for seconds in light.green)
+        message = (
+            f"the light of junction {timing.junction!r} has {len(light.green)} stages, but "
+            f"green has {len(timing.green)} times; give one for each (the map's are {program})"
+        )
+        yield error("wrong_number_of_greens", f"{where}.green", message)
+    for stage, seconds in enumerate(timing.green):
+        if seconds < LEAST_GREEN:
             message = (
-                f"the light of junction {timing.junction!r} has {len(light.green)} stages, but "
-                f"green has {len(timing.green)} times; give one for each (the map's are {program})"
+                f"{seconds:g} s is too short for a green; give stage {stage + 1} at least "
+                f"{LEAST_GREEN:g} s"
             )
-            yield error("wrong_number_of_greens", f"{where}.green", message)
-        for stage, seconds in enumerate(timing.green):
-            if seconds < LEAST_GREEN:
+            yield error("green_too_short", f"{where}.green[{stage}]", message)
+
+
+def _coordination_problems(signals: Signals) -> Iterator[Problem]:
+    """Lights of one coordination with different cycles, plan by plan."""
+    first: dict[tuple[str, str], tuple[float, str]] = {}
+    for index, timing in enumerate(signals.junctions):
+        if timing.coordination is None:
+            continue
+        where = f"signals.junctions[{index}]"
+        cycles = {plan.id: plan.cycle or timing.cycle for plan in timing.plans}
+        for plan, cycle in (cycles or {"": timing.cycle}).items():
+            if cycle is None:
+                message = f"lights of coordination {timing.coordination!r} need a cycle"
+                yield error("cycle_missing", f"{where}.cycle", message)
+                continue
+            seconds, other = first.setdefault((timing.coordination, plan), (cycle, where))
+            if seconds != cycle:
                 message = (
-                    f"{seconds:g} s is too short for a green; give stage {stage + 1} at least "
-                    f"{LEAST_GREEN:g} s"
+                    f"the cycle is {cycle:g} s, but {other} of the same coordination "
+                    f"{timing.coordination!r} has {seconds:g} s; give both one"
                 )
-                yield error("green_too_short", f"{where}.green[{stage}]", message)
+                yield error("cycles_of_coordination", f"{where}.cycle", message)
 
 
 def _known(lights: Sequence[Light]) -> str:

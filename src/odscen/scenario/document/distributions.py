@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from odscen.scenario.document.scenario_document import Part
+from odscen.scenario.document.document_parts import Part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

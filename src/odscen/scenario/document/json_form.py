@@ -74,6 +74,9 @@ def _layout(key: str, value: object) -> str:
     if key == "demand" and isinstance(value, dict):
         fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"
+    if key == "signals" and isinstance(value, dict) and _has_programs(value):
+        fields = (f"    {json.dumps(name)}: {_lights(part)}" for name, part in value.items())
+        return "{\n" + ",\n".join(fields) + "\n  }"
     if isinstance(value, list) and value:
         lines = [json.dumps(part, ensure_ascii=False) for part in value]
         if key == "roi":
@@ -96,6 +99,26 @@ def _parts(value: object) -> str:
             line = line.replace(whole, f"[\n        {split}\n      ]")
         lines.append(line)
     return "[\n      " + ",\n      ".join(lines) + "\n    ]"
+
+
+def _has_programs(signals: dict[str, Any]) -> bool:
+    return any("groups" in light for light in signals.get("junctions", ()))
+
+
+def _lights(value: object) -> str:
+    """Lay out lights: one on a line, or each group, stage, ... of its program on one of its own."""
+    if not isinstance(value, list) or not value:
+        return json.dumps(value, ensure_ascii=False)
+    lights = []
+    for light in value:
+        text = json.dumps(light, ensure_ascii=False)
+        for part in light.values():
+            if isinstance(part, list) and part and isinstance(part[0], dict | list):
+                whole = json.dumps(part, ensure_ascii=False)
+                split = ",\n        ".join(json.dumps(one, ensure_ascii=False) for one in part)
+                text = text.replace(whole, f"[\n        {split}\n      ]", 1)
+        lights.append(text)
+    return "[\n      " + ",\n      ".join(lights) + "\n    ]"
 
 
 def _foreign(text: str | bytes) -> str | None:

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
 from odscen.base.categories import Category
+from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
+from odscen.scenario.document.signals_document import Signals
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
@@ -20,19 +22,11 @@ if TYPE_CHECKING:
 FORMAT: Final = "odscen-scenario"
 VERSION: Final = 1
 
-_PRINTABLE = r"^[^\x00-\x1f\x7f\u0085\u2028\u2029\ufffe\uffff]*$"
 _PROSE = r"^[^\x00-\x08\x0b-\x1f\x7f\ufffe\uffff]*$"
-_IDENTIFIER = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
 DrivingStyle = Literal["cautious", "normal", "sporty"]
-Label = Annotated[str, Field(min_length=1, max_length=200, pattern=_PRINTABLE)]
-"""One line of text that JSON and XML can both carry."""
 Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
-Identifier = Annotated[str, Field(pattern=_IDENTIFIER, max_length=64)]
-Seconds = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
-Control = Literal["fixed", "actuated"]
 Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
 """How many road users; a fraction is a probability."""
 Mix = dict[Category, Annotated[float, Field(gt=0)]]
@@ -43,17 +37,6 @@ _ANY_NAME = WithJsonSchema(
     {"type": "object", "additionalProperties": {"type": "number"}}, mode="serialization"
 )
 """Whoever reads a document need not know which names can be written."""
-
-
-class Part(BaseModel):
-    """Base of all parts of the document: frozen, unknown fields refused."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        json_schema_serialization_defaults_required=True,
-    )
 
 
 class MapReference(Part):
@@ -211,29 +194,6 @@ class Demand(Part):
         )
 
 
-class JunctionTiming(Part):
-    """Timing of the traffic light of one junction, where it differs from the map's program.
-
-    ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
-    ``control`` ``None`` is the scenario's. ``green`` has the seconds of green of each stage in
-    order; empty keeps the program's. The intergreen (pedestrian clearance, yellow, all-red)
-    cannot be changed. The program begins ``offset`` seconds into the scenario, as if it had run
-    before.
-    """
-
-    junction: Label
-    control: Control | None = None
-    offset: SignalSeconds = 0.0
-    green: tuple[SignalSeconds, ...] = ()
-
-
-class Signals(Part):
-    """How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens)."""
-
-    control: Control = "fixed"
-    junctions: tuple[JunctionTiming, ...] = ()
-
-
 class Simulation(Part):
     """How the scenario is run unless the command says otherwise; seconds."""
 
@@ -282,7 +242,7 @@ class Scenario(Part):
 
     format: Literal["odscen-scenario"] = FORMAT
     version: Literal[1] = VERSION
-    name: Annotated[str, Field(min_length=1, max_length=120, pattern=_PRINTABLE)]
+    name: Annotated[str, Field(min_length=1, max_length=120, pattern=PRINTABLE)]
     description: Prose = ""
     map: MapReference
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0

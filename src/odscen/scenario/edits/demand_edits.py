@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
+from odscen.scenario.document.document_parts import Identifier  # noqa: TC001 (read at run time)
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.scenario_document import (
     Background,
     Counts,
     Demand,
-    Identifier,
     Matrix,
     Profile,
     Scenario,

@@ -8,13 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids, shared_nodes
+from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.problems import Problem, refuse_errors
-from odscen.scenario.document.scenario_document import (
-    Actor,
-    Flow,
-    Part,
-    Scenario,
-)
+from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 from odscen.scenario.document.validation import validated
 from odscen.scenario.placing.region import Region
 

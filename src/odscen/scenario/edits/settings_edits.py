@@ -6,27 +6,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.scenario_checks import roi_problems
-from odscen.scenario.checks.signal_timing import find_light, signal_problems
+from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.document.scenario_document import (
-    Environment,
-    JunctionTiming,
-    MapReference,
-    Scenario,
-)
+from odscen.scenario.document.scenario_document import Environment, MapReference, Scenario
+from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.document.validation import validated
 from odscen.scenario.edits.edit_registry import edit
 from odscen.scenario.edits.edited_parts import (
     changed_part,
     with_fields,
 )
+from odscen.scenario.signals.light import find_light
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.checks.signal_timing import Light
-    from odscen.scenario.document.scenario_document import Control, Simulation
+    from odscen.scenario.document.scenario_document import Simulation
+    from odscen.scenario.document.signals_document import Control
+    from odscen.scenario.signals.light import Light
 
 
 def new_scenario(
@@ -118,7 +116,7 @@ def set_timing(
     lights
         Traffic lights of the map.
     fields
-        Fields of a :class:`~odscen.scenario.document.scenario_document.JunctionTiming`,
+        Fields of a :class:`~odscen.scenario.document.signals_document.JunctionTiming`,
         such as ``green``; those not given stay as they are.
 
     Raises

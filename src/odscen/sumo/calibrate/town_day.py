@@ -18,8 +18,8 @@ from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.scenario.demand.day_profiles import DAY, Curve, known_profiles
 from odscen.scenario.document.scenario_document import Background, Demand
 from odscen.scenario.placing.region import Region
+from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.passages import each_passing
-from odscen.sumo.realize.program_files import scenario_lights
 from odscen.sumo.realize.realization import all_road_users
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def approach_capacities(sumo_map: SumoMap) -> dict[str, float]:
     graph = sumo_map.graph
     ids, kinds = graph.segments.ids, graph.segments.kinds
     junctions = {str(name) for name, kind in zip(ids, kinds, strict=True) if kind == "junction"}
-    lights = scenario_lights(sumo_map.lights)
+    lights = scenario_lights(sumo_map)
     stages = {f"j{name}": len(light.green) for light in lights for name in light.names}
     before: dict[str, list[str]] = {name: [] for name in junctions}
     for one, others in transitions(graph).items():

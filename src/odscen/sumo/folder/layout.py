@@ -34,11 +34,21 @@ SSM_FILE = "ssm.xml"
 """SUMO's own; what is in it goes into the conflicts."""
 CONFLICTS_FILE = "conflicts.parquet"
 CONFLICTS_FOLDER = "conflicts"
+STATES_FILE = "signal_states.xml"
+"""SUMO's own; what is in it goes into the signal states."""
+LIGHT_STATES_FILE = "signal_states.parquet"
+LIGHT_STATES_FOLDER = "signal_states"
+CALLS_FILE = "detector_calls.parquet"
+CALLS_FOLDER = "detector_calls"
+LIGHTS_FILE = "signals.json"
+"""Signal groups and programs of all lights."""
 RECORDED = {
     TRAJECTORIES_FILE: TRAJECTORIES_FOLDER,
     LANES_FILE: LANES_FOLDER,
     TRIPS_FILE: TRIPS_FOLDER,
     CONFLICTS_FILE: CONFLICTS_FOLDER,
+    LIGHT_STATES_FILE: LIGHT_STATES_FOLDER,
+    CALLS_FILE: CALLS_FOLDER,
 }
 """What is recorded: the file of a run in one piece, the folder of one in slices."""
 EVENTS_FILE = "events.json"

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.results.measures.conflicts import conflicts_of_slices
 from odscen.sumo.folder.layout import (
+    CALLS_FILE,
     CONFLICTS_FILE,
     LANES_FILE,
+    LIGHT_STATES_FILE,
     RECORDED,
     TRAJECTORIES_FILE,
     TRIPS_FILE,
@@ -111,6 +113,36 @@ def read_conflicts(run: Path) -> pl.DataFrame | None:
 
     files = recorded_files(run, CONFLICTS_FILE)
     return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
+
+
+def read_light_states(run: Path) -> pl.DataFrame | None:
+    """Read what each light showed: columns of :mod:`odscen.sumo.outputs.signal_log`.
+
+    Returns
+    -------
+    Sorted by light and time, each row another state or program than the one before; ``None`` if the
+    map has no lights.
+    """
+    import polars as pl
+
+    states = _read(run, LIGHT_STATES_FILE)
+    if states is None:
+        return None
+    shown = pl.struct("program", "state")
+    return states.sort("light", "time", maintain_order=True).filter(
+        (shown != shown.shift(1).over("light")).fill_null(value=True)
+    )
+
+
+def read_calls(run: Path) -> pl.DataFrame | None:
+    """Read when which detector saw somebody: ``detector``, ``begin`` and ``end``, s.
+
+    Returns
+    -------
+    Sorted by detector and time; ``None`` if no light has detectors. Who is there when a slice ends
+    is in two rows.
+    """
+    return _read(run, CALLS_FILE)
 
 
 def _read(run: Path, file: str) -> pl.DataFrame | None:

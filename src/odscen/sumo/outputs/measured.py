@@ -9,13 +9,23 @@ from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import traffic_figures
 from odscen.results.by_place.traffic_sums import intervals
 from odscen.results.measures.figure import RunData
+from odscen.results.measures.signal_use import signal_use, write_signal_use
 from odscen.results.measures.traffic_files import figures_json, write_tables
+from odscen.results.records.light_programs import programs_from_json
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.recorded import read_conflicts, read_lanes, read_trips, trajectory_files
+from odscen.sumo.folder.recorded import (
+    read_conflicts,
+    read_lanes,
+    read_light_states,
+    read_trips,
+    trajectory_files,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    import polars as pl
 
     from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.measures.summary import ActorOutcome
@@ -69,11 +79,42 @@ def read_run_data(
         trips=read_trips(run),
         conflicts=read_conflicts(run),
         end=end,
+        signals=read_signal_use(run, end=end, meso=meso),
     )
+
+
+def read_signal_use(run: Path, *, end: float, meso: bool = False) -> pl.DataFrame | None:
+    """How signal groups were used in a run that lasted ``end`` seconds.
+
+    Returns
+    -------
+    See :func:`odscen.results.measures.signal_use.signal_use`; ``None`` if the map has no lights.
+
+    Raises
+    ------
+    InputError
+        If the programs of lights cannot be read.
+    """
+    import polars as pl
+
+    states = read_light_states(run)
+    file = run / layout.LIGHTS_FILE
+    if states is None or not file.is_file():
+        return None
+    programs = programs_from_json(file.read_text(encoding="utf-8"))
+    files = trajectory_files(run)
+    rows = pl.scan_parquet(files) if files and not meso else None
+    places = run / layout.LANE_PLACES_FILE
+    ways = (
+        LanePlaces.from_json(places.read_text(encoding="utf-8")).ways if places.is_file() else None
+    )
+    return signal_use(programs, states, end=end, rows=rows, ways=ways)
 
 
 def write_figures(run: Path, data: RunData) -> None:
     """Write ``figures.json`` and the tables of a run; neither if nothing was measured on lanes."""
+    if data.signals is not None:
+        write_signal_use(data.signals, run / layout.FIGURES_FOLDER)
     if data.traffic is None:
         return
     text = figures_json(data, data.traffic)

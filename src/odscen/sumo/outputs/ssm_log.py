@@ -1,4 +1,4 @@
-"""The log of SUMO's SSM device; :mod:`odscen.sumo.realize.ssm_device` says what it logs."""
+"""The log of SUMO's SSM device; :mod:`odscen.sumo.realize.sumocfg` says what it logs."""
 
 from __future__ import annotations
 

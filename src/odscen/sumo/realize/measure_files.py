@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from odscen.sumo.folder.layout import EMISSIONS_FILE, LANES_FILE
+from typing import TYPE_CHECKING
+
+from odscen.sumo.folder.layout import EMISSIONS_FILE, LANES_FILE, STATES_FILE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 INTERVALS = (10.0, 30.0, 60.0, 300.0, 900.0)
 """Seconds, from fine to coarse: one of them is what is measured over."""
@@ -22,15 +27,37 @@ def interval_of(until: float, slice_length: float | None = None) -> float:
     return min(next(fine, INTERVALS[-1]), slice_length or until)
 
 
-def measures_xml(interval: float, *, emissions: bool) -> str:
-    """Text of ``measures.add.xml``; files are relative to it."""
+def measures_xml(
+    interval: float, *, emissions: bool, lights: bool = False, watched: Sequence[str] = ()
+) -> str:
+    """Text of ``measures.add.xml``; files are relative to it.
+
+    Parameters
+    ----------
+    lights
+        Whether there are traffic lights, whose states are logged when they change.
+    watched
+        SUMO's ids of lights whose detectors are logged too, in every step.
+    """
     wanted = [_lane_data("lanes", LANES_FILE, interval, LANE_ATTRIBUTES)]
     if emissions:
         attributes = tuple(f"{name}_abs" for name in EMISSIONS)
         wanted.append(
             _lane_data("emissions", EMISSIONS_FILE, interval, attributes, 'type="emissions" ')
         )
+    if lights:
+        wanted.append(f'    <timedEvent type="SaveTLSSwitchStates" dest="{STATES_FILE}"/>')
+    wanted += [
+        f'    <timedEvent type="SaveTLSStates" source="{light}" dest="{calls_file(number)}"'
+        ' saveDetectors="true"/>'
+        for number, light in enumerate(watched)
+    ]
     return "\n".join(["<additional>", *wanted, "</additional>", ""])
+
+
+def calls_file(number: int) -> str:
+    """Name of SUMO's log of the detectors of one light; there is one for each."""
+    return f"detector_calls.{number}.xml"
 
 
 def _lane_data(

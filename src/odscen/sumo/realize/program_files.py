@@ -1,77 +1,91 @@
-"""Programs of traffic lights that a scenario changes, as an additional file for SUMO.
-
-Only stages are timed anew. Yellow, clearing of crossings and all-red follow from speeds and lengths
-of the map (:mod:`odscen.convert.signals.signal_programs`) and stay as they are.
-"""
+"""Programs of traffic lights that a scenario changes, as an additional file for SUMO."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
-
-from odscen.convert.model.net import TrafficLight, light_xml
-from odscen.scenario.checks.signal_timing import Light
-from odscen.scenario.document.scenario_document import JunctionTiming
+from xml.sax.saxutils import quoteattr
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator
 
-    from odscen.convert.lane_table.table import SumoLight
-    from odscen.convert.model.net import Phase
-    from odscen.scenario.document.scenario_document import Control, Signals
+    from odscen.sumo.realize.light_detectors import PlacedLoop
+    from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
+    from odscen.sumo.realize.stage_phases import SumoPhase
 
-PROGRAM = "scenario"
-"""``programID``; the network's own is ``0``. SUMO runs the one that it has read last."""
+DETECTOR_PARAM = "odscen.detector"
+"""Parameter of a loop that has the detector's name in the scenario."""
 
-TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
-"""``type`` of a ``<tlLogic>``."""
-
-
-def scenario_lights(lights: Sequence[SumoLight]) -> tuple[Light, ...]:
-    """Traffic lights as scenarios see them, in the same order."""
-    return tuple(
-        Light(
-            tuple(light.junctions) or (light.id,),
-            tuple(phase.duration for phase in light.phases if phase.is_stage),
-        )
-        for light in lights
-    )
+_PERIOD = 86_400
+"""Seconds over which SUMO would aggregate what a loop counts; nothing of it is written."""
 
 
-def signals_xml(signals: Signals, lights: Sequence[SumoLight]) -> str | None:
-    """Text of ``signals.add.xml``; ``None`` if all lights keep the program of the network.
-
-    Parameters
-    ----------
-    signals
-        Without errors, see :func:`odscen.scenario.checks.signal_timing.signal_problems`.
-    """
-    timings = {timing.junction: timing for timing in signals.junctions}
+def signals_xml(lights: Iterable[RealizedLight]) -> str | None:
+    """Text of ``signals.add.xml``; ``None`` if all lights keep the program of the network."""
     lines: list[str] = []
-    for light, known in zip(lights, scenario_lights(lights), strict=True):
-        own = [timings[name] for name in known.names if name in timings]
-        timing = own[0] if own else JunctionTiming(junction=known.names[0])
-        kind = TYPES[timing.control or signals.control]
-        phases = _timed(light.phases, timing.green or known.green)
-        offset = timing.offset or light.offset
-        if (kind, phases, offset) != (TYPES["fixed"], light.phases, light.offset):
-            lines += light_xml(TrafficLight(light.id, phases, kind, offset, PROGRAM, light.signals))
+    for light in lights:
+        if light.programs:
+            lines += [_loop_xml(loop) for loop in light.loops]
+            for program in light.programs:
+                lines += _program_xml(light.shown.id, program)
+            lines += _switches_xml(light)
     if not lines:
         return None
     head = ['<?xml version="1.0" encoding="UTF-8"?>', "<additional>"]
     return "\n".join([*head, *lines, "</additional>", ""])
 
 
-def _timed(phases: Sequence[Phase], greens: Sequence[float]) -> tuple[Phase, ...]:
-    """Phases with other greens; the bounds of an actuated green move with it."""
-    left = iter(greens)
-    return tuple(_stretched(phase, next(left)) if phase.is_stage else phase for phase in phases)
+def _loop_xml(loop: PlacedLoop) -> str:
+    walking = ' detectPersons="walk"' if loop.walk else ""
+    text = (
+        f'    <inductionLoop id="{loop.id}" lane="{loop.lane}" pos="{loop.pos:.4f}"'
+        f' length="{loop.length:.4f}"{walking} file="NUL" period="{_PERIOD}"'
+    )
+    if not loop.name:
+        return text + "/>"
+    return f'{text}><param key="{DETECTOR_PARAM}" value="{loop.name}"/></inductionLoop>'
 
 
-def _stretched(phase: Phase, green: float) -> Phase:
-    return replace(
-        phase,
-        duration=green,
-        least=min(phase.least, green),
-        most=phase.most * green / phase.duration,
+def _program_xml(light: str, program: SumoProgram) -> Iterator[str]:
+    yield (
+        f'    <tlLogic id="{light}" type="{program.kind}" programID="{program.id}"'
+        f' offset="{program.offset:g}">'
+    )
+    for phase in program.plan.phases:
+        yield f"        <phase {' '.join(_attributes(phase, program.kind))}/>"
+    for name, expression in program.conditions.items():
+        yield f"        <condition id={quoteattr(name)} value={quoteattr(expression)}/>"
+    for key, value in program.params.items():
+        yield f"        <param key={quoteattr(key)} value={quoteattr(value)}/>"
+    yield "    </tlLogic>"
+
+
+def _attributes(phase: SumoPhase, kind: str) -> Iterator[str]:
+    yield f'duration="{phase.seconds:g}" state="{phase.state}"'
+    if kind == "actuated" and phase.prolonged:
+        yield f'minDur="{phase.least:g}" maxDur="{phase.most:g}"'
+    if phase.earliest_end is not None:
+        yield f'earliestEnd="{phase.earliest_end:g}"'
+    if phase.latest_end is not None:
+        yield f'latestEnd="{phase.latest_end:g}"'
+    if phase.following:
+        yield f'next="{" ".join(map(str, phase.following))}"'
+    if phase.early:
+        yield f"earlyTarget={quoteattr(phase.early)}"
+    if phase.final:
+        yield f"finalTarget={quoteattr(phase.final)}"
+    yield f"name={quoteattr(phase.name)}"
+
+
+def _switches_xml(light: RealizedLight) -> Iterator[str]:
+    """Plans of the day: SUMO waits for the begin of the first stage, and falls in step there."""
+    if len(light.programs) < 2:
+        return
+    name = light.shown.id
+    yield f'    <WAUT id="plans.{name}" refTime="0" startProg="{light.switches[0][1]}">'
+    for time, program in light.switches[1:]:
+        yield f'        <wautSwitch time="{time:g}" to="{program}"/>'
+    yield "    </WAUT>"
+    yield (
+        f'    <wautJunction wautID="plans.{name}" junctionID="{name}" procedure="GSP"'
+        ' synchron="true"/>'
     )

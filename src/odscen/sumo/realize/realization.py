@@ -31,16 +31,17 @@ from odscen.sumo.folder.layout import (
 )
 from odscen.sumo.realize.departures import demand_users, road_users
 from odscen.sumo.realize.driving import KINDS, draw_factor, driver
+from odscen.sumo.realize.light_realization import realized_lights
+from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
-from odscen.sumo.realize.program_files import scenario_lights, signals_xml
+from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.recording import region_xml
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.run_settings import AS_DESIGNED
-from odscen.sumo.realize.ssm_device import VEHICLE_PARAMETER
-from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
+from odscen.sumo.realize.sumocfg import SSM_PARAMETER, SumocfgSettings, sumo_config
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.realize.walk_planner import Walk, WalkPlanner
 from odscen.sumo.realize.weather_effects import NO_EFFECT, weather_effect
@@ -49,8 +50,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import Int32Array
+    from odscen.results.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Environment, Scenario
     from odscen.sumo.realize.driving import Driver
+    from odscen.sumo.realize.light_realization import RealizedLight
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.realize.sumo_map import SumoMap
@@ -82,12 +85,14 @@ class Realization:
 
     ``problems`` name actors that are in the plan but not in the files, because the SUMO network has
     no route for them; ``notes`` name routes that had to be repaired, and demand that was not met.
+    ``lights`` say what each traffic light shows.
     """
 
     files: dict[str, str]
     plan: Plan
     problems: tuple[str, ...]
     notes: tuple[str, ...]
+    lights: tuple[LightProgram, ...] = ()
 
 
 def realize(
@@ -113,7 +118,7 @@ def realize(
         With every actor and flow whose spawn or goal is not usable, or with every timing of a
         traffic light that is not possible.
     """
-    refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map.lights)))
+    refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map)))
     if settings.seed is not None:
         scenario = scenario.model_copy(update={"seed": settings.seed})
     own, recording = scenario.simulation, settings.recorded
@@ -123,7 +128,7 @@ def realize(
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
-    demand = RoutesFile((VEHICLE_PARAMETER,) if recording.criticality else ())
+    demand = RoutesFile((SSM_PARAMETER,) if recording.criticality else ())
     writer = _Writer(sumo_map, region, assets, scenario.seed, effect, demand)
     plan = Plan(
         scenario=scenario.name,
@@ -136,12 +141,21 @@ def realize(
         slice_length=slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
     )
-    signals = signals_xml(scenario.signals, sumo_map.lights)
-    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals)}
-    return Realization(files, plan, tuple(writer.problems), (*unmet, *writer.notes))
+    lights = realized_lights(scenario, sumo_map, until=until)
+    signals = signals_xml(lights)
+    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals, lights)}
+    return Realization(
+        files,
+        plan,
+        tuple(writer.problems),
+        (*unmet, *writer.notes),
+        tuple(light.shown for light in lights),
+    )
 
 
-def _run_files(plan: Plan, settings: RunSettings, signals: str | None) -> dict[str, str]:
+def _run_files(
+    plan: Plan, settings: RunSettings, signals: str | None, lights: Sequence[RealizedLight]
+) -> dict[str, str]:
     """What SUMO reads beside network and routes; ``signals`` are programs that differ."""
     recording = settings.recorded
     sumocfg = SumocfgSettings(
@@ -157,7 +171,12 @@ def _run_files(plan: Plan, settings: RunSettings, signals: str | None) -> dict[s
     interval = interval_of(plan.until, plan.slice_length)
     files = {
         CONFIG_FILE: sumo_config(sumocfg),
-        MEASURES_FILE: measures_xml(interval, emissions=recording.emissions),
+        MEASURES_FILE: measures_xml(
+            interval,
+            emissions=recording.emissions,
+            lights=bool(lights),
+            watched=[light.shown.id for light in lights if light.watched],
+        ),
     }
     if signals is not None:
         files[SIGNALS_FILE] = signals

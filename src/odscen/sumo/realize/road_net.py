@@ -88,6 +88,14 @@ class RoadNet:
             found.setdefault(link.source, []).append(link)
         return {lane: tuple(links) for lane, links in found.items()}
 
+    @cached_property
+    def links_to(self) -> dict[str, tuple[Link, ...]]:
+        """Links that lead onto each lane, from internal lanes where there are such."""
+        found: dict[str, list[Link]] = {}
+        for link in self.links:
+            found.setdefault(link.via or link.target, []).append(link)
+        return {lane: tuple(links) for lane, links in found.items()}
+
     def followers(self, edge: str, vclass: str) -> tuple[str, ...]:
         """Edges that one can drive to from ``edge``, sorted."""
         key = edge, vclass

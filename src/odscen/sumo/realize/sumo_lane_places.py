@@ -58,14 +58,8 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
     that crosses no junction of the map, and is too short for a node, is in the segment that it is
     entered from.
     """
-    net, segments = sumo_map.net, sumo_map.graph.segments
-    junctions = {
-        str(name)
-        for name, kind in zip(segments.ids, segments.kinds, strict=True)
-        if kind == "junction"
-    }
-    parts = dict(_parts(sumo_map, junctions))
-    parts |= _beside(parts, net)
+    net, junctions = sumo_map.net, _junctions(sumo_map)
+    parts = _road_parts(sumo_map, junctions)
     chains = list(_chains(net))
     parts |= _inside(chains, parts, junctions, net)
     connections = list(_connections(chains, parts, junctions))
@@ -89,6 +83,26 @@ def lane_places(sumo_map: SumoMap) -> LanePlaces:
             for name, junction in sorted(movements.items())
         ],
     )
+
+
+def lane_segments(sumo_map: SumoMap) -> dict[str, tuple[str, ...]]:
+    """Segments in which each lane lies that has nodes, or lies beside one; in driving direction."""
+    parts = _road_parts(sumo_map, _junctions(sumo_map))
+    return {lane: tuple(part.segment for part in some) for lane, some in parts.items()}
+
+
+def _junctions(sumo_map: SumoMap) -> set[str]:
+    segments = sumo_map.graph.segments
+    return {
+        str(name)
+        for name, kind in zip(segments.ids, segments.kinds, strict=True)
+        if kind == "junction"
+    }
+
+
+def _road_parts(sumo_map: SumoMap, junctions: set[str]) -> _Parts:
+    parts = dict(_parts(sumo_map, junctions))
+    return parts | _beside(parts, sumo_map.net)
 
 
 def _parts(

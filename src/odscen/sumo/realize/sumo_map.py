@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.ids import Roadside
+from odscen.base.ids import LaneKey, Roadside
 from odscen.lanegraph.graphs import Relation
 from odscen.sumo.realize.road_net import Link, RoadNet, RoadNetLane
 from odscen.sumo.realize.route_planner import NodePositions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
-    from odscen.base.ids import LaneKey
     from odscen.convert.lane_table.table import LaneTable, SumoLight
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
 
@@ -45,6 +44,9 @@ class SumoMap:
         Whether the network has heights.
     lights
         Traffic lights of the network.
+    lane_names
+        OpenDRIVE lanes (``12.0.-1``) at the stop lines of lights, and where one comes out behind
+        them, by SUMO lane.
     """
 
     graph: MapGraph
@@ -54,6 +56,7 @@ class SumoMap:
     net_offset: tuple[float, float]
     elevation: bool = False
     lights: tuple[SumoLight, ...] = ()
+    lane_names: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def drivable(self) -> BoolArray:
@@ -87,6 +90,7 @@ class SumoMap:
             net_offset=table.net_offset,
             elevation=table.elevation,
             lights=table.lights,
+            lane_names=_lane_names(table),
         )
 
 
@@ -164,6 +168,18 @@ def _all_scaled(places: NodePositions) -> NodePositions:
 
 def _or_one(scale: float) -> float:
     return 1.0 if np.isnan(scale) else float(scale)
+
+
+def _lane_names(table: LaneTable) -> dict[str, str]:
+    links = [link for light in table.lights for link in light.links]
+    places = [(link.target, 0.0) for link in links]
+    places += [(link.source, table.lanes[link.source].length) for link in links]
+    found = {lane: table.to_xodr(lane, pos) for lane, pos in places}
+    return {
+        lane: str(place.lane)
+        for lane, place in found.items()
+        if place is not None and isinstance(place.lane, LaneKey)
+    }
 
 
 def _road_net(table: LaneTable) -> RoadNet:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
+from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
 from odscen.sumo.folder.layout import (
     MEASURES_FILE,
     NET_FILE,
@@ -19,13 +20,25 @@ from odscen.sumo.folder.layout import (
     TRIPINFO_FILE,
 )
 from odscen.sumo.realize.recording import REGION_ID, Recording
-from odscen.sumo.realize.ssm_device import OPTIONS
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
 
 Longer than a red light, at which they stand behind each other for a reason.
 """
+
+
+SSM_PARAMETER = ("has.ssm.device", "true")
+"""By which every vType has SUMO's SSM device: devices given by probability are gone from vehicles
+that come in with a saved state."""
+
+SSM_OPTIONS = {
+    "device.ssm.measures": "TTC DRAC PET",
+    "device.ssm.thresholds": f"{SEEN_TTC:g} {SEEN_DRAC:g} {SEEN_PET:g}",
+    "device.ssm.range": "50",
+    "device.ssm.extratime": f"{WATCHED_ON:g}",
+}
+"""What the SSM device measures; range in metres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +116,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         },
     }
     if recording.criticality:
-        sections["ssm_device"] = {**OPTIONS, "device.ssm.file": SSM_FILE}
+        sections["ssm_device"] = {**SSM_OPTIONS, "device.ssm.file": SSM_FILE}
     if settings.meso:
         sections["mesoscopic"] = {
             "mesosim": "true",

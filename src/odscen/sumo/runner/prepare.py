@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.scenario.document.json_form import dumps
-from odscen.sumo.realize.forecast import forecast
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumo_lane_places import lane_places
+from odscen.sumo.runner.forecast import forecast
 from odscen.sumo.runner.run_folder import PreparedRun
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ def prepare(
         problems=realization.problems,
         notes=((MESO_NOTE,) if settings.meso else ()) + realization.notes,
         places=lane_places(sumo_map),
+        lights=realization.lights,
         about={
             "map": scenario.map.name,
             "map_sha256": scenario.map.sha256,

@@ -16,20 +16,24 @@ from odscen.results.measures.expectations import evaluate
 from odscen.results.measures.figure import SummaryPart
 from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
+from odscen.results.measures.signal_use import SIGNALS_TABLE
 from odscen.results.measures.summary import actors_from_json
+from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import events_from_json, rounded
 from odscen.sumo.folder import layout
 from odscen.sumo.outputs.measured import read_run_data, write_figures
+from odscen.sumo.outputs.signal_log import signal_logs
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.results.by_place.lane_places import LanePlaces
+    from odscen.results.records.light_programs import LightProgram
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.realize.forecast import Forecast
     from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.sumo.runner.forecast import Forecast
     from odscen.sumo.runner.worker_process import Ended
 
 Finish = Callable[["Path", Mapping[str, Any]], None]
@@ -64,6 +68,8 @@ class PreparedRun:
         What it will need on disk and in memory.
     places
         Where each lane lies; figures of traffic by place need them.
+    lights
+        What each traffic light shows; figures of signals need it.
     """
 
     plan: Plan
@@ -76,6 +82,7 @@ class PreparedRun:
     about: Mapping[str, Any] = field(default_factory=dict)
     expected: Forecast | None = None
     places: LanePlaces | None = None
+    lights: tuple[LightProgram, ...] = ()
 
 
 def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
@@ -85,6 +92,9 @@ def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
     (folder / layout.PLAN_FILE).write_text(prepared.plan.to_json(), encoding="utf-8")
     if prepared.places is not None:
         (folder / layout.LANE_PLACES_FILE).write_text(prepared.places.to_json(), encoding="utf-8")
+    if prepared.lights:
+        text = programs_to_json(prepared.lights)
+        (folder / layout.LIGHTS_FILE).write_text(text, encoding="utf-8")
     sumo = folder / layout.SUMO_FOLDER
     sumo.mkdir()
     write_sumo_files(prepared.sumo_files, prepared.net, sumo, link=True)
@@ -169,6 +179,8 @@ def drop_torn_records(folder: Path) -> None:
     """
     for name in (layout.LANES_FILE, layout.EMISSIONS_FILE, layout.TRIPINFO_FILE, layout.SSM_FILE):
         (folder / name).unlink(missing_ok=True)
+    for log in signal_logs(folder):
+        log.unlink(missing_ok=True)
     file = folder / layout.TRAJECTORIES_FILE
     if not file.is_file():
         return
@@ -198,6 +210,12 @@ def found_files(folder: Path) -> dict[str, str]:
         "trip_parts": layout.TRIPS_FOLDER,
         "conflicts": layout.CONFLICTS_FILE,
         "conflict_parts": layout.CONFLICTS_FOLDER,
+        "signal_states": layout.LIGHT_STATES_FILE,
+        "signal_state_parts": layout.LIGHT_STATES_FOLDER,
+        "detector_calls": layout.CALLS_FILE,
+        "detector_call_parts": layout.CALLS_FOLDER,
+        "lights": layout.LIGHTS_FILE,
+        "signal_figures": f"{layout.FIGURES_FOLDER}/{SIGNALS_TABLE}",
         "lane_places": layout.LANE_PLACES_FILE,
         "figures": layout.FIGURES_FILE,
         **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},

@@ -17,7 +17,7 @@ from odscen.base.errors import WorkspaceError
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.realize.forecast import refuse_without_room
+from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,

@@ -35,6 +35,7 @@ from odscen.sumo.folder.parts import tidy_part
 from odscen.sumo.folder.run_status import write_status
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.output_tables import tidy_outputs, trips_in, write_results
+from odscen.sumo.outputs.signal_log import tidy_signals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -76,6 +77,7 @@ class Written:
         tidy_part(part / layout.TRAJECTORIES_FILE)
         tidy_outputs(part, self.lengths, present=self.lanes, last=last)
         tidy_conflicts(part, plan)
+        tidy_signals(part)
         checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))
         complete(run, part, checkpoint)
         write_status(run, plan, checkpoint)

@@ -31,6 +31,7 @@ from odscen.sumo.folder.layout import (
 from odscen.sumo.folder.parts import tidy_part
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
 from odscen.sumo.outputs.output_tables import outputs_to, tidy_outputs, trips_in, write_results
+from odscen.sumo.outputs.signal_log import tidy_signals
 from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.output_capture import captured_output
 from odscen.sumo.worker.protocol import Done, Failed, Lockstep, Message, Pace, decode, encode
@@ -99,6 +100,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
     tidy_part(folder / TRAJECTORIES_FILE)
     tidy_outputs(folder, lengths, present={}, last=True)
     tidy_conflicts(folder, plan)
+    tidy_signals(folder)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
 
 

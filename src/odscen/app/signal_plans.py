@@ -1,0 +1,157 @@
+"""Signal programs of scenarios: shown, taken over from SUMO's files, and written as such."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.app.maps import map_of
+from odscen.app.scenarios import given_scenario
+from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.edits.edited_parts import changed_part, with_fields
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from odscen.interchange.tll_file import SignalFile
+    from odscen.interchange.tll_program import TakenPlan
+    from odscen.results.records.light_programs import LightProgram
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.workspace.store import Workspace
+
+_DAY = 86_400.0
+
+
+def lights_of(workspace: Workspace, scenario: Scenario | Path) -> tuple[LightProgram, ...]:
+    """What each traffic light shows in a scenario.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem of the signals.
+    NotFoundError
+        If the workspace has no such map.
+    """
+    from odscen.sumo.realize.light_realization import realized_lights
+
+    scenario = given_scenario(scenario)
+    loaded = map_of(workspace, scenario)
+    refuse_errors(signal_problems(scenario.signals, loaded.lights))
+    return tuple(light.shown for light in realized_lights(scenario, loaded.sumo))
+
+
+def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
+    """SUMO's additional file with the programs that a scenario gives to lights.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem of the signals.
+    InputError
+        If the scenario leaves all lights as they are in the map.
+    """
+    from odscen.sumo.realize.light_realization import realized_lights
+    from odscen.sumo.realize.program_files import signals_xml
+
+    scenario = given_scenario(scenario)
+    loaded = map_of(workspace, scenario)
+    refuse_errors(signal_problems(scenario.signals, loaded.lights))
+    text = signals_xml(realized_lights(scenario, loaded.sumo))
+    if text is None:
+        msg = "the scenario changes no traffic light: all run the programs of the network"
+        raise InputError(msg)
+    return text
+
+
+def import_signals(
+    workspace: Workspace,
+    scenario: Scenario | Path,
+    file: Path,
+    *,
+    junctions: Sequence[str] = (),
+) -> tuple[Scenario, tuple[str, ...]]:
+    """Take programs of lights over from a SUMO file, in place of those that the scenario has.
+
+    Parameters
+    ----------
+    junctions
+        Lights, by OpenDRIVE junction or SUMO's id; all that the file and the map have if empty.
+
+    Returns
+    -------
+    The scenario, and in words what was taken otherwise than the file says it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a program in it is not one of stages; names the program.
+    NotFoundError
+        If a junction has no light.
+    ScenarioError
+        If greens conflict or intergreens are too short, with the movements and times.
+    """
+    from odscen.interchange.tll_file import parse_signal_file
+    from odscen.interchange.tll_loops import taken_loops
+    from odscen.interchange.tll_program import taken_timing
+
+    scenario = given_scenario(scenario)
+    loaded = map_of(workspace, scenario)
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise InputError(error.strerror or str(error), file=str(file)) from error
+    views = {light.id: view for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True)}
+    wanted = {light for light, view in views.items() if {light, *view.names} & set(junctions)}
+    for name in junctions:
+        if not any(name == light or name in view.names for light, view in views.items()):
+            what = "traffic light in junction"
+            raise NotFoundError(what, name, [n for view in views.values() for n in view.names])
+    timings = {timing.junction: timing for timing in scenario.signals.junctions}
+    notes: list[str] = []
+    with in_file(str(file)):
+        parsed = parse_signal_file(content)
+        found = {program.light for program in parsed.programs} & (wanted or views.keys())
+        if missing := sorted(wanted - found) or (not found and sorted(views)):
+            msg = f"the file has no program for {', '.join(map(repr, missing))}"
+            raise InputError(msg)
+        for light in loaded.sumo.lights:
+            if light.id not in found:
+                continue
+            loops = taken_loops(parsed.loops.values(), light, loaded.sumo.net)
+            plans = _plans(parsed, light.id, scenario.demand.clock, notes)
+            timing, more = taken_timing(views[light.id], plans, loops=loops)
+            notes += more
+            for name in views[light.id].names:
+                timings.pop(name, None)
+            timings[timing.junction] = timing
+    signals = changed_part(scenario.signals, {"junctions": tuple(timings.values())})
+    refuse_errors(signal_problems(signals, loaded.lights))
+    return with_fields(scenario, signals=signals), tuple(notes)
+
+
+def _plans(parsed: SignalFile, light: str, clock: float, notes: list[str]) -> list[TakenPlan]:
+    """Programs of a light that are run, with the times of day at which they begin."""
+    from odscen.interchange.tll_program import TakenPlan
+
+    programs = {one.id: one for one in parsed.programs if one.light == light}
+    switches = parsed.switches.get(light)
+    if switches is None:
+        last = list(programs.values())[-1]
+        dropped = [f"program {name!r}" for name in programs if name != last.id]
+        if dropped:
+            notes.append(f"tlLogic {light!r}: {', '.join(dropped)} is never active in SUMO")
+        return [TakenPlan(last, last.id)]
+    times: dict[str, list[str]] = {}
+    for seconds, name in ((0.0, switches.start), *switches.switches):
+        if name not in programs:
+            msg = f"WAUT of {light!r}: there is no program {name!r}"
+            raise InputError(msg)
+        times.setdefault(name, []).append(_clock_time(clock + seconds))
+    return [TakenPlan(programs[name], name, tuple(dict.fromkeys(t))) for name, t in times.items()]
+
+
+def _clock_time(seconds: float) -> str:
+    whole = round(seconds % _DAY)
+    return f"{whole // 3600 % 24:02d}:{whole // 60 % 60:02d}:{whole % 60:02d}"

@@ -1,0 +1,116 @@
+"""``odscen signals``: programs of traffic lights, shown, and from and to SUMO's files."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
+from odscen.cli.scenario_commands import ScenarioArgument
+
+app = typer.Typer(
+    help="Programs of traffic lights: what they show, and from and to SUMO's files.",
+    no_args_is_help=True,
+)
+
+
+@app.command()
+def show(
+    scenario: ScenarioArgument,
+    junction: Annotated[
+        list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show signal groups, stages and plans of the lights of a scenario."""
+    from odscen.app.signal_plans import lights_of
+    from odscen.workspace.store import Workspace
+
+    lights = lights_of(Workspace.open(workspace), scenario)
+    lights = tuple(
+        one for one in lights if not junction or set(junction) & {one.id, *one.junctions}
+    )
+    if as_json:
+        print_json({"lights": [asdict(one) for one in lights]})
+        return
+    for light in lights:
+        rows = [[group.id, ", ".join(group.movements)] for group in light.groups]
+        print_table(f"Junction {', '.join(light.junctions)}", ["group", "movements"], rows)
+        for plan in light.plans:
+            title = f"{plan.id}: {plan.cycle:g} s, offset {plan.offset:g} s, {light.control}"
+            rows = [
+                [phase.name, f"{phase.seconds:g}", _green(light.groups, phase.state)]
+                for phase in plan.phases
+            ]
+            print_table(title, ["phase", "s", "green"], rows)
+
+
+@app.command("import")
+def import_(
+    scenario: ScenarioArgument,
+    file: Annotated[
+        Path,
+        typer.Argument(help="SUMO's programs: .tll.xml, .add.xml or .net.xml.", metavar="FILE"),
+    ],
+    junction: Annotated[
+        list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Take programs over from SUMO's tlLogic, with WAUT as plans of the day, and its loops.
+
+    A program that conflicts, or whose intergreens are too short, is refused.
+    """
+    from odscen.app import scenarios
+    from odscen.app.signal_plans import import_signals
+    from odscen.workspace.store import Workspace
+
+    document, notes = import_signals(
+        Workspace.open(workspace), scenario, file, junctions=junction or ()
+    )
+    path = scenarios.write_scenario(document, out or scenario)
+    for note in notes:
+        log(note)
+    if as_json:
+        print_json({"scenario": str(path), "notes": list(notes)})
+    else:
+        log(f"wrote {path}")
+
+
+@app.command()
+def export(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Additional file to write.")] = Path(
+        "signals.add.xml"
+    ),
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the programs of a scenario's lights as an additional file for SUMO."""
+    from odscen.app.signal_plans import export_signals
+    from odscen.base.text_files import write_text
+    from odscen.workspace.store import Workspace
+
+    path = write_text(out, export_signals(Workspace.open(workspace), scenario))
+    if as_json:
+        print_json({"file": str(path)})
+    else:
+        log(f"wrote {path}")
+
+
+def _green(groups: tuple[object, ...], state: str) -> str:
+    shown = []
+    for group in groups:
+        letters = {state[n] for n in getattr(group, "links", ())}
+        if letters & {"G", "g"}:
+            shown.append(str(getattr(group, "id", "")))
+    return " ".join(shown)

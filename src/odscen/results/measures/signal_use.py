@@ -1,0 +1,291 @@
+"""How signal groups were used: greens served, cycle failures, green in which nobody passed.
+
+From what lights showed and, for vehicles, from trajectories of every step or nearly so.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import polars as pl
+
+    from odscen.results.measures.figure import RunData
+    from odscen.results.records.light_programs import LightProgram, ShownGroup
+
+SIGNALS_TABLE = "signals.csv"
+"""Name of the table in the folder of figures."""
+
+PASSING = 3.0
+"""Seconds of green after a vehicle has passed that are not counted as unused."""
+
+STOPPED = 0.1
+"""m/s below which SUMO counts a vehicle as waiting."""
+
+_DIGITS = 3
+_PERCENT = Display("%", 100.0, 1)
+
+
+def signal_use(
+    programs: Sequence[LightProgram],
+    states: pl.DataFrame,
+    *,
+    end: float,
+    rows: pl.LazyFrame | None = None,
+    ways: pl.DataFrame | None = None,
+) -> pl.DataFrame:
+    """Use of each signal group over a run.
+
+    Parameters
+    ----------
+    states
+        From :func:`odscen.sumo.folder.recorded.read_light_states`.
+    end
+        Simulated seconds.
+    rows
+        Trajectories as SUMO wrote them; without them, or without their lanes, nothing is known of
+        vehicles.
+    ways
+        Of :class:`odscen.results.by_place.lane_places.LanePlaces`: lanes that lead to junctions.
+
+    Returns
+    -------
+    polars.DataFrame
+        ``junction``, ``group``, ``movements``; ``greens``, their number, ``green``, their seconds,
+        and ``mean_green``; of groups for vehicles also ``vehicles`` that passed in green or yellow,
+        ``cycle_failures`` (greens at whose end a vehicle had not passed that was stopped before
+        their begin) and ``unused_green`` (seconds of green from 3 s after a vehicle passed until
+        the next one did); null where there are no trajectories.
+    """
+    import polars as pl
+
+    greens = _greens(programs, states, end)
+    table = greens.group_by("light", "group").agg(
+        greens=pl.len(), green=(pl.col("end") - pl.col("begin")).sum()
+    )
+    listed = pl.DataFrame(
+        [
+            (number, light.id, light.junctions[0], group.id, ", ".join(group.movements), group.walk)
+            for number, (light, group) in enumerate(_groups(programs))
+        ],
+        schema={
+            "order": pl.Int64, "light": pl.String, "junction": pl.String, "group": pl.String,
+            "movements": pl.String, "walk": pl.Boolean,
+        },
+        orient="row",
+    )  # fmt: skip
+    table = listed.join(table, on=["light", "group"], how="left").with_columns(
+        pl.col("greens").fill_null(0).cast(pl.Int64), pl.col("green").fill_null(0.0)
+    )
+    passed = None if rows is None else _passages(programs, rows, ways)
+    if passed is not None:
+        used = _used(greens, passed)
+        table = table.join(used, on=["light", "group"], how="left")
+    known = ("vehicles", "cycle_failures", "unused_green")
+    missing = [name for name in known if name not in table.columns]
+    none = pl.lit(None, dtype=pl.Float64)
+    table = table.with_columns(none.alias(name) for name in missing)
+    return (
+        table.sort("order")
+        .with_columns(
+            mean_green=pl.col("green") / pl.col("greens").replace(0, None),
+            **{
+                name: pl.when(~pl.col("walk") & (passed is not None))
+                .then(pl.col(name).fill_null(0))
+                .otherwise(None)
+                .cast(pl.Float64 if name == "unused_green" else pl.Int64)
+                for name in known
+            },
+        )
+        .select("junction", "group", "movements", "greens", "green", "mean_green", *known)
+    )
+
+
+def _groups(programs: Sequence[LightProgram]) -> list[tuple[LightProgram, ShownGroup]]:
+    return [(light, group) for light in programs for group in light.groups]
+
+
+def _greens(programs: Sequence[LightProgram], states: pl.DataFrame, end: float) -> pl.DataFrame:
+    """Greens of each group: ``light``, ``group``, ``number``, ``begin`` and ``end``, s."""
+    import polars as pl
+
+    links = {light.id: [(g.id, g.links[0]) for g in light.groups] for light in programs}
+    found = []
+    for (name,), shown in states.group_by("light", maintain_order=True):
+        times = [*shown["time"].to_list(), end]
+        letters = shown["state"].to_list()
+        for group, link in links.get(str(name), ()):
+            begin, number = None, 0
+            for time, state in zip(times, [*letters, None], strict=True):
+                green = state is not None and state[link] in "Gg"
+                if green and begin is None:
+                    begin = time
+                elif not green and begin is not None:
+                    found.append((str(name), group, number, begin, time))
+                    begin, number = None, number + 1
+    columns = {"light": pl.String, "group": pl.String, "number": pl.Int64}
+    return pl.DataFrame(
+        found, schema={**columns, "begin": pl.Float64, "end": pl.Float64}, orient="row"
+    )
+
+
+def _passages(
+    programs: Sequence[LightProgram], rows: pl.LazyFrame, ways: pl.DataFrame | None
+) -> pl.DataFrame | None:
+    """Vehicles and the times at which they passed a light, and stopped before it if they did."""
+    import polars as pl
+
+    names = rows.collect_schema().names()
+    if not {"vehicle_lane", "vehicle_speed"} <= set(names):
+        return None
+    inside = pl.DataFrame(
+        [
+            (lane, light.id, group.id)
+            for light, group in _groups(programs)
+            for lanes in group.lanes
+            for lane in lanes[1:]
+        ],
+        schema=dict.fromkeys(("lane", "light", "group"), pl.String),
+        orient="row",
+    ).unique("lane", maintain_order=True)
+    seen = rows.select(
+        pl.col("timestep_time").cast(pl.Float64).alias("time"),
+        pl.col("vehicle_id").alias("id"),
+        pl.col("vehicle_lane").alias("lane"),
+        pl.col("vehicle_speed").alias("speed"),
+    )
+    passed = (
+        seen.join(inside.lazy(), on="lane")
+        .group_by("id", "light", "group")
+        .agg(passed=pl.col("time").min())
+        .collect()
+    )
+    if ways is None or passed.is_empty():
+        return passed.with_columns(stopped=pl.lit(None, dtype=pl.Float64))
+    edges = _approaches(programs, ways)
+    stopped = (
+        seen.filter(pl.col("speed") < STOPPED)
+        .join(edges.lazy(), on="lane")
+        .group_by("id", "light")
+        .agg(stopped=pl.col("time").min())
+        .collect()
+    )
+    return passed.join(stopped, on=["id", "light"], how="left")
+
+
+def _approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.DataFrame:
+    """Lanes on the way to each light."""
+    import polars as pl
+
+    lights = pl.DataFrame(
+        [(lanes[0], light.id) for light, group in _groups(programs) for lanes in group.lanes],
+        schema={"source": pl.String, "light": pl.String},
+        orient="row",
+    ).unique()
+    last = (
+        ways.select("lane", "approach")
+        .join(lights, left_on="lane", right_on="source")
+        .select("approach", "light")
+        .unique()
+    )
+    before = ways.filter(pl.col("movement").is_null()).select("lane", "approach")
+    return before.join(last, on="approach").select("lane", "light").unique()
+
+
+def _used(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
+    """Vehicles, cycle failures and unused seconds of each group."""
+    import polars as pl
+
+    keys = ["light", "group"]
+    late = (
+        passed.filter(pl.col("stopped").is_not_null() & (pl.col("stopped") < pl.col("passed")))
+        .join(greens, on=keys)
+        .filter((pl.col("stopped") < pl.col("begin")) & (pl.col("end") < pl.col("passed")))
+        .select(*keys, "number")
+        .unique()
+        .group_by(keys)
+        .agg(cycle_failures=pl.len())
+    )
+    vehicles = passed.group_by(keys).agg(vehicles=pl.len())
+    during = (
+        greens.join(passed.select(*keys, "passed"), on=keys)
+        .filter((pl.col("passed") >= pl.col("begin")) & (pl.col("passed") < pl.col("end")))
+        .select(*keys, "number", pl.col("passed").alias("at"))
+    )
+    marks = pl.concat(
+        [
+            greens.select(*keys, "number", at="begin"),
+            during,
+            greens.select(*keys, "number", at="end"),
+        ]
+    ).sort(*keys, "number", "at")
+    gaps = marks.with_columns(gap=pl.col("at").diff().over(*keys, "number"))
+    unused = gaps.group_by(keys).agg(
+        unused_green=(pl.col("gap") - PASSING).clip(0.0).fill_null(0.0).sum()
+    )
+    return vehicles.join(late, on=keys, how="full", coalesce=True).join(
+        unused, on=keys, how="full", coalesce=True
+    )
+
+
+def write_signal_use(table: pl.DataFrame, folder: Path) -> None:
+    """Write the table beside those of traffic by place."""
+    import polars.selectors as cs
+
+    folder.mkdir(exist_ok=True)
+    table.with_columns(cs.float().round(_DIGITS)).write_csv(folder / SIGNALS_TABLE)
+
+
+def read_signal_use_table(file: Path) -> pl.DataFrame:
+    """Inverse of :func:`write_signal_use`."""
+    import polars as pl
+
+    texts = dict.fromkeys(("junction", "group", "movements"), pl.String)
+    return pl.read_csv(file, schema_overrides=texts)
+
+
+def _share(run: RunData, part: str, whole: str) -> float | None:
+    if run.signals is None:
+        return None
+    known = run.signals.filter(run.signals["vehicles"].is_not_null())
+    total = float(known[whole].sum())
+    return float(known[part].sum()) / total if total else None
+
+
+FIGURES = (
+    RunFigure(
+        name="cycle_failures",
+        unit="",
+        label="cycle failures",
+        definition="Share of the greens of all signal groups for vehicles at whose end a vehicle "
+        "had not passed that was stopped before the green began.",
+        source="HCM, 7th edition, cycle failure; SUMO's log of signal states and trajectories",
+        better=Better.LOWER,
+        tolerance="5 % or 0.01",
+        basis=Basis.SIGNALS,
+        display=_PERCENT,
+        section=ReportSection.SIGNALS,
+        note="greens that did not clear the queue",
+        compute=lambda run: _share(run, "cycle_failures", "greens"),
+    ),
+    RunFigure(
+        name="unused_green",
+        unit="",
+        label="unused green",
+        definition=f"Share of the green of all signal groups for vehicles from {PASSING:g} s after "
+        "a vehicle passed, or the green began, until the next one did.",
+        source="SUMO's log of signal states and trajectories",
+        better=Better.LOWER,
+        tolerance="5 % or 0.01",
+        basis=Basis.SIGNALS,
+        display=_PERCENT,
+        section=ReportSection.SIGNALS,
+        note="green in which no vehicle passed",
+        compute=lambda run: _share(run, "unused_green", "green"),
+    ),
+)

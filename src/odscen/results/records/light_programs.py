@@ -1,0 +1,129 @@
+"""Programs that the lights of a run have: signal groups, stages and times, as they are run.
+
+Kept in the run folder as ``signals.json``, so that logs, figures and drawings name signal groups
+without asking SUMO.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+from odscen.base.errors import InputError
+
+_FORMAT = "odscen-signals"
+_VERSION = 1
+
+
+class ProgramPhase(NamedTuple):
+    """Seconds for which a state is shown; ``stage`` is the id of the stage whose green it is."""
+
+    seconds: float
+    state: str
+    name: str
+    stage: str = ""
+    least: float = 0.0
+    most: float = 0.0
+    on_call: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ShownGroup:
+    """A signal group: its letters in the states, and what it is for.
+
+    ``lanes`` are SUMO's: for each link that before the light, then those inside the junction; of
+    crossings none. ``paths`` are points of each link's way, x and y in metres.
+    """
+
+    id: str
+    links: tuple[int, ...]
+    movements: tuple[str, ...]
+    walk: bool
+    lanes: tuple[tuple[str, ...], ...] = ()
+    paths: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPlan:
+    """One program: ``begins`` are the seconds of the run at which it is to take over."""
+
+    id: str
+    offset: float
+    phases: tuple[ProgramPhase, ...]
+    begins: tuple[float, ...] = ()
+
+    @property
+    def cycle(self) -> float:
+        """Seconds of all phases."""
+        return sum(phase.seconds for phase in self.phases)
+
+
+@dataclass(frozen=True, slots=True)
+class ShownDetector:
+    """A detector, and the stages that it prolongs; ``call`` if it calls them instead."""
+
+    id: str
+    name: str
+    stages: tuple[str, ...]
+    call: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LightProgram:
+    """All that one light is told to show.
+
+    ``id`` is SUMO's; ``junctions`` are the names that scenarios have for it; ``own`` says whether
+    the program is the scenario's.
+    """
+
+    id: str
+    junctions: tuple[str, ...]
+    control: str
+    own: bool
+    groups: tuple[ShownGroup, ...]
+    plans: tuple[ShownPlan, ...]
+    detectors: tuple[ShownDetector, ...] = ()
+
+
+def programs_to_json(programs: tuple[LightProgram, ...]) -> str:
+    """One JSON document."""
+    data = {"format": _FORMAT, "version": _VERSION, "lights": [asdict(one) for one in programs]}
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+def programs_from_json(text: str) -> tuple[LightProgram, ...]:
+    """Inverse of :func:`programs_to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is not such a document of this version.
+    """
+    try:
+        data = json.loads(text)
+        if (data["format"], data["version"]) != (_FORMAT, _VERSION):
+            msg = f"format {data['format']!r} version {data['version']!r} is not known"
+            raise InputError(msg)
+        return tuple(_light(light) for light in data["lights"])
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"not the programs of lights: {error!r}"
+        raise InputError(msg) from error
+
+
+def _light(data: dict[str, object]) -> LightProgram:
+    light = json.loads(json.dumps(data), object_hook=_tuples)
+    groups = tuple(ShownGroup(**group) for group in light.pop("groups"))
+    plans = tuple(
+        ShownPlan(**{**plan, "phases": tuple(ProgramPhase(*one) for one in plan["phases"])})
+        for plan in light.pop("plans")
+    )
+    detectors = tuple(ShownDetector(**one) for one in light.pop("detectors"))
+    return LightProgram(**light, groups=groups, plans=plans, detectors=detectors)
+
+
+def _tuples(data: dict[str, object]) -> dict[str, object]:
+    def made(value: object) -> object:
+        return tuple(map(made, value)) if isinstance(value, list) else value
+
+    return {key: made(value) for key, value in data.items()}

@@ -1,0 +1,241 @@
+"""Rules on the signal programs of a scenario: names, conflicts, intergreens, cycles, detectors."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from odscen.scenario.document.problems import error, warning
+from odscen.scenario.signals.detectors import detector_movements
+from odscen.scenario.signals.movement_names import find_movements, known_names
+from odscen.scenario.signals.plan_times import active_plans
+from odscen.scenario.signals.program_design import DesignedProgram
+from odscen.scenario.signals.stage_sequence import beginning_groups, cycle_length, stage_state
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.signals_document import Control, JunctionTiming
+    from odscen.scenario.signals.light import Light, Meeting
+    from odscen.scenario.signals.program_design import PlannedStage, TimedPlan
+
+_SAME = 1e-6
+
+
+def program_problems(
+    timing: JunctionTiming,
+    light: Light,
+    control: Control,
+    where: str,
+    *,
+    clock: float,
+    until: float | None,
+) -> Iterator[Problem]:
+    """Yield what is wrong with the program of a light; ``where`` is its place in the document."""
+    names = list(_name_problems(timing, light, where))
+    yield from names
+    stages = (
+        {stage.id for stage in timing.stages}
+        if timing.stages
+        else {str(number + 1) for number in range(len(light.green))}
+    )
+    yield from _detector_problems(timing, light, stages, where)
+    if names or not timing.stages:
+        return
+    program = DesignedProgram(timing, light, control)
+    plans = program.plans()
+    yield from _conflict_problems(program, plans[0].stages, where)
+    yield from _intergreen_problems(program, where)
+    for index, plan in enumerate(plans):
+        place = f"{where}.plans[{index}]" if timing.plans else where
+        yield from _plan_problems(program, plan, place)
+    yield from _never_active(plans, where, clock=clock, until=until)
+
+
+def _name_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator[Problem]:
+    for kind in ("groups", "stages", "detectors", "plans"):
+        ids = [one.id for one in getattr(timing, kind)]
+        for name in sorted(name for name, count in Counter(ids).items() if count > 1):
+            message = f"id {name!r} is taken twice; give one of them another"
+            yield error("duplicate_id", f"{where}.{kind}", message)
+    if timing.groups:
+        yield from _movement_problems(timing, light, where)
+    groups = {group.id for group in timing.groups}
+    stages = {stage.id for stage in timing.stages}
+    for index, stage in enumerate(timing.stages):
+        yield from _unknown("group", stage.groups, groups, f"{where}.stages[{index}]")
+    for index, row in enumerate(timing.intergreens):
+        yield from _unknown("group", row[:2], groups, f"{where}.intergreens[{index}]")
+    for index, plan in enumerate(timing.plans):
+        named = (*plan.stages, *plan.green, *plan.min_green, *plan.max_green)
+        yield from _unknown("stage", dict.fromkeys(named), stages, f"{where}.plans[{index}]")
+        shown = [s for s in timing.stages if s.id in (plan.stages or stages)]
+        yield from _without_green(groups, shown, f"{where}.plans[{index}].stages")
+    if not timing.plans and timing.stages:
+        yield from _without_green(groups, timing.stages, f"{where}.stages")
+
+
+def _without_green(
+    groups: Iterable[str], stages: Iterable[object], where: str
+) -> Iterator[Problem]:
+    green = {name for stage in stages for name in getattr(stage, "groups", ())}
+    for name in sorted(set(groups) - green):
+        message = f"group {name!r} has green in no stage; add it to one"
+        yield error("movement_without_green", where, message)
+
+
+def _unknown(
+    kind: str, names: Iterable[str], known: Iterable[str], where: str
+) -> Iterator[Problem]:
+    for name in names:
+        if name not in known:
+            listed = ", ".join(map(repr, sorted(known)))
+            yield error(
+                f"unknown_{kind}", where, f"there is no {kind} {name!r}; there are {listed}"
+            )
+
+
+def _movement_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator[Problem]:
+    owner: dict[int, str] = {}
+    for index, group in enumerate(timing.groups):
+        for number, name in enumerate(group.movements):
+            place = f"{where}.groups[{index}].movements[{number}]"
+            found = find_movements(name, light.movements)
+            if not found:
+                listed = ", ".join(known_names(light.movements))
+                message = f"no movement of this light is called {name!r}; there are {listed}"
+                yield error("unknown_movement", place, message)
+            for n in found:
+                other = owner.setdefault(n, group.id)
+                if other != group.id:
+                    message = (
+                        f"{light.movements[n].exact_name} is in group {other!r} already; "
+                        "a movement has one light"
+                    )
+                    yield error("movement_twice", place, message)
+    missing = [one for n, one in enumerate(light.movements) if n not in owner]
+    if missing:
+        listed = ", ".join(dict.fromkeys(one.exact_name for one in missing))
+        message = f"no group has {listed}; they would never have green"
+        yield error("movement_without_green", f"{where}.groups", message)
+
+
+def _conflict_problems(
+    program: DesignedProgram, stages: Iterable[PlannedStage], where: str
+) -> Iterator[Problem]:
+    order = {stage.id: index for index, stage in enumerate(program.timing.stages)}
+    for stage in stages:
+        told: set[tuple[str, str]] = set()
+        for meeting in program.light.meetings:
+            pair = program.group_of[meeting.one], program.group_of[meeting.other]
+            if set(pair) <= stage.groups and pair not in told:
+                message = _conflict(program, stage, meeting)
+                if message:
+                    told.add(pair)
+                    place = f"{where}.stages[{order[stage.id]}]"
+                    yield error("conflicting_greens", place, message)
+
+
+def _conflict(program: DesignedProgram, stage: PlannedStage, meeting: Meeting) -> str | None:
+    """Why two movements that meet may not both have green in a stage, if they may not."""
+    one, other = (
+        f"{program.light.movements[n].name} (group {program.group_of[n]!r})"
+        for n in (meeting.one, meeting.other)
+    )
+    own, their = program.group_of[meeting.one], program.group_of[meeting.other]
+    what = f"stage {stage.id!r} gives green to {one} and {other}, which meet"
+    if not meeting.shares or meeting.yields < 0:
+        return f"{what}; they cannot have green together"
+    if own == their or program.group_of[meeting.yields] in stage.permissive:
+        return None
+    return (
+        f"{what}; make group {program.group_of[meeting.yields]!r}, which gives way, permissive, or "
+        "put them in different stages"
+    )
+
+
+def _intergreen_problems(program: DesignedProgram, where: str) -> Iterator[Problem]:
+    follows = {
+        (one, other)
+        for stages in (plan.stages for plan in program.plans())
+        for stage in stages
+        for following in stages
+        for one in stage.groups - following.groups
+        for other in beginning_groups(stage, following)
+    }
+    rows = {row[:2]: n for n, row in enumerate(program.timing.intergreens)}
+    order = [group.id for group in program.timing.groups]
+    for short in program.too_short():
+        pair = short.ending, short.beginning
+        if pair not in follows:
+            continue
+        row = rows.get(pair)
+        place = (
+            f"{where}.groups[{order.index(short.ending)}]"
+            if row is None
+            else f"{where}.intergreens[{row}]"
+        )
+        one, other = (program.light.movements[n].name for n in short.places)
+        message = (
+            f"{short.given:g} s between group {short.ending!r} and group {short.beginning!r} is "
+            f"too short: {one} needs {short.needed:g} s to clear the path of {other}"
+        )
+        yield error("intergreen_too_short", place, message)
+
+
+def _plan_problems(program: DesignedProgram, plan: TimedPlan, where: str) -> Iterator[Problem]:
+    for stage in plan.stages:
+        if not stage.least <= stage.green <= stage.most:
+            message = (
+                f"stage {stage.id!r} has {stage.green:g} s of green, which is not between its "
+                f"min_green of {stage.least:g} s and its max_green of {stage.most:g} s"
+            )
+            yield error("green_out_of_bounds", where, message)
+        crossing = any(program.groups[name].walk for name in stage.groups)
+        if stage.on_call and not crossing:
+            message = f"stage {stage.id!r} cannot be called: it has no crossing"
+            yield error("call_without_crossing", where, message)
+        if "G" not in (state := stage_state(program, stage)) and "g" not in state:
+            yield error("empty_stage", where, f"stage {stage.id!r} gives no green")
+    if plan.stages[0].on_call:
+        message = f"stage {plan.stages[0].id!r} is the first and cannot wait for a call"
+        yield error("first_stage_on_call", where, message)
+    length = cycle_length(program, plan.stages)
+    if plan.cycle is not None and abs(length - plan.cycle) > _SAME:
+        message = (
+            f"greens and intergreens add up to {length:g} s, but the cycle is {plan.cycle:g} s; "
+            "change one of them"
+        )
+        yield error("cycle_differs", f"{where}.cycle", message)
+
+
+def _never_active(
+    plans: tuple[TimedPlan, ...], where: str, *, clock: float, until: float | None
+) -> Iterator[Problem]:
+    if len(plans) < 2 and not plans[0].times:
+        return
+    active = {name for _, name in active_plans(plans, clock=clock, until=until)}
+    for index, plan in enumerate(plans):
+        place = f"{where}.plans[{index}].times"
+        if not plan.times:
+            message = f"plan {plan.id!r} is never active: give a time at which it begins"
+            yield error("plan_never_active", place, message)
+        elif plan.id not in active:
+            message = f"plan {plan.id!r} is not active at any time of the run"
+            yield warning("plan_never_active", place, message)
+
+
+def _detector_problems(
+    timing: JunctionTiming, light: Light, stages: set[str], where: str
+) -> Iterator[Problem]:
+    for index, detector in enumerate(timing.detectors):
+        place = f"{where}.detectors[{index}]"
+        yield from _unknown("stage", detector.stages, stages, f"{place}.stages")
+        if light.movements and not detector_movements(detector.at, light.movements):
+            ends = dict.fromkeys(one.approach for one in light.movements if not one.walk)
+            message = (
+                f"no approach or lane before this light is called {detector.at!r}; approaches are "
+                f"{', '.join(ends)}"
+            )
+            yield error("unknown_detector_place", f"{place}.at", message)

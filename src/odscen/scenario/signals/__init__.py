@@ -1,0 +1,1 @@
+"""Signal programs of a scenario: names of movements, intergreens, and what is shown when."""

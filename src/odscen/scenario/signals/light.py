@@ -1,0 +1,111 @@
+"""A traffic light as a scenario sees it: its movements, and which of them meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+
+class SignalMovement(NamedTuple):
+    """What one letter of a light's states is for.
+
+    Attributes
+    ----------
+    approach, exit
+        Segments before and behind the junction; of a crossing the leg that it leads over, twice.
+    turn
+        ``left``, ``straight``, ``right``, ``turnaround``, or ``walk`` for a crossing.
+    lanes
+        OpenDRIVE lanes before and behind, ``12.0.-1``; empty for a crossing.
+    yellow
+        Seconds, by the speed of the approach; 0 for a crossing.
+    legs
+        All segments that a crossing leads over.
+    """
+
+    approach: str
+    exit: str
+    turn: str
+    lanes: tuple[str, str] = ("", "")
+    yellow: float = 0.0
+    legs: tuple[str, ...] = ()
+
+    @property
+    def walk(self) -> bool:
+        """Whether it is a crossing."""
+        return self.turn == "walk"
+
+    @property
+    def name(self) -> str:
+        """As one would call it in a program."""
+        return f"walk {self.approach}" if self.walk else f"{self.approach}>{self.exit}"
+
+    @property
+    def exact_name(self) -> str:
+        """Name that says the lanes too."""
+        return self.name if self.walk else ">".join(self.lanes)
+
+
+class Meeting(NamedTuple):
+    """Two movements of a light that meet, by their places in its states.
+
+    Attributes
+    ----------
+    yields
+        The one that gives way to the other; -1 if neither does.
+    shares
+        Whether drivers expect both to have green together, so that one may give way.
+    clearing, clearing_back
+        Seconds from the end of yellow (of a crossing: of green) of ``one`` until ``other`` may
+        begin, and of ``other`` until ``one`` may.
+    """
+
+    one: int
+    other: int
+    yields: int
+    shares: bool
+    clearing: float
+    clearing_back: float
+
+
+@dataclass(frozen=True)
+class Light:
+    """A traffic light of the map.
+
+    Attributes
+    ----------
+    names
+        What a scenario may call it: its OpenDRIVE junctions, or the SUMO id of a light in none.
+    green
+        Seconds of green of each stage in the map's program.
+    movements
+        In the order of the letters of its states.
+    meetings
+        Which of them meet.
+    """
+
+    names: tuple[str, ...]
+    green: tuple[float, ...]
+    movements: tuple[SignalMovement, ...] = ()
+    meetings: tuple[Meeting, ...] = ()
+
+    @cached_property
+    def met(self) -> Mapping[tuple[int, int], Meeting]:
+        """Meetings by the two movements, smaller first."""
+        return {(min(m.one, m.other), max(m.one, m.other)): m for m in self.meetings}
+
+    def clearing(self, ending: int, beginning: int) -> float | None:
+        """Seconds until ``beginning`` may have green after ``ending``; ``None`` if they miss."""
+        meeting = self.met.get((min(ending, beginning), max(ending, beginning)))
+        if meeting is None:
+            return None
+        return meeting.clearing if meeting.one == ending else meeting.clearing_back
+
+
+def find_light(lights: Sequence[Light], junction: str) -> Light | None:
+    """Light that a scenario means by ``junction``, if there is one."""
+    return next((light for light in lights if junction in light.names), None)

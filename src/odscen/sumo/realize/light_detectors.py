@@ -1,0 +1,214 @@
+"""Detectors of actuated lights: loops in lanes, and places where people wait to cross.
+
+SUMO's own loops count for a stage only where no turn from the lane gives way. Ours count where the
+scenario says so, or else for all stages in which a movement of the lane has green; one on which a
+vehicle waits for a gap in the green no longer prolongs it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.scenario.signals.detectors import detector_movements
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.document.signals_document import SignalDetector
+    from odscen.scenario.signals.light import Light
+    from odscen.sumo.realize.road_net import RoadNet
+
+GAP = 3.0
+"""Seconds between vehicles in which a stage goes on, where the scenario does not say."""
+
+LOOP = 2.0
+"""Metres."""
+
+AHEAD = 2.0
+"""Seconds at the speed limit from a loop to the stop line, where the scenario does not say."""
+
+PASSING, ROOM = 1.9, 7.5
+"""Seconds and metres of a vehicle in a queue that drives off: a stage of the shortest green has to
+take all that stand between loop and stop line."""
+
+STANDING, MOVED_OFF = 10.0, 5.0
+"""A vehicle on a loop for more seconds waits for a gap, once a queue would have moved off."""
+
+WAVE = 3.0
+"""m/s, at least, at which a queue moves off from the stop line backwards."""
+
+_LEAST = 0.1
+"""Metres of a loop, at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedLoop:
+    """A loop in a lane, or where people wait.
+
+    Attributes
+    ----------
+    id
+        Of SUMO's ``inductionLoop``.
+    name
+        Of the detector in the scenario; empty for one that the scenario does not have.
+    lane, pos, length
+        Where it lies; metres.
+    before
+        Lane at the stop line that it is for; empty where people wait.
+    stages
+        Ids of the stages that it prolongs, or calls.
+    movements
+        Places in the light's states of the movements of its lane.
+    """
+
+    id: str
+    name: str
+    lane: str
+    pos: float
+    length: float
+    before: str
+    stages: tuple[str, ...]
+    movements: tuple[int, ...]
+    gap: float = GAP
+    ahead: float = 0.0
+
+    @property
+    def walk(self) -> bool:
+        """Whether it is for people on foot."""
+        return not self.before
+
+
+def vehicle_loops(
+    light: SumoLight,
+    view: Light,
+    net: RoadNet,
+    *,
+    designed: Sequence[SignalDetector],
+    green: Mapping[str, set[int]],
+    least: Mapping[str, float],
+) -> tuple[PlacedLoop, ...]:
+    """Loops of a light: those of the scenario, or else one in each lane.
+
+    Parameters
+    ----------
+    green
+        Movements that have green in each stage.
+    least
+        Shortest green of each stage, seconds.
+    """
+    loops: list[PlacedLoop] = []
+    for detector in designed:
+        own = detector_movements(detector.at, view.movements)
+        for lane, movements in _by_lane(light, own).items():
+            loops.append(
+                _placed(
+                    net, f"{light.id}.{detector.id}.{len(loops)}", lane, movements,
+                    name=detector.id, ahead=detector.before, length=detector.length,
+                    stages=detector.stages, gap=detector.gap,
+                )
+            )  # fmt: skip
+    if designed:
+        return tuple(loops)
+    every = [n for n, one in enumerate(view.movements) if not one.walk]
+    for lane, movements in _by_lane(light, every).items():
+        stages = tuple(stage for stage, some in green.items() if some & set(movements))
+        if not stages:
+            continue
+        shortest = min(least[stage] for stage in stages)
+        ahead = min(
+            AHEAD * max(light.links[n].speed for n in movements), (shortest / PASSING + 0.5) * ROOM
+        )
+        loops.append(
+            _placed(
+                net, f"{light.id}.loop.{len(loops)}", lane, movements, ahead=ahead, stages=stages
+            )
+        )
+    return tuple(loops)
+
+
+def idle_loop(light: SumoLight, net: RoadNet, movement: int) -> PlacedLoop:
+    """Make a loop that prolongs nothing: without any SUMO could not load the state of a light."""
+    lane = light.links[movement].source
+    return _placed(net, f"{light.id}.idle", lane, (movement,), ahead=LOOP, stages=())
+
+
+def waiting_places(
+    light: SumoLight, net: RoadNet, crossings: Mapping[str, Iterable[int]]
+) -> tuple[PlacedLoop, ...]:
+    """Where people wait who call stages; ``crossings`` are the movements that call each."""
+    found: dict[str, tuple[set[str], set[int]]] = {}
+    for stage, movements in crossings.items():
+        for n in movements:
+            for area in (light.links[n].source, light.links[n].target):
+                stages, own = found.setdefault(area, (set(), set()))
+                stages.add(stage)
+                own.add(n)
+    return tuple(
+        PlacedLoop(
+            f"{light.id}.call.{number}", "", area, 0.0, net.lanes[area].length, "",
+            tuple(sorted(stages)), tuple(sorted(own)),
+        )
+        for number, (area, (stages, own)) in enumerate(sorted(found.items()))
+    )  # fmt: skip
+
+
+def may_end(loops: Iterable[PlacedLoop], stage: str, green: set[int]) -> str:
+    """SUMO's expression for: no detector prolongs the stage any more; empty without any."""
+    parts = []
+    for loop in loops:
+        shown = sorted(green & set(loop.movements))
+        if stage in loop.stages and not loop.walk and shown:
+            late = loop.ahead / WAVE + MOVED_OFF
+            parts.append(
+                f"((z:{loop.id} > {loop.gap:g}) or"
+                f" ((w:{loop.id} > {STANDING:g}) and (g:{shown[0]} > {late:g})))"
+            )
+    return " and ".join(parts)
+
+
+def called(loops: Iterable[PlacedLoop], stage: str) -> str:
+    """SUMO's expression for: somebody waits to cross in the stage."""
+    waiting = [f"(w:{loop.id} > 0)" for loop in loops if loop.walk and stage in loop.stages]
+    return " or ".join(waiting)
+
+
+def _by_lane(light: SumoLight, movements: Iterable[int]) -> dict[str, tuple[int, ...]]:
+    found: dict[str, list[int]] = {}
+    for n in movements:
+        found.setdefault(light.links[n].source, []).append(n)
+    return {lane: tuple(own) for lane, own in found.items()}
+
+
+def _placed(
+    net: RoadNet,
+    name_of_loop: str,
+    stop_lane: str,
+    movements: tuple[int, ...],
+    *,
+    ahead: float,
+    stages: tuple[str, ...],
+    name: str = "",
+    length: float = LOOP,
+    gap: float = GAP,
+) -> PlacedLoop:
+    """Lay a loop whose front end is ``ahead`` metres before the stop line, on the lane there."""
+    lane, front = _upstream(net, stop_lane, ahead)
+    rear = max(front - length, 0.0)
+    return PlacedLoop(
+        name_of_loop, name, lane, rear, max(front - rear, _LEAST), stop_lane, stages, movements,
+        gap, ahead,
+    )  # fmt: skip
+
+
+def _upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
+    """Lane and position so many metres before the end of a lane; the start of the last one else."""
+    while (rest := net.lanes[lane].length - ahead) < _LEAST:
+        before = [link.source for link in net.links_to.get(lane, ())]
+        if not before:
+            return lane, min(_LEAST, net.lanes[lane].length)
+        ahead -= net.lanes[lane].length
+        same = net.lanes[lane].index
+        lane = min(before, key=lambda one: (abs(net.lanes[one].index - same), one))
+    return lane, rest

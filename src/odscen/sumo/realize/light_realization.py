@@ -1,0 +1,386 @@
+"""How each traffic light of a run is to be run: its programs, detectors and plans of the day.
+
+Either the stages of the network are timed anew, and yellow, clearing of crossings and all-red stay
+(:mod:`odscen.convert.signals.signal_programs`); or the scenario has stages of its own
+(:mod:`odscen.scenario.signals`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import TYPE_CHECKING
+
+from odscen.convert.model.net import STAGE
+from odscen.results.records.light_programs import (
+    LightProgram,
+    ProgramPhase,
+    ShownDetector,
+    ShownGroup,
+    ShownPlan,
+)
+from odscen.scenario.document.signals_document import JunctionTiming
+from odscen.scenario.signals.movement_names import shortest_names
+from odscen.scenario.signals.plan_times import active_plans
+from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
+from odscen.sumo.realize.light_detectors import (
+    called,
+    idle_loop,
+    may_end,
+    vehicle_loops,
+    waiting_places,
+)
+from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase, kept_cycle, plan_phases
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.document.signals_document import Control
+    from odscen.scenario.signals.light import Light
+    from odscen.sumo.realize.light_detectors import PlacedLoop
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
+"""``type`` of a ``<tlLogic>``."""
+
+CONTROL_PARAM = "odscen.control"
+"""Parameter that says whether the program is meant to be fixed-time or actuated."""
+
+GROUP_PARAM = "odscen.group."
+"""How parameters begin that name signal groups; their values are places in the states."""
+
+
+@dataclass(frozen=True, slots=True)
+class SumoProgram:
+    """One ``<tlLogic>`` with what it needs."""
+
+    id: str
+    kind: str
+    offset: float
+    plan: PhasePlan
+    conditions: Mapping[str, str]
+    params: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class RealizedLight:
+    """A light as SUMO is to run it; ``programs`` are empty if it keeps the network's.
+
+    ``switches`` are seconds of the run and the program that then takes over.
+    """
+
+    shown: LightProgram
+    programs: tuple[SumoProgram, ...] = ()
+    loops: tuple[PlacedLoop, ...] = ()
+    switches: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def watched(self) -> bool:
+        """Whether SUMO runs detectors of it."""
+        return any(program.kind == "actuated" for program in self.programs)
+
+
+def realized_lights(
+    scenario: Scenario, sumo_map: SumoMap, *, until: float | None = None
+) -> tuple[RealizedLight, ...]:
+    """How each light of the map is run.
+
+    Parameters
+    ----------
+    scenario
+        Its signals without errors, see
+        :func:`odscen.scenario.checks.signal_timing.signal_problems`.
+    until
+        Seconds that the run lasts; the scenario's duration if not given.
+    """
+    signals = scenario.signals
+    timings = {timing.junction: timing for timing in signals.junctions}
+    until = scenario.simulation.duration if until is None else until
+    found = []
+    for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True):
+        own = [timings[name] for name in view.names if name in timings]
+        timing = own[0] if own else JunctionTiming(junction=view.names[0])
+        one = _Realizing(light, view, timing, timing.control or signals.control, sumo_map)
+        found.append(one.designed(scenario.demand.clock, until) if timing.stages else one.kept())
+    return tuple(found)
+
+
+class _Realizing:
+    """One light."""
+
+    def __init__(
+        self,
+        light: SumoLight,
+        view: Light,
+        timing: JunctionTiming,
+        control: Control,
+        sumo_map: SumoMap,
+    ) -> None:
+        self._light = light
+        self._view = view
+        self._timing = timing
+        self._control = control
+        self._net = sumo_map.net
+
+    def kept(self) -> RealizedLight:
+        """The network's stages, perhaps with other greens, offset or control."""
+        light, timing = self._light, self._timing
+        greens = iter(timing.green)
+        phases = []
+        for phase in light.phases:
+            stage = phase.name.removeprefix(STAGE) if phase.is_stage else ""
+            seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
+            least = min(phase.least, seconds)
+            most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
+            phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
+        offset = timing.offset or light.offset
+        changed = [p.seconds for p in phases] != [p.duration for p in light.phases]
+        loops: tuple[PlacedLoop, ...] = ()
+        conditions: dict[str, str] = {}
+        if self._control == "actuated":
+            loops = self._loops({p.stage: p for p in phases if p.prolonged})
+            phases = self._ending(phases, loops, conditions)
+        plan = PhasePlan(tuple(phases), len(phases))
+        shown = self._shown(
+            self._own_groups(), (self._shown_plan(ONLY_PLAN, offset, plan),), loops, own=False
+        )
+        if self._control == "fixed" and not changed and offset == light.offset:
+            return RealizedLight(shown)
+        program = SumoProgram(
+            ONLY_PLAN, TYPES[self._control], offset, plan, conditions, self._params(loops)
+        )
+        return RealizedLight(shown, (program,), loops)
+
+    def _ending(
+        self, phases: Sequence[SumoPhase], loops: Sequence[PlacedLoop], conditions: dict[str, str]
+    ) -> list[SumoPhase]:
+        """Say of the phase behind each prolonged one when it is to come."""
+        result = list(phases)
+        for index, phase in enumerate(phases):
+            if not phase.prolonged:
+                continue
+            expression = may_end(loops, phase.stage, _green(phase.state))
+            if not expression:
+                result[index] = replace(result[index], least=0.0, most=0.0)
+                continue
+            name = f"end{phase.stage}"
+            conditions[name] = expression
+            after = (index + 1) % len(phases)
+            result[after] = replace(result[after], early=name, final="1")
+        return result
+
+    def designed(self, clock: float, until: float) -> RealizedLight:
+        """A program of the scenario."""
+        program = DesignedProgram(self._timing, self._view, self._control)
+        plans = program.plans()
+        active = active_plans(plans, clock=clock, until=until)
+        calling = self._calling(program)
+        loops = waiting_places(self._light, self._net, calling)
+        if loops and self._control == "fixed":
+            first = program.plans()[0].stages[0]
+            shown = [n for g in sorted(first.groups) for n in program.groups[g].movements]
+            cars = [n for n in shown if not self._view.movements[n].walk]
+            loops = (*loops, *(idle_loop(self._light, self._net, n) for n in cars[:1]))
+        if self._control == "actuated":
+            stages = {s.id: s for plan in plans for s in plan.stages}
+            loops = (
+                *self._loops(
+                    {
+                        name: SumoPhase(0.0, "", "", name, stage.least, stage.most)
+                        for name, stage in stages.items()
+                    },
+                    {
+                        stage.id: {n for g in stage.groups for n in program.groups[g].movements}
+                        for stage in stages.values()
+                    },
+                ),
+                *loops,
+            )
+        made: list[SumoProgram] = []
+        shown_plans: list[ShownPlan] = []
+        for plan in plans:
+            if plan.id in {name for _, name in active}:
+                one = self._program(program, plan, loops)
+                made.append(one)
+                begins = tuple(time for time, name in active if name == plan.id)
+                shown_plans.append(self._shown_plan(plan.id, plan.offset, one.plan, begins))
+        groups = tuple(
+            self._shown_group(group.id, group.movements) for group in program.groups.values()
+        )
+        return RealizedLight(
+            self._shown(groups, tuple(shown_plans), loops, own=True), tuple(made), loops, active
+        )
+
+    def _calling(self, program: DesignedProgram) -> dict[str, set[int]]:
+        """Crossings that call each stage on call: those that have no green otherwise, if any."""
+        stages = program.timing.stages
+        walks = {name for name, group in program.groups.items() if group.walk}
+        served = {name for stage in stages if not stage.on_call for name in stage.groups}
+        found = {}
+        for stage in stages:
+            if stage.on_call:
+                own = walks & set(stage.groups)
+                found[stage.id] = {
+                    n for name in own - served or own for n in program.groups[name].movements
+                }
+        return found
+
+    def _program(
+        self, program: DesignedProgram, plan: TimedPlan, loops: Sequence[PlacedLoop]
+    ) -> SumoProgram:
+        conditions, ends, calls = {}, {}, {}
+        for stage in plan.stages:
+            green = {n for g in stage.groups for n in program.groups[g].movements}
+            expression = may_end(loops, stage.id, green)
+            if self._control == "actuated" and expression and stage.most > stage.least:
+                ends[stage.id] = f"end{stage.id}"
+                conditions[ends[stage.id]] = expression
+            if stage.on_call:
+                calls[stage.id] = f"call{stage.id}"
+                conditions[calls[stage.id]] = called(loops, stage.id)
+        switched = bool(program.timing.plans) and (bool(loops) or self._control == "actuated")
+        phases = plan_phases(program, plan, ends=ends, calls=calls, switched=switched)
+        free = self._control == "fixed" and not phases.chooses
+        params = self._params(() if free else loops)
+        params |= {
+            f"{GROUP_PARAM}{group.id}": " ".join(map(str, group.movements))
+            for group in program.groups.values()
+        }
+        params[CONTROL_PARAM] = self._control
+        if program.timing.plans:
+            before = sum(phase.seconds for phase in phases.phases[: phases.first])
+            params["GSP"] = f"{before + 1:g}"
+        offset = plan.offset
+        cycle = kept_cycle(program, plan)
+        if cycle is not None:
+            params |= {"coordinated": "true", "cycleTime": f"{cycle:g}"}
+            # The cycle is counted from the end of the first stage; SUMO errs before a positive one.
+            offset = -(-(offset + plan.stages[0].green) % cycle)
+        else:
+            offset = _started(phases, offset)
+        return SumoProgram(
+            plan.id, "static" if free else "actuated", offset, phases, conditions, params
+        )
+
+    def _loops(
+        self, stages: Mapping[str, SumoPhase], green: Mapping[str, set[int]] | None = None
+    ) -> tuple[PlacedLoop, ...]:
+        return vehicle_loops(
+            self._light,
+            self._view,
+            self._net,
+            designed=self._timing.detectors,
+            green=green or {name: _green(phase.state) for name, phase in stages.items()},
+            least={name: phase.least for name, phase in stages.items()},
+        )
+
+    def _params(self, loops: Sequence[PlacedLoop]) -> dict[str, str]:
+        """SUMO's parameters: one loop a lane as its own, the others only to be shown."""
+        params = {
+            f"linkSignalID:{n}": " ".join(names)
+            for n, names in enumerate(self._light.signals)
+            if names
+        }
+        if not loops:
+            return params
+        lanes = dict.fromkeys(
+            link.source
+            for link, one in zip(self._light.links, self._view.movements, strict=True)
+            if not one.walk
+        )
+        params |= dict.fromkeys(lanes, "NO_DETECTOR")
+        extra = []
+        for loop in loops:
+            if params.get(loop.before) == "NO_DETECTOR":
+                params[loop.before] = loop.id
+            else:
+                extra.append(loop.id)
+        # Whether a lane counts for a stage is said by conditions, so SUMO need not judge.
+        params |= {"jam-threshold": "3600", "passing-time": "0.1"}
+        if extra:
+            params["extra-detectors"] = " ".join(extra)
+        return params
+
+    # What is shown
+
+    def _shown(
+        self,
+        groups: tuple[ShownGroup, ...],
+        plans: tuple[ShownPlan, ...],
+        loops: Sequence[PlacedLoop],
+        *,
+        own: bool,
+    ) -> LightProgram:
+        detectors = tuple(
+            ShownDetector(loop.id, loop.name, loop.stages, loop.walk)
+            for loop in loops
+            if loop.stages
+        )
+        light = self._light
+        return LightProgram(
+            light.id, self._view.names, self._control, own, groups, plans, detectors
+        )
+
+    def _shown_plan(
+        self, name: str, offset: float, plan: PhasePlan, begins: tuple[float, ...] = ()
+    ) -> ShownPlan:
+        phases = []
+        for p in plan.cycle:
+            free = self._control == "actuated" and p.prolonged and p.earliest_end is None
+            least, most = (p.least, p.most) if free else (0.0, 0.0)
+            phases.append(ProgramPhase(p.seconds, p.state, p.name, p.stage, least, most, p.on_call))
+        return ShownPlan(name, offset, tuple(phases), begins)
+
+    def _shown_group(self, name: str, links: tuple[int, ...]) -> ShownGroup:
+        movements = self._view.movements
+        walk = bool(movements) and all(movements[n].walk for n in links)
+        lanes = tuple(self._inside(n) for n in links)
+        names = shortest_names(links, movements) if movements else ()
+        paths = tuple(self._light.links[n].path for n in links)
+        return ShownGroup(name, links, names, walk, () if walk else lanes, paths)
+
+    def _inside(self, n: int) -> tuple[str, ...]:
+        """Lane before the light, and the lanes of a link inside the junction."""
+        link = self._light.links[n]
+        onto = next(
+            (
+                one.via
+                for one in self._net.links_from.get(link.source, ())
+                if one.target == link.target
+            ),
+            None,
+        )
+        if onto is None:
+            return link.source, link.target
+        return link.source, onto, *(lane.id for lane in self._net.leaving(onto)[:-1])
+
+    def _own_groups(self) -> tuple[ShownGroup, ...]:
+        """Groups of the network's program: links that always show the same, but for who yields."""
+        if not self._light.links:
+            return ()
+        columns: dict[tuple[str, ...], list[int]] = {}
+        for n in range(len(self._light.links)):
+            shown = tuple(phase.state[n].lower() for phase in self._light.phases)
+            approach = self._view.movements[n].approach
+            columns.setdefault((approach, str(self._view.movements[n].walk), *shown), []).append(n)
+        names = {True: count(1), False: count(1)}
+        groups = []
+        for links in columns.values():
+            walk = self._view.movements[links[0]].walk
+            name = f"{'F' if walk else 'K'}{next(names[walk])}"
+            groups.append(self._shown_group(name, tuple(links)))
+        return tuple(groups)
+
+
+def _green(state: str) -> set[int]:
+    return {n for n, letter in enumerate(state) if letter in "Gg"}
+
+
+def _started(plan: PhasePlan, offset: float) -> float:
+    """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
+    cycle = sum(phase.seconds for phase in plan.cycle)
+    total = sum(phase.seconds for phase in plan.phases)
+    return offset if total == cycle else (total - (-offset % cycle)) % total

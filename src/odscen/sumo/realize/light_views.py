@@ -1,0 +1,75 @@
+"""Traffic lights of the network as scenarios see them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.convert.model.net import CROSSED
+from odscen.convert.signals.signal_programs import SignalGroup
+from odscen.scenario.signals.light import Light, Meeting, SignalMovement
+from odscen.sumo.realize.sumo_lane_places import lane_segments
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.convert.model.net import LightLink
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+_TURNS = {"l": "left", "s": "straight", "r": "right", "t": "turnaround", CROSSED: "walk"}
+
+
+def scenario_lights(sumo_map: SumoMap) -> tuple[Light, ...]:
+    """Traffic lights as scenarios see them, in the order of the network."""
+    if not sumo_map.lights:
+        return ()
+    segments = lane_segments(sumo_map)
+    return tuple(_light(light, sumo_map, segments) for light in sumo_map.lights)
+
+
+def _light(light: SumoLight, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]) -> Light:
+    return Light(
+        tuple(light.junctions) or (light.id,),
+        tuple(phase.duration for phase in light.phases if phase.is_stage),
+        tuple(_movement(link, sumo_map, segments) for link in light.links),
+        tuple(Meeting(*conflict) for conflict in light.conflicts),
+    )
+
+
+def _movement(
+    link: LightLink, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]
+) -> SignalMovement:
+    turn = _TURNS[link.turn]
+    if link.turn == CROSSED:
+        lanes = sumo_map.net.edge_lanes
+        crossed = [lane.id for edge in link.crossed for lane in lanes.get(edge, ())]
+        legs = tuple(dict.fromkeys(name for lane in crossed for name in segments.get(lane, ())))
+        legs = legs or (link.source,)
+        return SignalMovement(legs[0], legs[0], turn, legs=legs)
+    source, target = (
+        _segment(lane, sumo_map, segments, back=back)
+        for lane, back in ((link.source, True), (link.target, False))
+    )
+    names = sumo_map.lane_names
+    lanes_named = names.get(link.source, link.source), names.get(link.target, link.target)
+    yellow = SignalGroup((), "", walkers=False, speed=link.speed).yellow
+    return SignalMovement(source, target, turn, lanes_named, yellow)
+
+
+def _segment(
+    lane: str, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]], *, back: bool
+) -> str:
+    """Segment at the stop line (or behind the junction) of a lane, or of the next one with any."""
+    links = sumo_map.net.links
+    seen = {lane}
+    todo = [lane]
+    while todo:
+        one = todo.pop(0)
+        if segments.get(one):
+            return segments[one][-1 if back else 0]
+        for link in links:
+            near, far = (link.target, link.source) if back else (link.source, link.target)
+            if near == one and far not in seen:
+                seen.add(far)
+                todo.append(far)
+    return lane

@@ -1,0 +1,267 @@
+"""Phases of SUMO for a plan of stages, with what decides on the way from one to the next.
+
+A stage on call comes only if somebody waits: SUMO chooses among the ways that ``next`` lists, by
+``earlyTarget`` while the green may end and by ``finalTarget`` when it must. With a fixed cycle the
+stage before is held for as long as one that was not called would have taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from odscen.convert.model.net import STAGE
+from odscen.scenario.signals.stage_sequence import (
+    change_length,
+    change_steps,
+    cycle_length,
+    stage_state,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
+
+HOLD = "hold "
+"""How the names of phases begin that hold a stage for one that was not called."""
+
+
+@dataclass(frozen=True, slots=True)
+class SumoPhase:
+    """One ``<phase>``; ``following`` are indices, ``early`` and ``final`` expressions.
+
+    ``earliest_end`` and ``latest_end`` are seconds of the cycle; ``stage`` is the id of a stage.
+    """
+
+    seconds: float
+    state: str
+    name: str
+    stage: str = ""
+    least: float = 0.0
+    most: float = 0.0
+    following: tuple[int, ...] = ()
+    early: str = ""
+    final: str = ""
+    earliest_end: float | None = None
+    latest_end: float | None = None
+    on_call: bool = False
+
+    @property
+    def prolonged(self) -> bool:
+        """Whether vehicles prolong it."""
+        return self.most > self.least
+
+
+@dataclass(frozen=True, slots=True)
+class PhasePlan:
+    """Phases; the first ``main`` are one cycle in which every stage comes.
+
+    ``first`` is where the first stage is.
+    """
+
+    phases: tuple[SumoPhase, ...]
+    main: int
+    first: int = 0
+
+    @property
+    def cycle(self) -> tuple[SumoPhase, ...]:
+        """The phases of one cycle from the first stage on."""
+        return (*self.phases[self.first : self.main], *self.phases[: self.first])
+
+    @property
+    def chooses(self) -> bool:
+        """Whether SUMO has to choose among ways."""
+        return any(len(phase.following) > 1 for phase in self.phases)
+
+
+def kept_cycle(program: DesignedProgram, plan: TimedPlan) -> float | None:
+    """Seconds of the cycle that SUMO has to keep to by itself; ``None`` if there is none to keep.
+
+    Fixed times keep their cycle anyhow, unless stages are left out.
+    """
+    if program.control == "actuated":
+        return plan.cycle
+    if any(stage.on_call for stage in plan.stages):
+        return cycle_length(program, plan.stages)
+    return None
+
+
+def plan_phases(
+    program: DesignedProgram,
+    plan: TimedPlan,
+    *,
+    ends: Mapping[str, str],
+    calls: Mapping[str, str],
+    switched: bool = False,
+) -> PhasePlan:
+    """Phases of a plan.
+
+    Parameters
+    ----------
+    ends
+        Names of conditions under which a stage may end; stages without one last their green.
+    calls
+        Names of conditions under which somebody calls a stage.
+    switched
+        Whether other plans are switched to this one. SUMO then begins with the first stage, but
+        asks whether to end it when another phase would have ended: so its least green is a phase
+        of its own, which only time ends.
+    """
+    return _Phases(program, plan, dict(ends), dict(calls), switched=switched).build()
+
+
+class _Phases:
+    def __init__(
+        self,
+        program: DesignedProgram,
+        plan: TimedPlan,
+        ends: dict[str, str],
+        calls: dict[str, str],
+        *,
+        switched: bool,
+    ) -> None:
+        self._program = program
+        self._plan = plan
+        self._stages = plan.stages
+        self._ends = ends
+        self._calls = calls
+        self._cycle = kept_cycle(program, plan)
+        if self._cycle is not None:
+            self._ends[plan.stages[0].id] = "1"
+        self._switched = switched
+        self._phases: list[SumoPhase] = []
+        self._first: list[int] = []
+        self._last: list[int] = []
+
+    def build(self) -> PhasePlan:
+        for number, stage in enumerate(self._stages):
+            self._first.append(len(self._phases))
+            self._phases += self._greens(number, stage)
+            self._last.append(len(self._phases) - 1)
+            self._change(number, self._after(number))
+        main = len(self._phases)
+        for number in range(len(self._stages)):
+            self._decide(number)
+        if len(self._phases) > main and not self._phases[main - 1].following:
+            self._phases[main - 1] = replace(self._phases[main - 1], following=(0,))
+        if self._cycle is not None:
+            self._coordinate(self._cycle)
+            return _from_its_end(self._phases, main, self._last[0])
+        return PhasePlan(tuple(self._phases), main)
+
+    def _after(self, number: int) -> int:
+        return (number + 1) % len(self._stages)
+
+    def _greens(self, number: int, stage: PlannedStage) -> list[SumoPhase]:
+        """Phase of a stage; of the first one perhaps two, of which the other may be ended."""
+        green = self._green(stage)
+        if not (self._switched and number == 0 and stage.id in self._ends and green.least > 1.0):
+            return [green]
+        fixed = green.least - 1.0
+        return [
+            replace(green, seconds=fixed, least=0.0, most=0.0, following=(1,)),
+            replace(
+                green,
+                seconds=green.seconds - fixed,
+                least=1.0,
+                most=green.most - fixed,
+                final="1",
+            ),
+        ]
+
+    def _green(self, stage: PlannedStage) -> SumoPhase:
+        bounds = (stage.least, stage.most) if stage.id in self._ends else (0.0, 0.0)
+        state = stage_state(self._program, stage)
+        name = f"{STAGE}{stage.id}"
+        return SumoPhase(stage.green, state, name, stage.id, *bounds, on_call=stage.on_call)
+
+    def _change(self, number: int, following: int) -> None:
+        """Append the steps from one stage to another."""
+        steps = change_steps(self._program, self._stages[number], self._stages[following])
+        self._phases += [SumoPhase(*step) for step in steps]
+
+    def _decide(self, number: int) -> None:
+        """Say where a stage leads, and lay the ways past stages that were not called."""
+        stage, at = self._stages[number], self._last[number]
+        end = self._ends.get(stage.id, "")
+        way = self._after(number)
+        ways: list[int] = [self._entry(number, way)]
+        passed = [way]
+        while self._stages[way].on_call and len(passed) < len(self._stages):
+            self._condition(ways[-1], end, self._calls[self._stages[way].id])
+            way = self._after(way)
+            ways.append(self._past(number, way, passed))
+            passed.append(way)
+        self._condition(ways[-1], end, "")
+        if self._switched and number == 0:
+            self._phases[ways[-1]] = replace(self._phases[ways[-1]], final="1")
+        if len(ways) > 1:
+            self._phases[at] = replace(self._phases[at], following=tuple(ways))
+
+    def _entry(self, number: int, following: int) -> int:
+        """First phase on the direct way from a stage to the next."""
+        after = self._last[number] + 1
+        return (
+            after
+            if self._phases[after : after + 1] and not self._phases[after].stage
+            else (self._first[following])
+        )
+
+    def _past(self, number: int, following: int, passed: list[int]) -> int:
+        """Append the way past stages, and return its first phase."""
+        stage, target = self._stages[number], self._stages[following]
+        first = len(self._phases)
+        if self._cycle is not None:
+            order = [number, *passed, following]
+            pairs = pairwise(order)
+            between = sum(
+                change_length(self._program, self._stages[a], self._stages[b]) for a, b in pairs
+            )
+            greens = sum(self._stages[n].green for n in passed)
+            rest = between + greens - change_length(self._program, stage, target)
+            green = self._phases[self._last[number]]
+            self._phases.append(SumoPhase(rest, green.state, f"{HOLD}{stage.id}", stage.id))
+        self._change(number, following)
+        last = len(self._phases) - 1
+        if last < first:
+            return self._first[following]
+        for index in range(first, last):
+            self._phases[index] = replace(self._phases[index], following=(index + 1,))
+        self._phases[last] = replace(self._phases[last], following=(self._first[following],))
+        return first
+
+    def _condition(self, phase: int, end: str, call: str) -> None:
+        """Say when a phase is the one to go to: if the green may end, and somebody has called."""
+        early = " and ".join(one for one in (end, call) if one)
+        self._phases[phase] = replace(
+            self._phases[phase], early=early if end else "", final=call or ("1" if end else "")
+        )
+
+    def _coordinate(self, cycle: float) -> None:
+        """End stages at their places in the cycle at the latest, and the first exactly there.
+
+        What the others leave over, the first stage has. SUMO counts the cycle from its end: only
+        so it can be held past the end of a cycle.
+        """
+        at = self._last[0]
+        first = self._phases[at]
+        self._phases[at] = replace(first, most=2.0 * cycle, earliest_end=cycle)
+        now = 0.0
+        for index, phase in enumerate(self._phases[at + 1 :], start=at + 1):
+            now += phase.seconds
+            if phase.prolonged:
+                self._phases[index] = replace(phase, latest_end=now)
+
+
+def _from_its_end(phases: list[SumoPhase], main: int, last: int) -> PhasePlan:
+    """Phases in the order in which SUMO counts the cycle: the first stage comes last."""
+    order = [*range(last + 1, main), *range(last + 1), *range(main, len(phases))]
+    place = {old: new for new, old in enumerate(order)}
+    phases[last] = replace(phases[last], following=phases[last].following or (last + 1,))
+    turned = [
+        replace(phases[old], following=tuple(place[n] for n in phases[old].following))
+        for old in order
+    ]
+    return PhasePlan(tuple(turned), main, place[0])

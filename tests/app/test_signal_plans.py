@@ -1,0 +1,204 @@
+"""Signal programs from and to SUMO's files."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from typing import TYPE_CHECKING
+
+import pytest
+
+from odscen.app.export import export
+from odscen.app.runs import run
+from odscen.app.scenarios import read_scenario, write_scenario
+from odscen.app.signal_plans import export_signals, import_signals, lights_of
+from odscen.base.errors import InputError, NotFoundError, ScenarioError
+from odscen.scenario.document.scenario_document import MapReference
+from odscen.workspace.store import Workspace
+from tests.signal_case import MAP, one_plan, program, scenario
+from tests.sumo.conftest import BIN
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from odscen.scenario.document.scenario_document import Scenario
+
+EVENING = 18.5 * 3600.0 - 200.0
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    store = Workspace.open(tmp_path_factory.mktemp("workspace"))
+    store.add_map(MAP)
+    return store
+
+
+def placed(workspace: Workspace, one: Scenario) -> Scenario:
+    """The scenario on the map of the workspace."""
+    sha256 = workspace.map("signal_crossing").info["sha256"]
+    return one.model_copy(update={"map": MapReference(name="signal_crossing", sha256=sha256)})
+
+
+def plain(one: Scenario) -> Scenario:
+    return one.model_copy(update={"signals": type(one.signals)()})
+
+
+def taken(workspace: Workspace, one: Scenario, folder: Path) -> Scenario:
+    """The same traffic with signals that were exported, and imported again."""
+    file = folder / "signals.add.xml"
+    file.write_text(export_signals(workspace, one))
+    back, notes = import_signals(workspace, plain(one), file)
+    assert notes == ()
+    return back
+
+
+@pytest.mark.parametrize("control", ["fixed", "actuated"])
+def test_a_program_as_json_and_as_tllogic_gives_the_same_run(
+    workspace: Workspace, tmp_path: Path, control: str
+) -> None:
+    own = placed(workspace, scenario(program(), control=control, clock=EVENING))
+    back = taken(workspace, own, tmp_path)
+    runs = [
+        run(workspace, one, name=name, out=tmp_path / "runs")
+        for name, one in (("own", own), ("back", back))
+    ]
+    assert [one.status for one in runs] == ["completed", "completed"]
+    for file in ("trajectories.parquet", "events.json"):
+        one, other = ((done.folder / file).read_bytes() for done in runs)
+        assert one == other
+    log = (runs[0].folder / "sumo.log").read_text()
+    assert "tlLogic" not in log
+    assert "detector" not in log
+    plain_sumo(workspace, own, tmp_path)
+    one, other = (
+        folder / "trajectories.parquet" for folder in (tmp_path / "exported", runs[0].folder)
+    )
+    assert one.read_bytes() == other.read_bytes()
+
+
+def plain_sumo(workspace: Workspace, one: Scenario, folder: Path) -> None:
+    """Export a scenario and run it by ``sumo -c`` alone."""
+    file = write_scenario(one, folder / "one.scenario.json")
+    export(workspace, file, folder / "exported", to="sumo")
+    subprocess.run(
+        [BIN / "sumo", "-c", "scenario.sumocfg"],
+        cwd=folder / "exported", check=True, capture_output=True,
+    )  # fmt: skip
+
+
+def test_groups_stages_calls_detectors_and_plans_come_back_as_they_were(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    one = placed(workspace, scenario(program(), control="actuated", clock=EVENING))
+    (timing,) = taken(workspace, one, tmp_path).signals.junctions
+    (own,) = one.signals.junctions
+    assert timing.control == "actuated"
+    assert [g.id for g in timing.groups] == [g.id for g in own.groups]
+    assert [(s.id, set(s.groups), s.on_call) for s in timing.stages] == [
+        (s.id, set(s.groups), s.on_call) for s in own.stages
+    ]
+    assert timing.intergreens == own.intergreens
+    assert timing.detectors == own.detectors
+    assert [(plan.id, plan.times) for plan in timing.plans] == [
+        ("day", ("18:26:40",)), ("evening", ("18:30:00",)),
+    ]  # fmt: skip
+    assert timing.plans[0].offset == 12.0
+
+
+def test_the_program_of_the_network_becomes_one_of_stages(workspace: Workspace) -> None:
+    one = placed(workspace, scenario(None))
+    net = workspace.map("signal_crossing").path("net")
+    back, notes = import_signals(workspace, one, net, junctions=["10001"])
+    assert notes == ()
+    (timing,) = back.signals.junctions
+    assert [group.movements for group in timing.groups] == [
+        ("r1",), ("r2",), ("r3",), ("r4",), ("walk r1",), ("walk r2",), ("walk r3",), ("walk r4",),
+    ]  # fmt: skip
+    assert [(s.id, s.green) for s in timing.stages] == [("1", 15.0), ("2", 15.0)]
+    assert timing.intergreens == ()
+    before, after = (lights_of(workspace, case)[0].plans[0].phases for case in (one, back))
+    assert [phase[:2] for phase in before] == [phase[:2] for phase in after]
+
+
+NETS = (
+    "gGgGgrrrrrGgGggrrrrrrGrG", "yyyyyrrrrryyyyyrrrrrrrrr", "rrrrrrrrrrrrrrrrrrrrrrrr",
+    "rrrrrgGgGgrrrrrgGgGgrrrr", "rrrrryyyyyrrrrryyyyyrrrr",
+)  # fmt: skip
+
+
+def written(folder: Path, phases: list[tuple[float, str]], **attributes: str) -> Path:
+    lines = [f'<phase duration="{seconds}" state="{state}"/>' for seconds, state in phases]
+    given = {"id": "J10001", "programID": "1", "type": "static", "offset": "0", **attributes}
+    head = " ".join(f'{key}="{value}"' for key, value in given.items())
+    file = folder / "own.tll.xml"
+    file.write_text(f"<tlLogics><tlLogic {head}>{''.join(lines)}</tlLogic></tlLogics>")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("phases", "message"),
+    [
+        ([(30.0, "GGr"), (30.0, "rrG")], "3 letters, but the light of this map has 24 links"),
+        ([(30.0, "G" * 23 + "x")], "letter 'x'"),
+        ([(30.0, "r" * 24)], "nothing ever begins"),
+    ],
+)
+def test_what_is_no_program_of_this_light_is_refused_with_its_place(
+    workspace: Workspace, tmp_path: Path, phases: list[tuple[float, str]], message: str
+) -> None:
+    file = written(tmp_path, phases)
+    with pytest.raises(InputError, match=message) as raised:
+        import_signals(workspace, placed(workspace, scenario(None)), file)
+    assert "J10001" in str(raised.value)
+    assert "own.tll.xml" in str(raised.value)
+
+
+def test_a_tllogic_with_conflicting_greens_is_refused_with_both_movements(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    walks = [(30.0, "G" * 10 + "r" * 14), (3.0, "y" * 10 + "r" * 14), (8.0, "r" * 24)]
+    rest = [(30.0, "r" * 10 + "G" * 14), (12.0, "r" * 10 + "y" * 10 + "rrrr")]
+    with pytest.raises(ScenarioError, match="which meet") as raised:
+        import_signals(
+            workspace, placed(workspace, scenario(None)), written(tmp_path, [*walks, *rest])
+        )
+    assert "cannot have green together" in str(raised.value)
+
+
+def test_a_tllogic_with_short_intergreens_is_refused_with_both_times(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    first, yellow, red, second, end = NETS
+    first = first[:20] + "rrrr"
+    phases = [(20.0, first), (3.0, yellow), (1.0, red), (20.0, second), (3.0, end), (9.0, red)]
+    walking = [(6.0, "r" * 20 + "GGGG"), (12.0, red)]
+    with pytest.raises(ScenarioError, match="is too short") as raised:
+        import_signals(
+            workspace, placed(workspace, scenario(None)), written(tmp_path, [*phases, *walking])
+        )
+    assert "4 s between group" in str(raised.value)
+    assert "needs 9 s" in str(raised.value)
+
+
+def test_a_junction_without_a_light_is_answered_with_those_that_have_one(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    file = written(tmp_path, [(30.0, "G" * 24)])
+    with pytest.raises(NotFoundError, match="10001"):
+        import_signals(workspace, placed(workspace, scenario(None)), file, junctions=["9"])
+
+
+def test_there_is_nothing_to_export_where_all_lights_are_as_in_the_map(
+    workspace: Workspace,
+) -> None:
+    with pytest.raises(InputError, match="changes no traffic light"):
+        export_signals(workspace, placed(workspace, scenario(None)))
+
+
+def test_a_scenario_with_a_program_is_read_as_it_was_written(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    one = placed(workspace, scenario(one_plan()))
+    file = write_scenario(one, tmp_path / "one.scenario.json")
+    assert read_scenario(file) == one
+    assert json.loads(file.read_text())["signals"]["junctions"][0]["junction"] == "10001"
