@@ -93,8 +93,8 @@ def test_a_movement_has_one_group_and_every_movement_has_one() -> None:
 def test_greens_and_intergreens_have_to_be_the_cycle() -> None:
     problem = only(problems(one_plan(cycle=90)))
     assert (problem.code, problem.where) == ("cycle_differs", "signals.junctions[0].cycle")
-    assert "add up to 85 s, but the cycle is 90 s" in problem.message
-    assert problems(one_plan(cycle=85)) == []
+    assert "add up to 84 s, but the cycle is 90 s" in problem.message
+    assert problems(one_plan(cycle=84)) == []
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_each_stage_is_shown_for_its_green_and_the_cycle_repeats(tmp_path: Path)
             assert one.seconds == greens[one.name]
     firsts = [one.begin for one in seen if one.name == "stage 1"]
     assert firsts[0] == 12.0
-    assert {round(b - a, 3) for a, b in pairwise(firsts)} == {85.0}
+    assert {round(b - a, 3) for a, b in pairwise(firsts)} == {84.0}
 
 
 def test_no_intergreen_is_ever_shorter_than_the_paths_need(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_a_stage_on_call_comes_only_if_somebody_waits(tmp_path: Path) -> None:
     # With fixed-time control stage 3 is held, so that the first stage begins when it would have.
     for seen in (called, quiet):
         firsts = [one.begin for one in seen if one.name == "stage 1"]
-        assert {round(b - a, 3) for a, b in pairwise(firsts)} == {85.0}
+        assert {round(b - a, 3) for a, b in pairwise(firsts)} == {84.0}
     assert {one.seconds for one in quiet if one.name == "stage 3"} == {12.0}
     assert any(one.name == "hold 3" for one in quiet)
 
@@ -138,11 +138,11 @@ def test_a_detector_prolongs_its_stage_up_to_the_bound_and_no_other(tmp_path: Pa
 
 def test_an_actuated_program_with_a_cycle_keeps_to_it(tmp_path: Path) -> None:
     bounds = [{**s, "min_green": 5, "max_green": 30} for s in program()["stages"][:3]]
-    junction = one_plan(stages=[*bounds, program()["stages"][3]], cycle=85, detectors=None)
+    junction = one_plan(stages=[*bounds, program()["stages"][3]], cycle=84, detectors=None)
     seen = shown(tmp_path, scenario(junction, control="actuated", walkers=0.0))
     ends = [one.begin + one.seconds for one in seen[:-1] if one.name == "stage 1"]
     assert len(ends) > 5
-    assert {round(b - a, 3) for a, b in pairwise(ends)} == {85.0}
+    assert {round(b - a, 3) for a, b in pairwise(ends)} == {84.0}
     assert ends[0] == 20.0
     assert len({one.seconds for one in seen if one.name == "stage 3"}) > 1
 
@@ -152,9 +152,9 @@ def test_plans_of_the_day_take_over_in_the_first_stage_and_fall_in_step(tmp_path
     assert [name for name, _ in groupby(one.program for one in seen)] == ["day", "evening"]
     last = next(one for one in reversed(seen) if one.program == "day")
     assert last.name == "stage 1"
-    assert 200.0 <= last.begin + last.seconds < 200.0 + 85.0 + 1.0
+    assert 200.0 <= last.begin + last.seconds < 200.0 + 84.0 + 1.0
     firsts = [one.begin for one in seen if (one.program, one.name) == ("evening", "stage 1")]
-    assert {round(b - a, 3) for a, b in pairwise(firsts[1:])} == {77.0}
+    assert {round(b - a, 3) for a, b in pairwise(firsts[1:])} == {76.0}
 
 
 def test_programs_of_actuated_lights_without_detectors_of_their_own_get_loops(
@@ -177,4 +177,4 @@ def test_what_lights_show_can_be_kept_as_json() -> None:
     (kept,) = shown
     assert [group.id for group in kept.groups][:2] == ["K1", "K1L"]
     assert kept.groups[0].movements == ("r1 right", "r1 straight")
-    assert [plan.cycle for plan in kept.plans] == [77.0]
+    assert [plan.cycle for plan in kept.plans] == [76.0]

@@ -60,7 +60,7 @@ def phases(logic: etree._Element) -> list[tuple[str | None, ...]]:
 def test_lights_are_known_by_their_junctions_and_their_movements_by_segments() -> None:
     (light,) = scenario_lights(crossing().sumo)
     assert light.names == (JUNCTION,)
-    assert light.green == (15.0, 15.0)
+    assert light.green == (13.0, 13.0)
     assert {one.name for one in light.movements if one.approach == "r1"} == {
         "r1>r2", "r1>r3", "r1>r4", "walk r1",
     }  # fmt: skip
@@ -73,7 +73,7 @@ def test_lights_are_known_by_their_junctions_and_their_movements_by_segments() -
     [
         {},
         {"junctions": [{"junction": JUNCTION}]},
-        {"junctions": [{"junction": JUNCTION, "control": "fixed", "green": [15, 15]}]},
+        {"junctions": [{"junction": JUNCTION, "control": "fixed", "green": [13, 13]}]},
         {"control": "actuated", "junctions": [{"junction": JUNCTION, "control": "fixed"}]},
     ],
 )
@@ -242,8 +242,8 @@ def test_the_light_shows_each_stage_as_long_as_the_scenario_says(tmp_path: Path)
 
 def test_an_offset_lets_the_first_stage_begin_later(tmp_path: Path) -> None:
     (light,) = crossing().table.lights
-    before, first = lengths(states(tmp_path, timed(offset=3), until=30.0))[:2]
-    assert before == (light.phases[-1].state, 3)
+    before, first = lengths(states(tmp_path, timed(offset=1), until=30.0))[:2]
+    assert before == (light.phases[-1].state, 1)
     assert first == (light.phases[0].state, light.phases[0].duration)
 
 
