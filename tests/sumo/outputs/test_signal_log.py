@@ -65,6 +65,16 @@ def test_every_change_of_a_light_is_in_the_log_and_every_call_of_a_detector(
     assert 0.0 < run.summary["figures"]["unused_green"] < 1.0
 
 
+def test_lights_are_fixed_time_in_the_mesoscopic_model(tmp_path: Path) -> None:
+    one = scenario(program(), control="actuated", clock=EVENING)
+    run = carried_out(one, tmp_path / "meso", meso=True)
+    states = read_light_states(run.folder)
+    assert states is not None
+    assert {s for name, s in stages(states) if name == "stage 4"} == {7.0}
+    assert read_calls(run.folder) is None
+    assert run.summary["figures"]["cycle_failures"] is None
+
+
 def test_greens_in_the_figures_are_those_of_the_log(tmp_path: Path) -> None:
     run = carried_out(scenario(None), tmp_path / "one")
     table = pl.read_csv(run.folder / "figures" / "signals.csv")

@@ -39,8 +39,8 @@ STANDING, MOVED_OFF = 10.0, 5.0
 WAVE = 3.0
 """m/s, at least, at which a queue moves off from the stop line backwards."""
 
-_LEAST = 0.1
-"""Metres of a loop, at least."""
+_LEAST = 0.05
+"""Metres of a loop, and of what is left of its lane before it, at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ def _placed(
 
 def _upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
     """Lane and position so many metres before the end of a lane; the start of the last one else."""
-    while (rest := net.lanes[lane].length - ahead) < _LEAST:
+    while (rest := net.lanes[lane].length - max(ahead, 0.0)) < _LEAST:
         before = [link.source for link in net.links_to.get(lane, ())]
         if not before:
             return lane, min(_LEAST, net.lanes[lane].length)

@@ -22,6 +22,7 @@ from odscen.results.records.run_records import Plan, PlannedActor
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
+from odscen.scenario.signals.detectors import without_detectors
 from odscen.sumo.folder.layout import (
     CONFIG_FILE,
     MEASURES_FILE,
@@ -141,6 +142,8 @@ def realize(
         slice_length=slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
     )
+    if settings.meso:
+        scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
     lights = realized_lights(scenario, sumo_map, until=until)
     signals = signals_xml(lights)
     files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals, lights)}
