@@ -229,7 +229,7 @@ class _TableBuilder:
     ) -> list[MappingInterval]:
         before = lasts.get(self._row[chain.before])
         after = firsts.get(self._row[chain.after])
-        if before is None or after is None or self._kinds[before.lane] != _DRIVE:
+        if before is None or after is None or self._kinds[before.lane] == _WALK:
             return []
         start = LanePoint(before.lane, float(before.s[-1]))
         end = LanePoint(after.lane, float(after.s[0]))
