@@ -337,7 +337,8 @@ class Workspace:
             settings = replace(settings, converter=same.converter if same else "odscen")
         if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
             return same
-        given = same.given() if same and settings.converter == "file" else None
+        kept = same is not None and same.converter == settings.converter == "file"
+        given = same.given() if same and kept else None
         return self._built(name, content, source.name, settings, given, progress)
 
     def set_network(

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 WORTH_TELLING = 1.0
 """Metres of a lane without SUMO lane that make an entry."""
 
+AREA = 1.5
+"""Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
 
 def import_findings(
     odr: OpenDrive, table: RoadTable, lanes: LaneTable, fidelity: Fidelity
@@ -63,12 +66,12 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
     for row, key in enumerate(table.lane_keys):
         if not is_used(table.lane_type[row]):
             continue
-        inside = odr.roads[key.road].junction is not None
-        if inside and table.lane_type[row] in WALKABLE_TYPES:
+        walk = table.lane_type[row] in WALKABLE_TYPES
+        if walk and odr.roads[key.road].junction is not None:
             continue  # persons cross junctions on walking areas, which have no lanes
         length = float(table.lane_s1[row] - table.lane_s0[row])
         gap = length - covered.get(key, 0.0)
-        if gap > WORTH_TELLING:
+        if gap > (AREA if walk and gap < length else WORTH_TELLING):
             reason = f"{gap:.2f} of {length:.2f} m have no SUMO lane"
             yield ReportEntry(ElementOutcome.LOST, _place(*key), reason)
         elif worst.get(key, 0.0) > NEAR:

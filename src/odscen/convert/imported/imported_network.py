@@ -67,7 +67,7 @@ def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:
     own = {
         row: lane.length
         for row, lane in enumerate(lanes.lane_list)
-        if lanes.edges[lane.edge].function == NORMAL
+        if lanes.edges[lane.edge].function == NORMAL and lane.allowed != frozenset()
     }
     placed = sum(
         float(interval.pos[-1] - interval.pos[0])
@@ -77,8 +77,8 @@ def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:
     if covered < LEAST_COVERED * length or placed < LEAST_PLACED * sum(own.values()):
         x, y = lanes.net_offset
         msg = (
-            f"the SUMO network is not one of this map: {placed:.0f} of {sum(own.values()):.0f} m of "
-            f"its lanes lie on lanes of the map, on {covered:.0f} of {length:.0f} m of driving "
+            f"the SUMO network is not one of this map: {placed:.0f} of {sum(own.values()):.0f} m "
+            f"of its lanes lie on lanes of the map, on {covered:.0f} of {length:.0f} m of driving "
             f"lanes (netOffset {x:g},{y:g})"
         )
         raise InputError(msg)
