@@ -56,10 +56,12 @@ def _own(source: MapInput) -> SumoNetwork:
 
 
 def _netconvert(source: MapInput) -> SumoNetwork:
+    from odscen.convert.imported.import_findings import unread_signs
     from odscen.convert.imported.imported_network import imported_network
     from odscen.workspace.netconvert import convert_map
 
     net_xml, entries = convert_map(source.xodr, lefthand=source.odr.rule == "LHT")
+    entries = (*entries, *unread_signs(source.odr))
     return imported_network(net_xml, source.odr, source.table, source.walks, entries=entries)
 
 

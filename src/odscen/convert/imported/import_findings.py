@@ -8,6 +8,7 @@ from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_
 from odscen.convert.model.access import is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.convert.verify.fidelity_result import NEAR
+from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.road_model import WALKABLE_TYPES
 
 if TYPE_CHECKING:
@@ -49,6 +50,17 @@ def import_findings(
         "signals": float(sum(len(road.signals) for road in odr.roads.values())),
     }
     return entries, figures
+
+
+def unread_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
+    """Yield the signs of right of way of a map, none of which netconvert reads."""
+    for road in odr.roads.values():
+        for signal in road.signals:
+            kind = signal_kind(signal)
+            if kind in ("stop", "yield"):
+                reason = f"{kind} sign: netconvert does not read it, and ranks roads itself"
+                element = f"road {road.id} > signal {signal.id}"
+                yield ReportEntry(ElementOutcome.LOST, element, reason)
 
 
 def _place(road: str, section: int, lane: int) -> str:
