@@ -13,7 +13,7 @@ from odscen.app.maps import load_map
 from odscen.app.runs import check_run, run_all
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings
-from odscen.lanegraph.query import node_id
+from odscen.lanegraph.query import largest_part, node_id
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import Flow, MapReference, Scenario, Simulation
 from odscen.scenario.placing.region import Region
@@ -37,6 +37,9 @@ PER_FLOW = 60.0
 
 LEAST_TRIP = 100.0
 """Metres between start and goal of a flow, as the crow flies."""
+
+FROM_ENDS = 50.0
+"""Metres of a lane ahead of a start, and behind a goal: room to change lanes."""
 
 _HALF = 0.5
 _TRIES = 20
@@ -218,16 +221,24 @@ def _trips(
     """Flows between places that all networks have, with routes on all of them."""
     loaded = [load_map(entry) for entry in entries.values()]
     graph, entry = loaded[0].sumo.graph, loaded[0].entry
+    everywhere = Region.of(graph, largest_part(graph.segments))
     usable = np.array([graph.lanes.lanes.junctions[lane] is None for lane in graph.lanes.lane])
+    usable &= everywhere.lanes
+    ahead = graph.lanes.lanes.lengths[graph.lanes.lane] - graph.lanes.offset
     for one in loaded:
         usable &= True if one.usable.spawnable is None else one.usable.spawnable
-    everywhere = Region.of(graph, graph.segments.ids)
     random = stream(0, "compare", entry.sha256)
     reference = MapReference(name=entry.name, sha256=entry.sha256, spacing=graph.lanes.spacing)
     count = max(1, round(per_hour / PER_FLOW))
     kept: dict[int, Flow] = {}
     for _ in range(_TRIES):
-        pairs = _pairs(random, np.flatnonzero(usable), everywhere, 2 * count)
+        pairs = _pairs(
+            random,
+            np.flatnonzero(usable & (ahead >= FROM_ENDS)),
+            np.flatnonzero(usable & (graph.lanes.offset >= FROM_ENDS)),
+            everywhere,
+            2 * count,
+        )
         flows = {
             spawn: Flow(
                 id=f"trips-{spawn}",
@@ -242,7 +253,7 @@ def _trips(
         scenario = Scenario(
             name="compare",
             map=reference,
-            roi=tuple(graph.segments.ids),
+            roi=everywhere.segments,
             simulation=Simulation(duration=2.0 * settings.duration),
         )
         routed = _routed(scenario, flows, loaded)
@@ -254,13 +265,17 @@ def _trips(
 
 
 def _pairs(
-    random: np.random.Generator, nodes: IntArray, region: Region, count: int
+    random: np.random.Generator,
+    starts: IntArray,
+    goals: IntArray,
+    region: Region,
+    count: int,
 ) -> list[tuple[int, int]]:
-    """Random starts and goals with a path between them, each start once."""
-    if len(nodes) < 2:
+    """Random pairs of a start and a goal with a path between them, each start once."""
+    if not len(starts) or not len(goals):
         return []
-    starts = random.choice(nodes, size=min(count, len(nodes)), replace=False)
-    goals = random.choice(nodes, size=len(starts))
+    starts = random.choice(starts, size=min(count, len(starts)), replace=False)
+    goals = random.choice(goals, size=len(starts))
     lanes = region.graph.lanes
     apart = np.hypot(lanes.x[starts] - lanes.x[goals], lanes.y[starts] - lanes.y[goals])
     starts, goals = starts[apart >= LEAST_TRIP], goals[apart >= LEAST_TRIP]
