@@ -12,14 +12,13 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from odscen.convert.model.net_shapes import inner_border, link_paths
+from odscen.convert.model.net_shapes import LinkPath, border
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from odscen.base.arrays import FloatArray
     from odscen.base.ids import SumoEdgeId, SumoLaneId
-    from odscen.convert.model.net_shapes import LinkPath
 
 
 NORMAL = "normal"
@@ -208,6 +207,23 @@ class Net:
             "walking_areas": functions.count(WALKING_AREA),
         }
 
+    def link_paths(self) -> dict[SumoLaneId, LinkPath]:
+        """How connections run through their junctions, by their first internal lane."""
+        of_edge = {edge.id: edge.lanes for edge in self.edges}
+        lanes = {lane.id: lane for own in of_edge.values() for lane in own}
+        beyond = {
+            of_edge[link.source][link.source_lane].id: link.via for link in self.links if link.via
+        }
+        found: dict[SumoLaneId, LinkPath] = {}
+        for first in (lanes[link.via] for link in self.links if link.via):
+            second = beyond.get(first.id)
+            if second is None:
+                found[first.id] = LinkPath(first.shape, first.speed, None)
+            else:
+                shape = np.concatenate([first.shape, lanes[second].shape[1:]])
+                found[first.id] = LinkPath(shape, first.speed, first.length)
+        return found
+
     def to_xml(self) -> bytes:
         """Text of ``net.net.xml``; the same network gives the same bytes."""
         x0, y0, x1, y1 = self.boundary
@@ -232,7 +248,7 @@ class Net:
             lines += self._junction(junction)
         for junction in self.inner_junctions:
             lines += self._junction(junction)
-        paths = link_paths(self.edges, self.links)
+        paths = self.link_paths()
         inside = {edge.id for edge in inner}
         for link in self.links:
             own = None if link.source in inside or link.via is None else paths[link.via]
@@ -250,7 +266,8 @@ class Net:
         crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
         shape, custom = "", ' customShape="1"'
         if edge.function == NORMAL:
-            shape = f' shape="{self._shape(inner_border(edge.lanes, lefthand=self.lefthand))}"'
+            inmost, side = edge.lanes[-1], -0.5 if self.lefthand else 0.5
+            shape = f' shape="{self._shape(border(inmost.shape, side * inmost.width))}"'
         elif edge.function == INTERNAL:
             custom = ""
         yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}{shape}>'

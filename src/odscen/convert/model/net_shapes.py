@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from odscen.base.arrays import FloatArray
-    from odscen.base.ids import SumoLaneId
-    from odscen.convert.model.net import NetEdge, NetLane, NetLink
 
 _SHARPEST = 0.5
 """Cosine of half a bend: at sharper ones the border is cut short."""
@@ -39,37 +35,20 @@ class LinkPath(NamedTuple):
     waits_at: float | None
 
 
-def link_paths(edges: Sequence[NetEdge], links: Sequence[NetLink]) -> dict[SumoLaneId, LinkPath]:
-    """Paths of connections by their first internal lane."""
-    lanes: dict[SumoLaneId, NetLane] = {lane.id: lane for edge in edges for lane in edge.lanes}
-    of_edge = {edge.id: edge.lanes for edge in edges}
-    beyond = {
-        of_edge[link.source][link.source_lane].id: link.via
-        for link in links
-        if link.via is not None
-    }
-    found: dict[SumoLaneId, LinkPath] = {}
-    for link in links:
-        if link.via is None:
-            continue
-        first = lanes[link.via]
-        second = beyond.get(first.id)
-        if second is None:
-            found[first.id] = LinkPath(first.shape, first.speed, None)
-        else:
-            shape = np.concatenate([first.shape, lanes[second].shape[1:]])
-            found[first.id] = LinkPath(shape, first.speed, first.length)
-    return found
+def border(shape: FloatArray, out: float) -> FloatArray:
+    """Line ``out`` metres to the left of another one.
 
+    netconvert spreads the lanes of an edge from its border towards the opposite direction.
 
-def inner_border(lanes: Sequence[NetLane], *, lefthand: bool) -> FloatArray:
-    """Border of an edge towards the opposite direction, from which netconvert spreads its lanes.
+    Parameters
+    ----------
+    shape
+        Shape ``(K, 3)``, metres.
 
     Returns
     -------
     Shape ``(K, 3)``, metres.
     """
-    shape, out = lanes[-1].shape, lanes[-1].width / 2.0
     steps = np.diff(shape[:, :2], axis=0)
     ahead = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
     left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
@@ -77,6 +56,6 @@ def inner_border(lanes: Sequence[NetLane], *, lefthand: bool) -> FloatArray:
     middle = before + after
     middle /= np.maximum(np.hypot(*middle.T), 1e-9)[:, None]
     bend = np.maximum(np.einsum("ij,ij->i", middle, after), _SHARPEST)
-    border = shape.copy()
-    border[:, :2] += middle * ((-out if lefthand else out) / bend)[:, None]
-    return border
+    line = shape.copy()
+    line[:, :2] += middle * (out / bend)[:, None]
+    return line
