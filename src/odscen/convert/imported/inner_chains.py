@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 MOST_LINKS = 12
 """Lanes in a chain; two for a junction, three for each stub between junctions."""
 
+MOST_PATHS = 1000
+"""Beginnings of chains from one lane that are followed: no junction has so many."""
+
 
 class LanePoint(NamedTuple):
     """A place on an OpenDRIVE lane; ``lane`` is a position in ``LaneSamples.rows``."""
@@ -67,7 +70,9 @@ def chains_of(net: ImportedNet, stubs: Container[SumoLaneId]) -> list[InnerChain
     found: list[InnerChain] = []
     for start in dict.fromkeys(starts):
         open_paths: list[tuple[SumoLaneId, ...]] = [(lane,) for lane in reversed(after[start])]
-        while open_paths:
+        for _ in range(MOST_PATHS):
+            if not open_paths:
+                break
             path = open_paths.pop()
             last = path[-1]
             if last not in stubs and net.function(last) == NORMAL:

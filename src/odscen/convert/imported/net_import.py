@@ -5,6 +5,7 @@ Ids are kept as they are and never taken apart.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -227,6 +228,10 @@ def _lane(
         msg = f"lane {lane.getID()} has no usable shape"
         raise ValueError(msg)
     shape = shape - np.array([*offset, 0.0])
+    numbers = [float(value) for value in (lane.getLength(), lane.getSpeed(), lane.getWidth())]
+    if not all(map(math.isfinite, numbers)) or numbers[0] <= 0.0 or min(numbers) < 0.0:
+        msg = f"lane {lane.getID()} has no usable length, speed or width: {numbers}"
+        raise ValueError(msg)
     classes = frozenset(lane.getPermissions())
     if classes not in permissions:
         permissions[classes] = _permitted(classes)
@@ -234,9 +239,7 @@ def _lane(
         SumoLaneId(lane.getID()),
         SumoEdgeId(edge.getID()),
         int(lane.getIndex()),
-        float(lane.getLength()),
-        float(lane.getSpeed()),
-        float(lane.getWidth()),
+        *numbers,
         permissions[classes],
         shape,
     )
