@@ -25,6 +25,7 @@ test: test-page $(READY) $(QC) $(PAGE) chromium allocator
 # Scenarios on the shipped maps against their baselines; see docs/regression.md.
 regression: $(READY)
 	$(BIN)/odscen test suites/shipped.toml --jobs 2 --workspace build/regression --junit build/regression/junit.xml --html build/regression/report.html
+	$(BIN)/odscen test suites/netconvert.toml --jobs 2 --workspace build/regression --junit build/regression/junit-netconvert.xml --html build/regression/report-netconvert.html
 
 # The parts of the page that need no browser.
 test-page: $(MODULES)

@@ -5,7 +5,7 @@ import { coverage, grouped } from "../src/catalogue/conversion";
 import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
 import { hashOf, parseAddress } from "../src/ui/address";
-import { clock, length, mapFacts, modelWord } from "../src/ui/words";
+import { clock, length, mapFacts, modelWord, networkFact } from "../src/ui/words";
 import { mapInfo } from "./example";
 
 type Entry = ConversionReport["entries"][number];
@@ -44,6 +44,12 @@ test("figures are said as people say them", () => {
   expect(clock(75.04)).toBe("1:15.0");
   expect(length(950)).toBe("950 m");
   expect(modelWord("vehicle.tesla.model3")).toBe("Tesla Model3");
+});
+
+test("who wrote the network is said where it is not odscen", () => {
+  expect(networkFact({ converter: "odscen", source: null })).toEqual([]);
+  expect(networkFact({ converter: "netconvert", source: null })).toEqual(["network by netconvert"]);
+  expect(networkFact({ converter: "file", source: "a.net.xml" })).toEqual(["network from a.net.xml"]);
 });
 
 test("only maps that have all that is wished for are shown", () => {

@@ -114,6 +114,7 @@ export const mapInfo = (name: string, junctions: number): MapInfo => ({
   source: "",
   opendrive: { version: "1.7", rule: "RHT" },
   report_counts: {},
+  network: { converter: "odscen", source: null },
   preview: "",
   graph: {
     spacing: 2,

@@ -11,7 +11,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from odscen.convert.building.network import SumoNetwork, build_network
+from odscen.convert.building.network import build_network
+from odscen.convert.lane_table.sumo_network import SumoNetwork
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import MapGraph
 from odscen.opendrive.lanes import RoadTable

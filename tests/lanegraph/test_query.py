@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from odscen.lanegraph.query import (
     induced,
     is_connected,
     is_walk_node_id,
+    largest_part,
     neighbours,
     node_id,
     node_ids,
@@ -124,3 +127,14 @@ def test_an_unknown_segment_is_refused_by_name() -> None:
 
 def test_no_segments_are_no_region() -> None:
     assert not is_connected(FORK.segments, [])
+
+
+def test_the_largest_part_is_the_one_with_most_segments_and_of_equals_the_first() -> None:
+    line = LINE.segments
+    assert largest_part(line) == line.ids
+    beside = [pair for pair in line.adjacency.tolist() if 3 not in pair]
+    parted = replace(line, adjacency=np.array(beside, dtype=line.adjacency.dtype))
+    assert largest_part(parted) == line.ids[4:]
+    beside = [pair for pair in line.adjacency.tolist() if 4 not in pair and 7 not in pair]
+    parted = replace(line, adjacency=np.array(beside, dtype=line.adjacency.dtype))
+    assert largest_part(parted) == line.ids[:4]

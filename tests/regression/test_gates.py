@@ -10,6 +10,7 @@ from odscen.regression.junit import junit_xml
 from odscen.regression.suite import read_suite
 from odscen.regression.suite_page import suite_page
 from odscen.regression.suite_words import lines, to_dict
+from tests.regression.conftest import copy_suite
 
 
 def run(store, file, **options):
@@ -177,3 +178,18 @@ def test_a_file_that_is_no_baseline_is_refused_before_anything_runs(store, suite
     path.write_text('{"format": "odscen-baseline", "version": 9}')
     with pytest.raises(InputError, match=r"signal_crossing\.json.*version 9"):
         run(store, suite)
+
+
+def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(store, tmp_path):
+    file = copy_suite(tmp_path, "signal_crossing")
+    text = file.read_text().replace('name = "small"', 'name = "small"\nconverter = "netconvert"')
+    file.write_text(text)
+    written = run_suite(store, read_suite(file), update_baseline=True)
+    assert written.exit_code == 0
+    (case_,) = run_suite(store, read_suite(file)).cases
+    assert (case_.status, case_.changed_inputs) == ("passed", ())
+    assert store.map(case_.map_name).converter == "netconvert"
+    file.write_text(text.replace('converter = "netconvert"', 'converter = "odscen"'))
+    (case_,) = run_suite(store, read_suite(file)).cases
+    assert case_.changed_inputs == ("the network",)
+    assert store.map(case_.map_name).converter == "odscen"

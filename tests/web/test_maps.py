@@ -160,3 +160,16 @@ def test_assets_list_seven_categories_models_and_weather(client: TestClient) -> 
         one["category"] for one in assets["categories"]
     }
     assert "ClearNoon" in [one["name"] for one in assets["weather"]]
+
+
+def test_a_map_can_be_added_with_a_network_by_netconvert(
+    client: TestClient, workspace: Workspace
+) -> None:
+    content = (SHIPPED / "t_junction_signs.xodr").read_bytes()
+    done = job(client, upload(client, content, "by_netconvert.xodr", converter="netconvert"))
+    assert done["result"] == "by_netconvert"
+    rows = {row["name"]: row["network"] for row in client.get("/api/maps").json()}
+    assert rows["by_netconvert"] == {"converter": "netconvert", "source": None}
+    assert rows[CROSSING] == {"converter": "odscen", "source": None}
+    assert upload(client, content, "m.xodr", converter="file").status_code == 422
+    workspace.remove_map("by_netconvert")

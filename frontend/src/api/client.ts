@@ -1,5 +1,5 @@
 import type { components, paths } from "./schema";
-import type { Edit } from "./types";
+import type { Converter, Edit } from "./types";
 
 type ErrorInfo = components["schemas"]["ErrorInfo"];
 
@@ -124,7 +124,8 @@ export const api = {
   map: (name: string) => call("get", "/api/maps/{name}", { path: { name } }),
   drawing: (name: string) => call("get", "/api/maps/{name}/drawing", { path: { name } }),
   graph: (name: string) => call("get", "/api/maps/{name}/graph", { path: { name } }),
-  addMap: (file: File) => call("post", "/api/maps", { body: form({ file }) }),
+  addMap: (file: File, converter: Converter) =>
+    call("post", "/api/maps", { body: form({ file, converter }) }),
   removeMap: (name: string) => call("delete", "/api/maps/{name}", { path: { name } }),
   job: (job: string) => call("get", "/api/jobs/{job}", { path: { job } }),
   assets: () => call("get", "/api/assets"),

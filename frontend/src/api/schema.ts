@@ -39,7 +39,7 @@ export interface paths {
         put?: never;
         /**
          * Add Map
-         * @description Add a map; it is built in the background.
+         * @description Add a map; it is built in the background, with a network by the converter of that name.
          */
         post: operations["add_map_api_maps_post"];
         delete?: never;
@@ -1084,6 +1084,8 @@ export interface components {
             file: string;
             /** Name */
             name?: string | null;
+            /** Converter */
+            converter?: ("odscen" | "netconvert") | null;
         };
         /** Body_table_api_scenarios__name__demand_table_post */
         Body_table_api_scenarios__name__demand_table_post: {
@@ -2116,6 +2118,7 @@ export interface components {
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
             sumo: components["schemas"]["NetCounts"];
+            network: components["schemas"]["NetworkOrigin"];
             report_counts: {
                 kept?: number;
                 repaired?: number;
@@ -2153,6 +2156,7 @@ export interface components {
             statistics: components["schemas"]["MapStatistics"];
             graph: components["schemas"]["GraphCounts"];
             sumo: components["schemas"]["NetCounts"];
+            network: components["schemas"]["NetworkOrigin"];
             report_counts: {
                 kept?: number;
                 repaired?: number;
@@ -2303,6 +2307,19 @@ export interface components {
             crossings: number;
             /** Walking Areas */
             walking_areas: number;
+        };
+        /**
+         * NetworkOrigin
+         * @description Who wrote the SUMO network; ``source`` is the file of one that was brought in.
+         */
+        NetworkOrigin: {
+            /**
+             * Converter
+             * @enum {string}
+             */
+            converter: "odscen" | "netconvert" | "file";
+            /** Source */
+            source: string | null;
         };
         /**
          * NewName

@@ -18,6 +18,9 @@ export const CATEGORIES: readonly Category[] = [
 export type MapStatistics = Schemas["MapStatistics"];
 export type Bounds = MapStatistics["bounds"];
 export type MapInfo = Schemas["MapInfo"];
+export type NetworkOrigin = Schemas["NetworkOrigin"];
+/** Who writes the network of a map that is added; null keeps the network of one that is there. */
+export type Converter = Exclude<NetworkOrigin["converter"], "file"> | null;
 export type MapDetails = Schemas["MapDetails"];
 export type GraphColumns = Schemas["GraphColumns"];
 export type WalkColumns = Schemas["WalkColumns"];

@@ -1,9 +1,9 @@
-import { Alert, Button, FileButton, Progress, Text } from "@mantine/core";
+import { Alert, Button, FileButton, NativeSelect, Progress, Text } from "@mantine/core";
 import { type DragEvent, useRef, useState } from "react";
 
 import { api } from "../api/client";
 import { addShipped, followJob } from "../api/maps";
-import type { Job } from "../api/types";
+import type { Converter, Job } from "../api/types";
 import { tell } from "../ui/notices";
 import { reasonOf } from "../ui/reason";
 import { stepWords } from "./steps";
@@ -33,6 +33,7 @@ export function AddMap({
   onReport: (map: string) => void;
 }) {
   const [over, setOver] = useState(false);
+  const [converter, setConverter] = useState<Converter>(null);
   const [work, setWork] = useState<Work | null>(null);
   const [refusals, setRefusals] = useState<Refusal[]>([]);
   const [added, setAdded] = useState<string[]>([]);
@@ -70,7 +71,7 @@ export function AddMap({
       const taken = file;
       const job = await attempt(
         taken.name,
-        () => api.addMap(taken),
+        () => api.addMap(taken, converter),
         () => undefined,
       );
       const name = job?.result;
@@ -135,7 +136,16 @@ export function AddMap({
                   : "Drop one or more OpenDRIVE files (.xodr) here, or choose them."}
               </Text>
             </div>
-            <div style={{ display: "flex", gap: 10, flexWrap: "wrap" }}>
+            <div style={{ display: "flex", gap: 10, flexWrap: "wrap", alignItems: "flex-end" }}>
+              <NativeSelect
+                label="SUMO network by"
+                size="xs"
+                value={converter ?? "odscen"}
+                onChange={({ currentTarget }) =>
+                  setConverter(currentTarget.value === "netconvert" ? "netconvert" : null)
+                }
+                data={["odscen", "netconvert"]}
+              />
               {empty && <Button onClick={() => void addThose()}>Add the example maps</Button>}
               <FileButton multiple accept=".xodr,.xml" onChange={(files) => void add(files)}>
                 {(props) => (

@@ -2,7 +2,7 @@ import { ActionIcon, Button, Card, Group, Title, Tooltip } from "@mantine/core";
 
 import type { MapInfo } from "../api/types";
 import { IconTrash } from "../ui/icons";
-import { mapFacts } from "../ui/words";
+import { mapFacts, networkFact } from "../ui/words";
 import { Preview } from "./Preview";
 
 /** A map with its picture and what there is in it. */
@@ -19,6 +19,7 @@ export function MapCard({
   onRemove: () => void;
   onReport: () => void;
 }) {
+  const facts = [...mapFacts(map.statistics), ...networkFact(map.network)];
   return (
     <Card withBorder padding={0} className="card">
       <Preview name={map.name} picture={map.preview} />
@@ -34,7 +35,7 @@ export function MapCard({
           </Tooltip>
         </Group>
         <ul className="card-facts" style={{ flex: 1, alignContent: "flex-start" }}>
-          {mapFacts(map.statistics).map((fact) => (
+          {facts.map((fact) => (
             <li key={fact}>{fact}</li>
           ))}
         </ul>

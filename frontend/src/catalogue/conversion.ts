@@ -34,6 +34,16 @@ const PLAIN: [RegExp, string][] = [
     /every crossing of a junction with lights has a light/,
     "Every crosswalk of a junction with traffic lights got a light for pedestrians",
   ],
+  [/of [\d.]+ m have no SUMO lane$/, "Lanes or parts of lanes that are missing in the simulation"],
+  [/^SUMO's lane lies up to/, "Lanes that lie a little beside their place in the simulation"],
+  [/^no connection to lane/, "Connections between lanes that are missing in the simulation"],
+  [/^SUMO connects it to lane/, "Connections between lanes that only the simulation has"],
+  [/^crosswalk: crossings of the network/, "Crosswalks that lie elsewhere in the simulation"],
+  [/netconvert does not read it/, "Signs of right of way, which netconvert does not read"],
+  [
+    /traffic lights have the network's programs/,
+    "The map does not say when its lights turn green: the programs of the network are used",
+  ],
   [/its width varies from/, "Lanes whose width changes have one width in the simulation"],
   [
     /traffic lights? have programs of odscen's own/,

@@ -1,4 +1,4 @@
-import type { Category, MapStatistics, Style, WeatherPreset } from "../api/types";
+import type { Category, MapStatistics, NetworkOrigin, Style, WeatherPreset } from "../api/types";
 
 /** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
@@ -107,6 +107,12 @@ export function bytes(n: number): string {
 
 export const count = (n: number, one: string, many = `${one}s`): string =>
   `${n.toLocaleString("en")} ${n === 1 ? one : many}`;
+
+/** Who wrote the network of a map, where it is not odscen itself. */
+export function networkFact({ converter, source }: NetworkOrigin): string[] {
+  if (converter === "odscen") return [];
+  return [converter === "file" ? `network from ${source ?? "a file"}` : "network by netconvert"];
+}
 
 export function mapFacts(s: MapStatistics): string[] {
   const [x0, y0, x1, y1] = s.bounds;

@@ -14,6 +14,7 @@ from odscen.scenario.document.sampling_config import SamplingConfig, loads_confi
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
+from odscen.sumo.realize.network_fit import place_fit, route_fit
 from odscen.workspace.store import plain_name
 
 if TYPE_CHECKING:
@@ -122,6 +123,9 @@ def given_scenario(scenario: Scenario | Path) -> Scenario:
 def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Problem, ...]:
     """Find every problem of a scenario on its map; :mod:`odscen.scenario.checks` has the rules.
 
+    What the SUMO network of the map does not hold of it are warnings:
+    :mod:`odscen.sumo.realize.network_fit`.
+
     Parameters
     ----------
     workspace
@@ -143,7 +147,11 @@ def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Pro
     """
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
-    return check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
+    problems = check(scenario, loaded.sumo.graph, workspace.assets(), loaded.lights)
+    problems += tuple(place_fit(scenario, loaded.sumo))
+    if not any(problem.severity == "error" for problem in problems):
+        problems += tuple(route_fit(scenario, loaded.sumo))
+    return problems
 
 
 def read_config(path: Path | None) -> SamplingConfig:

@@ -19,6 +19,7 @@ from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
 from odscen.cli.doctor_command import doctor
 from odscen.cli.map_commands import app as maps
+from odscen.cli.network_commands import compare_networks, network
 from odscen.cli.pull_command import pull
 from odscen.cli.regression_commands import compare, gate
 from odscen.cli.report_command import report
@@ -35,6 +36,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 maps.command()(pull)
+maps.command()(network)
+maps.command("compare")(compare_networks)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.add_typer(demand, name="demand")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +34,14 @@ UNITS = dict.fromkeys(
 _WORST = 4
 """Places shown of each kind of finding; JSON has all of them."""
 
+
+class ConverterChoice(StrEnum):
+    """Converters that can be asked for by name."""
+
+    ODSCEN = "odscen"
+    NETCONVERT = "netconvert"
+
+
 app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=True)
 
 
@@ -43,6 +52,12 @@ def add(
         str | None, typer.Option(help="Name in the catalogue. [default: the file's name]")
     ] = None,
     spacing: Annotated[float, typer.Option(help="Metres between nodes of the lane graph.")] = 2.0,
+    converter: Annotated[
+        ConverterChoice | None,
+        typer.Option(
+            help="Who writes the SUMO network. [default: as the map has it, odscen for a new one]"
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -66,7 +81,9 @@ def add(
                 entry = store.add_map(
                     file,
                     name=map_name,
-                    settings=ConversionSettings(spacing=spacing),
+                    settings=ConversionSettings(
+                        spacing=spacing, converter=converter.value if converter else None
+                    ),
                     progress=step,
                 )
         except OdscenError as error:
@@ -107,10 +124,11 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     elif not rows:
         log("No maps yet. Add one with: odscen maps add FILE.xodr")
     else:
-        shown = ("name", "rule", "road km", "junctions", "crosswalks", "lights", "nodes")
+        shown = ("name", "rule", "road km", "junctions", "crosswalks", "lights", "nodes", "network")
+        others = any(row["network"]["converter"] != "odscen" for row in rows)
         print_table(
             "",
-            shown,
+            shown if others else shown[:-1],
             [
                 (
                     row["name"],
@@ -120,6 +138,7 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
                     row["statistics"]["crosswalks"],
                     row["statistics"]["traffic_lights"],
                     row["graph"]["nodes"],
+                    *((row["network"]["converter"],) if others else ()),
                 )
                 for row in rows
             ],
@@ -140,7 +159,7 @@ def show(
         files = {key: str(entry.path(key)) for key in entry.info["files"]}
         print_json({**entry.info, "files": files})
         return
-    for part in ("opendrive", "statistics", "graph", "sumo", "report"):
+    for part in ("opendrive", "statistics", "graph", "network", "sumo", "report"):
         values = entry.info[part]
         if part == "report":
             values = values["counts"]
@@ -300,7 +319,7 @@ def _figure(value: float) -> str:
 
 
 def _row(entry: MapEntry) -> dict[str, Any]:
-    keys = ("name", "sha256", "opendrive", "statistics", "graph", "build_seconds")
+    keys = ("name", "sha256", "opendrive", "statistics", "graph", "network", "build_seconds")
     return {key: entry.info[key] for key in keys}
 
 

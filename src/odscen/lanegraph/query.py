@@ -180,6 +180,15 @@ def is_connected(segments: Segments, ids: Iterable[str]) -> bool:
     return len(graph) > 0 and nx.is_connected(graph)
 
 
+def largest_part(segments: Segments) -> tuple[SegmentId, ...]:
+    """Segments of the largest connected part of a map, in the order of the map."""
+    import networkx as nx
+
+    parts = nx.connected_components(_induced_adjacency(segments, segments.ids))
+    largest: set[int] = max(parts, key=lambda part: (len(part), -min(part)), default=set())
+    return tuple(segments.ids[row] for row in sorted(largest))
+
+
 def removable(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:
     """Members without which the others are connected, or none are left (R29).
 

@@ -50,8 +50,12 @@ class Baseline:
     figures: dict[FigureKey, tuple[float | None, ...]]
 
 
-def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> Fingerprint:
+def fingerprint(
+    scenario: Scenario, map_sha256: str, settings: RunSettings, *, network: str | None = None
+) -> Fingerprint:
     """Fingerprint of what a scenario is run from.
+
+    ``network`` is the SHA-256 of a network that odscen has not written.
 
     The scenario's parts are apart, so that the one that has changed can be named. Its seed is
     left out, as the suite names the seeds, and so are name and description.
@@ -64,6 +68,8 @@ def fingerprint(scenario: Scenario, map_sha256: str, settings: RunSettings) -> F
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)
     found = {"map": map_sha256[:_SHORT]}
+    if network is not None:
+        found["network"] = network[:_SHORT]
     found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
     return found | {"odscen": __version__, "sumo": version("libsumo")}
 
@@ -84,7 +90,7 @@ def changed_inputs(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str,
             changes.append(f"{name} {before} -> {now}")
         else:
             part = name.removeprefix("scenario.")
-            changes.append("the map" if name == "map" else f"the scenario's {part}")
+            changes.append(f"the {name}" if part == name else f"the scenario's {part}")
     return tuple(changes)
 
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from odscen.app.runs import CheckedRun
+    from odscen.convert.model.conversion_settings import ConverterName
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
@@ -212,39 +213,48 @@ def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_L
     for case in suite.cases:
         scenario = read_scenario(case.file)
         with in_file(str(case.file)):
-            entry = _map_of(workspace, scenario, maps)
+            entry = _map_of(workspace, scenario, maps, suite.converter)
             # The suite names the map to test on; a baseline knows if it is not the one of before.
             reference = scenario.map.model_copy(update={"sha256": entry.sha256})
             scenario = scenario.model_copy(update={"map": reference})
             settings = _settings(case, suite)
             run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
-        made_of = fingerprint(scenario, entry.sha256, settings)
+        network = None if entry.converter == "odscen" else entry.net_sha256
+        made_of = fingerprint(scenario, entry.sha256, settings, network=network)
         baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
         run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
         loaded.append(_Loaded(case, run, made_of, baseline))
     return loaded
 
 
-def _map_of(workspace: Workspace, scenario: Scenario, maps: Mapping[str, Path]) -> MapEntry:
+def _map_of(
+    workspace: Workspace,
+    scenario: Scenario,
+    maps: Mapping[str, Path],
+    converter: ConverterName | None,
+) -> MapEntry:
     """Find the map of the suite, built in the workspace if need be; else the workspace's own.
 
-    A map of that name and another content in the workspace is left alone.
+    A map of that name and another content or converter in the workspace is left alone.
     """
     name = scenario.map.name
     if name not in maps:
-        return workspace.map_for(name, scenario.map.sha256)
+        own = workspace.map_for(name, scenario.map.sha256)
+        if converter in (None, own.converter):
+            return own
+    source = maps[name] if name in maps else own.path("xodr")
+    wished = ConversionSettings(spacing=scenario.map.spacing, converter=converter or "odscen")
     try:
-        content = maps[name].read_bytes()
+        content = source.read_bytes()
     except OSError as error:
-        raise InputError(error.strerror or str(error), file=str(maps[name])) from error
+        raise InputError(error.strerror or str(error), file=str(source)) from error
     sha256 = hashlib.sha256(content).hexdigest()
     for entry in workspace.maps():
-        if entry.sha256 == sha256 and entry.info["spacing"] == scenario.map.spacing:
+        if (entry.sha256, entry.conversion) == (sha256, wished):
             return entry
     free = name not in workspace.map_names()
-    own = name if free else f"{name[:50]}-{sha256[:8]}"
-    settings = ConversionSettings(spacing=scenario.map.spacing)
-    return workspace.add_map(maps[name], name=own, settings=settings)
+    new = name if free else f"{name[:40]}-{sha256[:8]}-{wished.converter}"
+    return workspace.add_map(source, name=new, settings=wished)
 
 
 def _settings(case: Case, suite: Suite) -> RunSettings:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationError
 
@@ -19,6 +19,7 @@ from odscen.scenario.document.validation import validation_problems
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from odscen.convert.model.conversion_settings import ConverterName
     from odscen.regression.tolerance import Tolerance
     from odscen.results.measures.expectations import Expectation
 
@@ -68,6 +69,7 @@ class _SuiteDocument(_Settings):
     scenarios: tuple[Label, ...] = ()
     scenario: tuple[_ScenarioEntry, ...] = ()
     baselines: Label | None = None
+    converter: Literal["odscen", "netconvert"] | None = None
     time_limit: Annotated[float, Field(gt=0)] | None = None
 
 
@@ -87,13 +89,25 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """A suite as it was read; ``maps`` are .xodr files, ``time_limit`` wall seconds of one run."""
+    """A suite as it was read.
+
+    Attributes
+    ----------
+    maps
+        The .xodr files to test on.
+    converter
+        Who writes their SUMO networks; ``None`` is odscen for ``maps``, and for those of the
+        workspace who did.
+    time_limit
+        Wall seconds of one run.
+    """
 
     name: str
     file: Path
     maps: tuple[Path, ...]
     cases: tuple[Case, ...]
     time_limit: float | None
+    converter: ConverterName | None = None
 
 
 def read_suite(file: Path) -> Suite:
@@ -140,6 +154,7 @@ def _suite(document: _SuiteDocument, file: Path) -> Suite:
         maps=tuple(dict.fromkeys(maps)),
         cases=tuple(cases.values()),
         time_limit=document.time_limit,
+        converter=document.converter,
     )
 
 

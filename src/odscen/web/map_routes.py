@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
@@ -14,6 +14,7 @@ from starlette.responses import Response
 from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import ConflictError
+from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.messages import (
     AssetsInfo,
@@ -35,6 +36,7 @@ from odscen.web.wire.map_messages import (
     MapHeader,
     MapInfo,
     NetCounts,
+    NetworkOrigin,
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
@@ -105,8 +107,9 @@ def add_map(
     shared: Shared,
     file: Annotated[UploadFile, File(description="An OpenDRIVE map.")],
     name: Annotated[str | None, Form()] = None,
+    converter: Annotated[Literal["odscen", "netconvert"] | None, Form()] = None,
 ) -> JobStarted:
-    """Add a map; it is built in the background."""
+    """Add a map; it is built in the background, with a network by the converter of that name."""
     given = Path(file.filename or "map.xodr")
     name = name_from_file(given) if name is None else check_name(name)
     folder = Path(tempfile.mkdtemp(prefix="odscen-upload-"))
@@ -121,7 +124,10 @@ def add_map(
 
     def work(progress: ProgressCallback) -> str:
         try:
-            return shared.workspace.add_map(source, name=name, progress=progress).name
+            settings = ConversionSettings(converter=converter)
+            return shared.workspace.add_map(
+                source, name=name, settings=settings, progress=progress
+            ).name
         finally:
             shutil.rmtree(folder)
 
@@ -210,6 +216,7 @@ def _map_info(entry: MapEntry) -> MapInfo:
         statistics=info["statistics"],
         graph=GraphCounts.model_validate(info["graph"]),
         sumo=NetCounts.model_validate(info["sumo"]),
+        network=NetworkOrigin(converter=entry.converter, source=info["network"]["source"]),
         report_counts=info["report"]["counts"],
         preview=f"/api/maps/{entry.name}/preview.svg",
     )

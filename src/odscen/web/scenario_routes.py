@@ -23,6 +23,7 @@ from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
+from odscen.sumo.realize.network_fit import place_fit
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.web.edit_messages import EditRequest, apply_edit
@@ -225,9 +226,10 @@ def _problems(shared: Services, scenario: Scenario) -> tuple[Problem, ...]:
         return (Problem("error", "map_missing", "map", str(error)),)
     with shared.search:
         region = region_of(loaded, scenario.roi)
-        return check(
+        problems = check(
             scenario, loaded.sumo.graph, shared.workspace.assets(), loaded.lights, region=region
         )
+    return (*problems, *place_fit(scenario, loaded.sumo))
 
 
 def _region(shared: Services, scenario: Scenario) -> Region:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.convert.building.network import build_network
 from odscen.convert.lane_table.table_json import table_to_json
 from odscen.drawing.map_shapes import map_drawing
 from odscen.drawing.map_sheet import render_drawing
@@ -18,6 +18,7 @@ from odscen.lanegraph.graphs import MapGraph, Relation
 from odscen.lanegraph.map_statistics import map_semantics, map_statistics
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
+from odscen.workspace.converters import MapInput, converted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.workspace.converters import GivenNetwork
 
 
 FORMAT = "odscen-map"
@@ -51,6 +53,7 @@ def build_map(
     sha256: str,
     settings: ConversionSettings,
     builder: str,
+    given: GivenNetwork | None,
     progress: Callable[[str, float], None],
 ) -> None:
     """Fill ``folder`` with all of :data:`FILES`.
@@ -62,9 +65,11 @@ def build_map(
     folder
         Exists and is empty.
     settings
-        How it is converted.
+        How it is converted; with a converter.
     builder
         Version of the folder's content.
+    given
+        A network that was brought in for the map.
     progress
         Called with what comes next and the share done.
 
@@ -72,6 +77,10 @@ def build_map(
     ------
     OpenDriveError
         If the map cannot be read.
+    InputError
+        If the given network cannot be read or is none of this map.
+    ToolError
+        If netconvert cannot convert the map.
     """
     start = time.perf_counter()
     progress("reading the map", 0.0)
@@ -83,7 +92,7 @@ def build_map(
     (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
     (folder / FILES["graph"]).write_bytes(to_graphml(graph))
     progress("making the SUMO network", 0.4)
-    network = build_network(odr, table, graph.walks)
+    network = converted(settings.converter, MapInput(content, odr, table, graph.walks, given))
     progress("drawing the map", 0.8)
     drawing = map_drawing(odr, table, name=name)
     statistics = map_statistics(odr, table, graph)
@@ -103,6 +112,11 @@ def build_map(
         "opendrive": {"version": f"{header.rev_major}.{header.rev_minor}", "rule": odr.rule},
         "statistics": statistics.to_dict(),
         "graph": graph_counts(graph),
+        "network": {
+            "converter": settings.converter,
+            "source": given.source if given else None,
+            "sha256": hashlib.sha256(network.net_xml).hexdigest(),
+        },
         "sumo": {"net_file": FILES["net"], **network.table.counts},
         "lights": [_light(light) for light in network.table.lights],
         "files": FILES,

@@ -13,7 +13,7 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +27,13 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from odscen.convert.lane_table.table import LaneTable
+    from odscen.convert.model.conversion_settings import ConverterName
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.lanegraph.graphs import MapGraph
     from odscen.lanegraph.map_statistics import MapStatistics
     from odscen.workspace.asset_catalogue import Assets
+    from odscen.workspace.converters import GivenNetwork
 
 BUILDER = "5"
 """Raised whenever what a map folder contains changes; older folders are then rebuilt."""
@@ -92,8 +94,8 @@ class MapEntry:
         return hash(self._key)
 
     @property
-    def _key(self) -> tuple[Path, str, float, str]:
-        return self.folder, self.sha256, self.info["spacing"], self.info["builder"]
+    def _key(self) -> tuple[Path, str, float, str, str]:
+        return self.folder, self.sha256, self.info["spacing"], self.info["builder"], self.net_sha256
 
     @property
     def sha256(self) -> str:
@@ -103,7 +105,18 @@ class MapEntry:
     @property
     def conversion(self) -> ConversionSettings:
         """How it was converted."""
-        return ConversionSettings(spacing=float(self.info["spacing"]))
+        return ConversionSettings(spacing=float(self.info["spacing"]), converter=self.converter)
+
+    @property
+    def converter(self) -> ConverterName:
+        """Who wrote its SUMO network."""
+        name: ConverterName = self.info.get("network", {}).get("converter", "odscen")
+        return name
+
+    @property
+    def net_sha256(self) -> str:
+        """SHA-256 of its SUMO network, hexadecimal."""
+        return str(self.info.get("network", {}).get("sha256", ""))
 
     def path(self, key: str) -> Path:
         """Absolute path of one of the files named in ``map.json``, for example ``"net"``."""
@@ -129,6 +142,12 @@ class MapEntry:
         from odscen.lanegraph.networkx_form import to_networkx
 
         return to_networkx(self.graph())
+
+    def given(self) -> GivenNetwork:
+        """Its SUMO network, as it can be given to another build of the map."""
+        from odscen.workspace.converters import GivenNetwork
+
+        return GivenNetwork(self.path("net").read_bytes(), str(self.info["network"]["source"]))
 
     def lane_table(self) -> LaneTable:
         """The table between OpenDRIVE lanes and SUMO lanes."""
@@ -284,7 +303,8 @@ class Workspace:
         """Build everything that later steps need from an OpenDRIVE file, once.
 
         A map of the same name is replaced if the file, the settings or the builder differ, and left
-        as it is otherwise.
+        as it is otherwise. A network that was brought in for it stays, unless the file is another
+        one or the settings name a converter.
 
         Parameters
         ----------
@@ -299,6 +319,8 @@ class Workspace:
         ------
         InputError
             If the name, the spacing or the file cannot be used; names file, element and value.
+        ToolError
+            If netconvert cannot convert the map.
         WorkspaceError
             If the workspace cannot be written.
         """
@@ -310,23 +332,69 @@ class Workspace:
         final = self.root / "maps" / name
         sha256 = hashlib.sha256(content).hexdigest()
         built = _read_entry(final) if (final / "map.json").is_file() else None
-        if built and (built.sha256, built.conversion, built.info["builder"]) == (
-            sha256,
-            settings,
-            BUILDER,
-        ):
-            return built
+        same = built if built and built.sha256 == sha256 else None
+        if settings.converter is None:
+            settings = replace(settings, converter=same.converter if same else "odscen")
+        if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
+            return same
+        kept = same is not None and same.converter == settings.converter == "file"
+        given = same.given() if same and kept else None
+        return self._built(name, content, source.name, settings, given, progress)
+
+    def set_network(
+        self, name: str, source: Path, *, progress: ProgressCallback | None = None
+    ) -> MapEntry:
+        """Make a SUMO network from outside that of a map; the lane table is made anew by geometry.
+
+        Parameters
+        ----------
+        name
+            Of the map.
+        source
+            The ``.net.xml``: the map's own after changes in netedit, or any other of this map.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If the file cannot be read, is no network, or none of this map; the map stays as it is.
+        WorkspaceError
+            If the workspace cannot be written.
+        """
+        from odscen.workspace.converters import GivenNetwork
+
+        entry = self.map(name)
+        try:
+            given = GivenNetwork(source.read_bytes(), source.name)
+        except OSError as error:
+            raise InputError(error.strerror or str(error), file=str(source)) from error
+        settings = replace(entry.conversion, converter="file")
+        content = entry.path("xodr").read_bytes()
+        return self._built(name, content, str(entry.info["source"]), settings, given, progress)
+
+    def _built(
+        self,
+        name: str,
+        content: bytes,
+        file: str,
+        settings: ConversionSettings,
+        given: GivenNetwork | None,
+        progress: ProgressCallback | None,
+    ) -> MapEntry:
         from odscen.workspace.map_build import build_map
 
-        with _workspace_errors(self.root), in_file(source.name), new_folder(final) as folder:
+        final = self.root / "maps" / name
+        with _workspace_errors(self.root), in_file(file), new_folder(final) as folder:
             build_map(
                 content,
                 folder,
                 name=name,
-                file=source.name,
-                sha256=sha256,
+                file=file,
+                sha256=hashlib.sha256(content).hexdigest(),
                 settings=settings,
                 builder=BUILDER,
+                given=given,
                 progress=progress or (lambda _what, _share: None),
             )
             # Read here: another process that adds the same map may replace ours at any time.

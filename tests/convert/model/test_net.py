@@ -100,8 +100,19 @@ def test_edges_inside_junctions_come_first_as_sumo_wants_them() -> None:
 def test_a_connection_names_its_lanes_its_internal_lane_and_its_light() -> None:
     assert text(net()).find("connection").attrib == {
         "from": "a", "to": "b", "fromLane": "0", "toLane": "1", "via": ":j_0_0", "tl": "j",
-        "linkIndex": "3", "dir": "l", "state": "m",
+        "linkIndex": "3", "dir": "l", "state": "m", "speed": "13.89",
+        "shape": "110.0000,-5.0000 112.0000,-5.0000",
     }  # fmt: skip
+
+
+def test_edges_and_junctions_have_shapes_that_netconvert_keeps() -> None:
+    xml = text(net())
+    edge = xml.find("edge[@id='a']")
+    lane_width = float(edge.find("lane").get("width"))
+    border = f"100.0000,{lane_width / 2 - 5:.4f} 110.0000,{lane_width / 2 - 5:.4f}"
+    assert edge.get("shape") == border
+    assert edge.find("lane").get("customShape") == "1"
+    assert xml.find("edge[@id=':j_0']/lane").get("customShape") is None
 
 
 def test_the_last_letter_of_a_response_is_the_first_link() -> None:

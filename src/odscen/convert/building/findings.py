@@ -8,7 +8,8 @@ import numpy as np
 
 from odscen.base.ids import LaneKey
 from odscen.convert.building.one_way import one_way_ends
-from odscen.convert.model.access import BICYCLE_TYPES, is_used
+from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
+from odscen.convert.model.access import is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.convert.model.edge_plan import LEAST_WIDTH
 from odscen.convert.model.net import CROSSING
@@ -71,7 +72,7 @@ def findings(
         *_crosswalks(odr, crosswalks),
         *_signals(odr, table, net, control),
     ]
-    lengths = _lengths(odr, table, lanes)
+    lengths = lane_lengths(odr, table, lanes)
     figures = {
         **lengths,
         "connections": float(len(found.connections)),
@@ -84,23 +85,11 @@ def findings(
         "signals_guessed": float(len(control.guessed)),
         "roundabouts": float(len(net.roundabouts)),
     }
-    return Findings((*_kept(lengths, found), *entries), figures)
-
-
-def _kept(lengths: Mapping[str, float], found: PlannedConnections) -> Iterator[ReportEntry]:
-    """One line for each kind of element of which there are thousands."""
-    for name, length in lengths.items():
-        if name.endswith("_length") and length > 0.0:
-            covered = lengths[name.replace("_length", "_covered")]
-            kind, where = name.removesuffix("_length").split("_")
-            reason = f"{covered:.0f} of {length:.0f} m of {kind} lanes lie on their centre lines"
-            yield ReportEntry(
-                ElementOutcome.KEPT, "junctions" if where == "junction" else "roads", reason
-            )
+    kept = list(kept_lanes(lengths))
     if found.connections:
-        yield ReportEntry(
-            ElementOutcome.KEPT, "map", f"{len(found.connections)} connections between lanes"
-        )
+        reason = f"{len(found.connections)} connections between lanes"
+        kept.append(ReportEntry(ElementOutcome.KEPT, "map", reason))
+    return Findings((*kept, *entries), figures)
 
 
 def _place(road: str, section: int, lane: int) -> str:
@@ -117,17 +106,8 @@ def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
             yield ReportEntry(ElementOutcome.LOST, _place(*lane), reason)
 
 
-def _covered(lanes: LaneTable) -> dict[object, float]:
-    """Metres of s of each lane that have a SUMO lane."""
-    covered: dict[object, float] = {}
-    for span in lanes.spans:
-        key = lanes.lane_keys[span.lane]
-        covered[key] = covered.get(key, 0.0) + span.high - span.low
-    return covered
-
-
 def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
-    covered = _covered(lanes)
+    covered = covered_metres(lanes)
     for row, key in enumerate(table.lane_keys):
         kind = table.lane_type[row]
         if is_used(kind):
@@ -147,23 +127,6 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
-
-
-def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, float]:
-    covered = _covered(lanes)
-    figures: dict[str, float] = {}
-    for row, key in enumerate(table.lane_keys):
-        lane_type = table.lane_type[row]
-        if not is_used(lane_type):
-            continue
-        kind = "driving" if lane_type in DRIVABLE_TYPES else "walking"
-        kind = "biking" if lane_type in BICYCLE_TYPES else kind
-        where = "road" if odr.roads[key.road].junction is None else "junction"
-        length = float(table.lane_s1[row] - table.lane_s0[row])
-        for name, value in (("length", length), ("covered", covered.get(key, 0.0))):
-            full = f"{kind}_{where}_{name}"
-            figures[full] = figures.get(full, 0.0) + value
-    return {name: round(value, 2) for name, value in sorted(figures.items())}
 
 
 def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:

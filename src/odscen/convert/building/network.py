@@ -7,7 +7,7 @@ The network is written by odscen itself, lane by lane from the road model; why n
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,10 +17,11 @@ from odscen.convert.building.findings import findings
 from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.building.nodes import find_nodes, plain_ids
 from odscen.convert.building.roundabouts import find_roundabouts
+from odscen.convert.lane_table.sumo_network import SumoNetwork
 from odscen.convert.lane_table.table_build import build_table
 from odscen.convert.model.access import speed as lane_speed
 from odscen.convert.model.connections import find_connections
-from odscen.convert.model.conversion_report import ConversionReport, ElementOutcome, ReportEntry
+from odscen.convert.model.conversion_report import ConversionReport, parser_entries
 from odscen.convert.model.edge_plan import plan_edges
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from odscen.base.ids import SumoLaneId
     from odscen.convert.building.junctions import BuiltJunction
     from odscen.convert.building.nodes import Nodes
-    from odscen.convert.lane_table.table import LaneTable
     from odscen.convert.model.connections import PlannedConnection, PlannedConnections
     from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.model.walk_net import WalkNet
@@ -53,15 +53,6 @@ SIDEWAYS = 5.5
 
 LEAST_TURN_SPEED = 2.0
 """m/s."""
-
-
-@dataclass(frozen=True, slots=True)
-class SumoNetwork:
-    """A network: its file, how to cross over to it, and how it came about."""
-
-    net_xml: bytes
-    table: LaneTable
-    report: ConversionReport
 
 
 def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> SumoNetwork:
@@ -87,15 +78,8 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     net = builder.net()
     lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
     entries, figures = findings(odr, table, net, lanes, found, builder.control, crosswalks)
-    notes = [ReportEntry(ElementOutcome.REPAIRED, *_split(note)) for note in odr.notes]
-    report = ConversionReport.of([*notes, *entries], figures)
+    report = ConversionReport.of([*parser_entries(odr.notes), *entries], figures)
     return SumoNetwork(net.to_xml(), lanes, report)
-
-
-def _split(note: str) -> tuple[str, str]:
-    """Divide a note of the parser into element and reason."""
-    element, mark, reason = note.partition(": ")
-    return (element, reason) if mark else ("map", note)
 
 
 def _keeps_left(table: RoadTable) -> bool:

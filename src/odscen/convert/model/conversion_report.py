@@ -27,6 +27,16 @@ class ReportEntry(NamedTuple):
     reason: str
 
 
+def parser_entries(notes: Iterable[str]) -> list[ReportEntry]:
+    """Entries for the notes of the parser, ``element: reason`` each."""
+    entries = []
+    for note in notes:
+        element, mark, reason = note.partition(": ")
+        parts = (element, reason) if mark else ("map", note)
+        entries.append(ReportEntry(ElementOutcome.REPAIRED, *parts))
+    return entries
+
+
 @dataclass(frozen=True, slots=True)
 class ConversionReport:
     """All entries, and figures by name.

@@ -12,6 +12,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from odscen.convert.model.net_shapes import LinkPath, border
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -260,6 +262,23 @@ class Net:
             "walking_areas": functions.count(WALKING_AREA),
         }
 
+    def link_paths(self) -> dict[SumoLaneId, LinkPath]:
+        """How connections run through their junctions, by their first internal lane."""
+        of_edge = {edge.id: edge.lanes for edge in self.edges}
+        lanes = {lane.id: lane for own in of_edge.values() for lane in own}
+        beyond = {
+            of_edge[link.source][link.source_lane].id: link.via for link in self.links if link.via
+        }
+        found: dict[SumoLaneId, LinkPath] = {}
+        for first in (lanes[link.via] for link in self.links if link.via):
+            second = beyond.get(first.id)
+            if second is None:
+                found[first.id] = LinkPath(first.shape, first.speed, None)
+            else:
+                shape = np.concatenate([first.shape, lanes[second].shape[1:]])
+                found[first.id] = LinkPath(shape, first.speed, first.length)
+        return found
+
     def to_xml(self) -> bytes:
         """Text of ``net.net.xml``; the same network gives the same bytes."""
         x0, y0, x1, y1 = self.boundary
@@ -284,7 +303,11 @@ class Net:
             lines += self._junction(junction)
         for junction in self.inner_junctions:
             lines += self._junction(junction)
-        lines += [_link(link) for link in self.links]
+        paths = self.link_paths()
+        inside = {edge.id for edge in inner}
+        for link in self.links:
+            own = None if link.source in inside or link.via is None else paths[link.via]
+            lines.append(self._link(link, own))
         for nodes, edges in self.roundabouts:
             lines.append(f'    <roundabout nodes="{" ".join(nodes)}" edges="{" ".join(edges)}"/>')
         lines += ["</net>", ""]
@@ -296,7 +319,13 @@ class Net:
         rank = f' priority="{edge.priority}"' if edge.function == NORMAL else ""
         name = f' name="{_quoted(edge.name)}"' if edge.name else ""
         crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
-        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}>'
+        shape, custom = "", ' customShape="1"'
+        if edge.function == NORMAL:
+            inmost, side = edge.lanes[-1], -0.5 if self.lefthand else 0.5
+            shape = f' shape="{self._shape(border(inmost.shape, side * inmost.width))}"'
+        elif edge.function == INTERNAL:
+            custom = ""
+        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}{shape}>'
         for lane in edge.lanes:
             change = "" if lane.change_left else ' changeLeft="emergency"'
             change += "" if lane.change_right else ' changeRight="emergency"'
@@ -304,7 +333,7 @@ class Net:
             text = (
                 f'        <lane id="{lane.id}" index="{lane.index}"'
                 f' allow="{" ".join(sorted(lane.allowed))}"{change} speed="{lane.speed:.2f}"'
-                f' length="{lane.length:.{DIGITS}f}" width="{lane.width:.2f}"{kind}'
+                f' length="{lane.length:.{DIGITS}f}" width="{lane.width:.2f}"{kind}{custom}'
                 f' shape="{self._shape(lane.shape)}"'
             )
             if lane.xodr:
@@ -318,8 +347,9 @@ class Net:
     def _junction(self, junction: NetJunction) -> Iterator[str]:
         x, y = junction.place[0] + self.offset[0], junction.place[1] + self.offset[1]
         z = "" if self.flat else f' z="{junction.place[2]:.{DIGITS}f}"'
+        custom = "" if junction.type == INTERNAL else ' customShape="1"'
         text = (
-            f'    <junction id="{junction.id}" type="{junction.type}" x="{x:.{DIGITS}f}"'
+            f'    <junction id="{junction.id}" type="{junction.type}"{custom} x="{x:.{DIGITS}f}"'
             f' y="{y:.{DIGITS}f}"{z} incLanes="{" ".join(junction.incoming)}"'
             f' intLanes="{" ".join(junction.inner)}" shape="{self._shape(junction.outline)}"'
         )
@@ -337,20 +367,24 @@ class Net:
             yield f'        <param key="opendrive" value="{_quoted(junction.xodr)}"/>'
         yield "    </junction>"
 
+    def _link(self, link: NetLink, path: LinkPath | None) -> str:
+        via = f' via="{link.via}"' if link.via else ""
+        light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
+        kept = ""
+        if path is not None:
+            waits = "" if path.waits_at is None else f' contPos="{path.waits_at:.{DIGITS}f}"'
+            kept = f'{waits} speed="{path.speed:.2f}" shape="{self._shape(path.shape)}"'
+        return (
+            f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
+            f' toLane="{link.target_lane}"{via}{light} dir="{link.direction}" state="{link.state}"'
+            f"{kept}/>"
+        )
+
     def _shape(self, shape: FloatArray) -> str:
         points = shape + np.array([*self.offset, 0.0])
         if self.flat:
             return " ".join([f"{x:.4f},{y:.4f}" for x, y, _ in points.tolist()])
         return " ".join([f"{x:.4f},{y:.4f},{z:.4f}" for x, y, z in points.tolist()])
-
-
-def _link(link: NetLink) -> str:
-    via = f' via="{link.via}"' if link.via else ""
-    light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
-    return (
-        f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
-        f' toLane="{link.target_lane}"{via}{light} dir="{link.direction}" state="{link.state}"/>'
-    )
 
 
 def light_xml(light: TrafficLight) -> Iterator[str]:

@@ -74,7 +74,9 @@ def lane_table(
     import polars as pl
 
     col = pl.col
-    rows = _named(lanes, lengths)
+    by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
+    # SUMO leads teleported vehicles over the first lane of an edge, be it a sidewalk.
+    rows = _named(lanes, lengths).filter(col("lane").is_in(list(by_lane)))
     if emissions is not None:
         measured = _named(emissions, lengths).select(
             "begin", "lane", *(_in_units(name) for name in EMISSIONS)
@@ -84,7 +86,6 @@ def lane_table(
         {"lane": list((present or {}).keys()), "present": list((present or {}).values())},
         schema={"lane": pl.String, "present": pl.Int64},
     ).with_columns(begin=pl.lit(rows["begin"].min(), dtype=pl.Float64))
-    by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
     sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
     # Where hardly a vehicle moved there is no travel time, and SUMO's density has an upper bound;
     # all were stopped for the whole interval then, a whole number of vehicles.

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from odscen.base.arrays import Bounds
 from odscen.convert.model.conversion_report import ElementOutcome
+from odscen.convert.model.conversion_settings import ConverterName
 from odscen.lanegraph.map_statistics import MapStatistics
 from odscen.opendrive.objects import SignalKind
 from odscen.web.messages import Answer
@@ -51,6 +52,13 @@ class NetCounts(Answer):
     walking_areas: int
 
 
+class NetworkOrigin(Answer):
+    """Who wrote the SUMO network; ``source`` is the file of one that was brought in."""
+
+    converter: ConverterName
+    source: str | None
+
+
 class MapInfo(Answer):
     """A map of the catalogue; ``report_counts`` says how many elements had which outcome."""
 
@@ -61,6 +69,7 @@ class MapInfo(Answer):
     statistics: MapStatistics
     graph: GraphCounts
     sumo: NetCounts
+    network: NetworkOrigin
     report_counts: dict[ElementOutcome, int]
     preview: str
 

@@ -1,0 +1,53 @@
+"""The SUMO networks of a map: brought in from outside, and side by side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.convert.imported.network_changes import NetworkState, network_changes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from odscen.convert.imported.network_changes import NetworkChange
+    from odscen.workspace.store import MapEntry, Workspace
+
+
+class BroughtIn(NamedTuple):
+    """A map with a network from outside, and what is different from the one that it had."""
+
+    entry: MapEntry
+    changes: tuple[NetworkChange, ...]
+
+
+def bring_in(
+    workspace: Workspace,
+    name: str,
+    source: Path,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> BroughtIn:
+    """Make a SUMO network that was changed elsewhere that of a map.
+
+    Parameters
+    ----------
+    name
+        Of the map.
+    source
+        The ``.net.xml``.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such map.
+    InputError
+        If the file cannot be read, is no network, or none of this map; the map stays as it is.
+    """
+    before = _state(workspace.map(name))
+    entry = workspace.set_network(name, source, progress=progress)
+    return BroughtIn(entry, network_changes(before, _state(entry)))
+
+
+def _state(entry: MapEntry) -> NetworkState:
+    return NetworkState(entry.lane_table(), entry.fidelity())

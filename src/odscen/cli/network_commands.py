@@ -1,0 +1,177 @@
+"""``odscen maps network`` and ``odscen maps compare``: the SUMO networks of a map."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.base.errors import InputError
+from odscen.cli.console import (
+    JsonOption,
+    WorkspaceOption,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
+
+if TYPE_CHECKING:
+    from odscen.app.map_comparison import ConvertedMap, MapComparison
+    from odscen.app.networks import BroughtIn
+
+_SHOWN = 40
+"""Changes shown; JSON has all of them."""
+
+
+def network(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    source: Annotated[
+        Path | None,
+        typer.Option("--from", help="Network to bring in for the map.", metavar="FILE.net.xml"),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write the map's network there.", metavar="FILE.net.xml"),
+    ] = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show or write a map's SUMO network, or bring one in that was changed in netedit.
+
+    With --from the lane table is made anew by geometry, and what is different from the network
+    before is listed. The network stays that of the map until: odscen maps add --converter.
+    """
+    from odscen.app.networks import bring_in
+    from odscen.base.text_files import write_text
+    from odscen.workspace.store import Workspace
+
+    if source is not None and out is not None:
+        msg = "give either --from, to bring a network in, or --out, to write the map's"
+        raise InputError(msg)
+    store = Workspace.open(workspace)
+    if source is not None:
+        with progress(name) as step:
+            done = bring_in(store, name, source, progress=step)
+        _print_changes(done, as_json=as_json)
+        return
+    entry = store.map(name)
+    path = entry.path("net")
+    if out is not None:
+        write_text(out, path.read_text(encoding="utf-8"))
+        log(f"Wrote {out}")
+    if as_json:
+        print_json({"name": name, "file": str(out or path), **entry.info["network"]})
+    elif out is None:
+        made = entry.info["network"]
+        log(f"{name}: network by {made['source'] or made['converter']}")
+        typer.echo(str(path))
+
+
+def _print_changes(done: BroughtIn, *, as_json: bool) -> None:
+    entry, changes = done
+    counts = Counter(change.what for change in changes)
+    if as_json:
+        print_json(
+            {
+                "name": entry.name,
+                "network": entry.info["network"],
+                "counts": dict(counts),
+                "changes": [change._asdict() for change in changes],
+            }
+        )
+        return
+    said = ", ".join(f"{count} x {what}" for what, count in counts.items())
+    log(f"{entry.name}: network {entry.info['network']['source']}; {said or 'no difference'}")
+    if changes:
+        print_table("", ("what", "element", "detail"), [tuple(one) for one in changes[:_SHOWN]])
+    if len(changes) > _SHOWN:
+        log(f"and {len(changes) - _SHOWN} more; --json lists all")
+
+
+def compare_networks(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    levels: Annotated[
+        str,
+        typer.Option(
+            help="Trips per hour and km of lane, with commas between; empty for no runs.",
+            metavar="N,...",
+        ),
+    ] = "100",
+    seeds: Annotated[
+        str, typer.Option(help="Random seeds, with commas between.", metavar="N,...")
+    ] = "1",
+    duration: Annotated[
+        float, typer.Option(help="Seconds in which vehicles depart; the run is twice as long.")
+    ] = 900.0,
+    jobs: Annotated[int, typer.Option(help="Runs at a time.", min=1, max=256)] = 1,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Put both converters side by side on a map: fidelity, losses, and what the networks carry."""
+    from odscen.app.map_comparison import ComparisonSettings, compare_converters
+    from odscen.workspace.store import Workspace
+
+    settings = ComparisonSettings(
+        levels=_numbers("levels", levels),
+        seeds=tuple(int(seed) for seed in _numbers("seeds", seeds)),
+        duration=duration,
+    )
+    with progress(name) as step:
+        found = compare_converters(
+            Workspace.open(workspace), name, settings=settings, processes=jobs, progress=step
+        )
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        _print_comparison(found)
+
+
+def _numbers(option: str, text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError as error:
+        msg = f"--{option} takes numbers with commas between, not {text!r}"
+        raise InputError(msg) from error
+
+
+def _print_comparison(found: MapComparison) -> None:
+    made = [one for one in found.networks if one.entry is not None]
+    for one in found.networks:
+        if one.refused:
+            log(f"{one.converter}: {one.refused}")
+    columns = ("measure", *(one.converter for one in made))
+    print_table(found.name, columns, _measures(made))
+    if found.capacity:
+        rows = [
+            (
+                f"{row.level:g}",
+                what,
+                *(round(getattr(row.networks[one.converter], what), 1) for one in made),
+            )
+            for row in found.capacity
+            for what in ("planned", "arrived", "delay", "teleported", "collided")
+        ]
+        head = ("per hour and km", "trips; delay in s", *columns[1:])
+        print_table(f"the same trips, {found.kilometres:.2f} km of lanes", head, rows)
+
+
+def _measures(made: list[ConvertedMap]) -> list[tuple[str, ...]]:
+    """Rows of the table of fidelity and sizes."""
+    verdicts = [one.fidelity.verdicts for one in made if one.fidelity is not None]
+    rows = [
+        (of_all[0].name, *(f"{v.value:.4g}{'' if v.ok else ' !'}" for v in of_all))
+        for of_all in zip(*verdicts, strict=True)
+    ]
+    infos = [one.entry.info for one in made if one.entry is not None]
+    rows += [
+        (f"{key} in SUMO", *(str(info["sumo"][key]) for info in infos))
+        for key in ("edges", "lanes", "junctions", "crossings", "tl_logics")
+    ]
+    rows += [
+        (f"import report, {key}", *(str(info["report"]["counts"][key]) for info in infos))
+        for key in ("lost", "guessed")
+    ]
+    return rows

@@ -1,0 +1,1 @@
+"""SUMO networks that odscen has not written itself, related to their map by geometry."""

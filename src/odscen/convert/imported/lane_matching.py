@@ -1,0 +1,284 @@
+"""Normal SUMO lanes found on OpenDRIVE lanes, by geometry alone.
+
+Each lane of the network is sampled; a sample belongs to the nearest OpenDRIVE lane of its kind with
+the same direction. Consecutive samples on one lane make a lane mapping interval.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from odscen.convert.imported.lane_samples import middle_points
+from odscen.convert.lane_table.mapping_intervals import MappingInterval, monotone
+
+if TYPE_CHECKING:
+    from odscen.base.arrays import FloatArray, IntArray
+    from odscen.convert.imported.lane_samples import LaneSamples, ShapeSamples
+    from odscen.opendrive.lanes import RoadTable
+
+REACH = 2.0
+"""Metres: a SUMO lane farther than this beside an OpenDRIVE lane is not that lane."""
+SAME_DIRECTION = 0.7
+"""Cosine: directions up to 45 degrees apart count as the same."""
+FLATTEN = 0.5
+"""Share of heights that counts: decks are told apart, superelevation (SUMO has none) is not."""
+NEIGHBOURS = 10
+_AT_ONCE = 20_000
+"""Places: keeps the memory that finding neighbours takes below 20 MB."""
+
+_TIP = 0.5
+"""Metres: shorter intervals at the ends of a SUMO lane may be mere touches of another lane."""
+_STRAY = 3
+"""Samples: a shorter run on another lane, between two runs on the same lane, is a stray."""
+
+
+class LaneMatch(NamedTuple):
+    """Places on OpenDRIVE lanes; ``lane`` is a position in ``LaneSamples.rows``, -1 for none."""
+
+    lane: IntArray
+    s: FloatArray
+    deviation: FloatArray
+
+
+def match(
+    places: ShapeSamples,
+    lanes: LaneSamples,
+    table: RoadTable,
+    *,
+    penalty: FloatArray,
+    either_way: bool = False,
+) -> LaneMatch:
+    """Find the nearest lane of the same direction for each place.
+
+    Parameters
+    ----------
+    penalty
+        Metres by which each lane must be nearer than others to be taken.
+    either_way
+        Whether lanes of opposite direction count too (sidewalks have none).
+    """
+    count = len(places.owner)
+    if not count or not len(lanes.owner):
+        return LaneMatch(np.full(count, -1, dtype=np.int64), np.zeros(count), np.zeros(count))
+    nearest = _NearestLane(lanes, penalty, either_way=either_way).nearest(places.xyz, places.hdg)
+    found = nearest >= 0
+    base = np.maximum(nearest, 0)
+    owner = lanes.owner[base]
+    rows = lanes.rows[owner]
+    rate = _s_per_metre(lanes)[base]
+    s = lanes.s[base] + _along(places.xyz, lanes.xyz[base], lanes.hdg[base]) * rate
+    low, high = table.lane_s0[rows], table.lane_s1[rows]
+    deviation = np.zeros(count)
+    for _ in range(2):
+        s = np.clip(s, low, high)
+        xyz, hdg = middle_points(table, rows, s, roadside=lanes.roadside[owner])
+        hdg = hdg + np.where(table.lane_forward[rows], 0.0, np.pi)
+        ahead = _along(places.xyz, xyz, hdg)
+        delta = places.xyz - xyz
+        deviation = np.hypot(delta[:, 0], delta[:, 1])
+        s = s + ahead * rate
+    found &= deviation <= REACH + 1.0
+    return LaneMatch(np.where(found, owner, -1), np.clip(s, low, high), deviation)
+
+
+class _NearestLane:
+    """Finds the samples whose lanes pass closest to places."""
+
+    def __init__(self, lanes: LaneSamples, penalty: FloatArray, *, either_way: bool) -> None:
+        self._lanes = lanes
+        self._penalty = penalty
+        self._either_way = either_way
+        self._squeeze = np.array([1.0, 1.0, FLATTEN])
+        self._tree = cKDTree(lanes.xyz * self._squeeze)
+        self._first = np.zeros(len(lanes.owner), dtype=np.bool_)
+        self._first[lanes.first[:-1]] = True
+        self._last = np.zeros(len(lanes.owner), dtype=np.bool_)
+        self._last[lanes.first[1:] - 1] = True
+        steps = np.diff(lanes.first) - 1
+        self._step = np.array([lanes.length(lane) for lane in range(len(steps))]) / steps
+        self._reach = REACH + float(self._step.max())
+
+    def nearest(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
+        """Index of the best sample for each place, -1 for none."""
+        found = [
+            self._some(xyz[start : start + _AT_ONCE], hdg[start : start + _AT_ONCE])
+            for start in range(0, len(xyz), _AT_ONCE)
+        ]
+        return np.concatenate(found)
+
+    def _some(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
+        lanes = self._lanes
+        neighbours = min(NEIGHBOURS, len(lanes.owner))
+        _, index = self._tree.query(
+            xyz * self._squeeze, k=neighbours, distance_upper_bound=self._reach, workers=1
+        )
+        index = np.asarray(index, dtype=np.int64).reshape(len(xyz), neighbours)
+        missing = index >= len(lanes.owner)
+        index = np.where(missing, 0, index)
+        delta = xyz[:, None, :] - lanes.xyz[index]
+        cos, sin = np.cos(lanes.hdg[index]), np.sin(lanes.hdg[index])
+        across = np.abs(delta[..., 1] * cos - delta[..., 0] * sin)
+        beyond = self._beyond(delta[..., 0] * cos + delta[..., 1] * sin, index)
+        agree = np.cos(hdg[:, None] - lanes.hdg[index])
+        if self._either_way:
+            agree = np.abs(agree)
+        cost = np.hypot(across, beyond) + FLATTEN * np.abs(delta[..., 2])
+        cost = np.where(missing | (agree < SAME_DIRECTION) | (across > REACH), np.inf, cost)
+        best = np.argmin(cost + self._penalty[lanes.owner[index]], axis=1)
+        rows = np.arange(len(best))
+        return np.where(np.isfinite(cost[rows, best]), index[rows, best], -1)
+
+    def _beyond(self, along: FloatArray, index: IntArray) -> FloatArray:
+        """Metres that places, ``along`` metres ahead of samples, lie past the ends of the lane."""
+        outside = (self._last[index] & (along > 0.0)) | (self._first[index] & (along < 0.0))
+        # Elsewhere a sample half a step further on is nearer; a little more allows for curves.
+        step = self._step[self._lanes.owner[index]]
+        past: FloatArray = np.abs(along) - np.where(outside, 0.0, 0.6 * step)
+        return np.maximum(past, 0.0)
+
+
+def _along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:
+    delta = places - origin
+    along: FloatArray = delta[:, 0] * np.cos(hdg) + delta[:, 1] * np.sin(hdg)
+    return along
+
+
+def _s_per_metre(lanes: LaneSamples) -> FloatArray:
+    """Change of s per metre in driving direction, at each sample."""
+    ds, da = np.diff(lanes.s), np.diff(lanes.arc)
+    joints = lanes.first[1:-1] - 1
+    da[joints] = 0.0
+    rate = np.divide(ds, da, out=np.zeros_like(ds), where=da > 1e-6)
+    after, before = np.append(rate, 0.0), np.insert(rate, 0, 0.0)
+    mean: FloatArray = np.where((after != 0) & (before != 0), 0.5, 1.0) * (after + before)
+    return mean
+
+
+def intervals_of(
+    places: ShapeSamples,
+    found: LaneMatch,
+    lanes: LaneSamples,
+    table: RoadTable,
+    *,
+    sumo_rows: IntArray,
+    lengths: FloatArray,
+) -> list[MappingInterval]:
+    """Join consecutive places on one OpenDRIVE lane to intervals.
+
+    Parameters
+    ----------
+    sumo_rows
+        Row of the SUMO lane of each shape that was sampled.
+    lengths
+        Length attribute of those lanes, metres: what their positions run to.
+    """
+    scale = np.divide(lengths, places.length, out=np.ones_like(lengths), where=places.length > 1e-9)
+    intervals: list[MappingInterval] = []
+    for shape, row in enumerate(sumo_rows):
+        part = slice(int(places.first[shape]), int(places.first[shape + 1]))
+        pos = np.minimum(places.arc[part] * scale[shape], lengths[shape])
+        runs = _runs(found.lane[part])
+        own = [
+            _LaneRun(lane, pos[a:b], found.s[part][a:b], found.deviation[part][a:b])
+            for lane, a, b in runs
+        ]
+        own = _without_tips(_meeting(own, lanes, table), lanes)
+        for run in own:
+            interval = MappingInterval(run.lane, int(row), run.pos, run.s, run.deviation)
+            kept = monotone(interval, growing=_growing(run, lanes, table))
+            if kept is not None:
+                intervals.append(kept)
+    return intervals
+
+
+class _LaneRun(NamedTuple):
+    lane: int
+    pos: FloatArray
+    s: FloatArray
+    deviation: FloatArray
+
+
+def _runs(lane: IntArray) -> list[tuple[int, int, int]]:
+    """Stretches of equal, found lanes as (lane, first, end), short strays removed."""
+    cuts = np.flatnonzero(np.diff(lane)) + 1
+    bounds = [0, *cuts.tolist(), len(lane)]
+    runs = [(int(lane[a]), a, b) for a, b in pairwise(bounds)]
+    runs = [run for run in runs if run[0] >= 0]
+    kept: list[tuple[int, int, int]] = []
+    for position, (row, a, b) in enumerate(runs):
+        before = kept[-1] if kept else None
+        after = runs[position + 1] if position + 1 < len(runs) else None
+        stray = b - a < _STRAY and before and after and before[0] == after[0] != row
+        if stray:
+            continue
+        if before and before[0] == row:
+            kept[-1] = (row, before[1], b)
+        else:
+            kept.append((row, a, b))
+    return kept
+
+
+def _meeting(runs: list[_LaneRun], lanes: LaneSamples, table: RoadTable) -> list[_LaneRun]:
+    """Extend consecutive runs to the ends of their lanes, where the next one begins.
+
+    Between the last sample on one lane and the first on the next lie the end of the one and the
+    start of the other; the position where they meet divides the step in the ratio of the two.
+    """
+    made = list(runs)
+    for i in range(len(made) - 1):
+        one, two = made[i], made[i + 1]
+        _, exit_s = _ends(one, lanes, table)
+        entry_s, _ = _ends(two, lanes, table)
+        rest, start = abs(exit_s - one.s[-1]), abs(entry_s - two.s[0])
+        step = two.pos[0] - one.pos[-1]
+        if rest + start > 3.0 * step + 0.5 or step <= 0:
+            continue
+        share = 0.5 if rest + start < 1e-9 else rest / (rest + start)
+        border = one.pos[-1] + share * step
+        made[i] = _LaneRun(
+            one.lane,
+            np.append(one.pos, border),
+            np.append(one.s, exit_s),
+            np.append(one.deviation, one.deviation[-1]),
+        )
+        made[i + 1] = _LaneRun(
+            two.lane,
+            np.insert(two.pos, 0, border),
+            np.insert(two.s, 0, entry_s),
+            np.insert(two.deviation, 0, two.deviation[0]),
+        )
+    return made
+
+
+def _without_tips(runs: list[_LaneRun], lanes: LaneSamples) -> list[_LaneRun]:
+    """Drop what a SUMO lane touches of the lanes before and after its own at its very ends.
+
+    Roads overlap a little where they meet; a run that covers most of a short lane stays.
+    """
+    kept = list(runs)
+    for end in (0, -1):
+        if len(kept) < 2:
+            break
+        run = kept[end]
+        extent = float(run.pos[-1] - run.pos[0])
+        if extent < _TIP and extent < 0.5 * lanes.length(run.lane):
+            kept.pop(end)
+    return kept
+
+
+def _growing(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> bool:
+    """Whether s grows along a run; a run of one sample follows the traffic."""
+    if len(run.s) > 1 and run.s[-1] != run.s[0]:
+        return bool(run.s[-1] > run.s[0])
+    return bool(table.lane_forward[lanes.rows[run.lane]])
+
+
+def _ends(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> tuple[float, float]:
+    """Values of s at which a run would enter and leave its lane."""
+    row = int(lanes.rows[run.lane])
+    low, high = float(table.lane_s0[row]), float(table.lane_s1[row])
+    return (low, high) if _growing(run, lanes, table) else (high, low)
