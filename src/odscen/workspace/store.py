@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.map_statistics import MapStatistics
     from odscen.workspace.asset_catalogue import Assets
 
-BUILDER = "4"
+BUILDER = "5"
 """Raised whenever what a map folder contains changes; older folders are then rebuilt."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"

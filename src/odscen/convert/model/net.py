@@ -91,7 +91,11 @@ class NetEdge:
 
 @dataclass(frozen=True, slots=True)
 class NetLink:
-    """One ``<connection>`` between lanes given by edge and index."""
+    """One ``<connection>`` between lanes given by edge and index.
+
+    ``visibility`` is how far before the link, m, one sees whom one has to give way to; ``None`` is
+    SUMO's 4.5 m.
+    """
 
     source: SumoEdgeId
     target: SumoEdgeId
@@ -102,6 +106,7 @@ class NetLink:
     state: str = "M"
     light: str = ""
     light_index: int = -1
+    visibility: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,9 +297,11 @@ class Net:
 def _link(link: NetLink) -> str:
     via = f' via="{link.via}"' if link.via else ""
     light = f' tl="{link.light}" linkIndex="{link.light_index}"' if link.light else ""
+    sight = "" if link.visibility is None else f' visibility="{link.visibility:g}"'
     return (
         f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
-        f' toLane="{link.target_lane}"{via}{light} dir="{link.direction}" state="{link.state}"/>'
+        f' toLane="{link.target_lane}"{via}{light}{sight} dir="{link.direction}"'
+        f' state="{link.state}"/>'
     )
 
 
