@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.checks.signal_timing import Light
-    from odscen.scenario.document.scenario_document import Control, Simulation
+    from odscen.scenario.document.scenario_document import Control, Drivers, Simulation
 
 
 def new_scenario(
@@ -96,6 +96,12 @@ def set_environment(
         fields["affects_driving"] = affects_driving
     environment: Environment = changed_part(scenario.environment, fields)
     return with_fields(scenario, environment=environment)
+
+
+@edit("Change how drivers drive")
+def set_drivers(scenario: Scenario, **fields: Annotated[Any, Drivers]) -> Scenario:
+    """Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`."""
+    return with_fields(scenario, drivers=changed_part(scenario.drivers, fields))
 
 
 @edit("Traffic lights {control}")
