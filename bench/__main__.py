@@ -10,6 +10,7 @@ ALL = (
     "lane_graph",
     "maps_add",
     "capacity",
+    "saturation",
     "recording",
     "long_run",
     "live_view",

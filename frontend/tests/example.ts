@@ -35,6 +35,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   seed: 0,
   roi,
   environment: { preset: "ClearNoon", parameters: {}, affects_driving: true },
+  drivers: { saturation_flow: null, headway: null, gap_acceptance: 0.3, lane_change_eagerness: 1 },
   actors,
   flows,
   demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },

@@ -8,6 +8,7 @@ from odscen.scenario.document.scenario_document import (
     Background,
     Counts,
     Demand,
+    Drivers,
     Environment,
     Flow,
     MapReference,
@@ -64,6 +65,13 @@ timings = st.builds(
     control=st.none() | controls,
     offset=st.floats(0, 3600),
     green=st.lists(st.floats(0, 3600), max_size=3).map(tuple),
+)
+manners = {
+    "gap_acceptance": st.floats(0, 1),
+    "lane_change_eagerness": st.floats(0, 10),
+}
+drivers = st.builds(Drivers, headway=st.none() | st.floats(0.5, 5), **manners) | st.builds(
+    Drivers, saturation_flow=st.floats(800, 2500), **manners
 )
 signals = st.builds(Signals, control=controls, junctions=st.lists(timings, max_size=3).map(tuple))
 identifiers = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True)
@@ -126,6 +134,7 @@ scenarios = st.builds(
     seed=st.integers(0, 2**31 - 1),
     roi=st.lists(labels, max_size=4).map(tuple),
     environment=environments,
+    drivers=drivers,
     actors=st.lists(actors, max_size=4).map(tuple),
     flows=st.lists(flows, max_size=3).map(tuple),
     signals=signals,

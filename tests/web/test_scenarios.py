@@ -47,6 +47,7 @@ ALL = (
     ("change_flow", {"flow": "flow-1", "end": 900}),
     ("set_environment", {"preset": "HardRainNoon"}),
     ("set_environment", {"parameters": {"wetness": 20}, "affects_driving": False}),
+    ("set_drivers", {"saturation_flow": 1900, "gap_acceptance": 0.5}),
     ("set_signal_control", {"control": "actuated"}),
     ("set_timing", {"junction": "10001", "offset": 5}),
     ("clear_timing", {"junction": "10001"}),

@@ -1542,6 +1542,32 @@ export interface components {
             buildings: components["schemas"]["PackedLines"];
         };
         /**
+         * Drivers
+         * @description What drivers of the style ``normal`` do; the other styles are set about it.
+         *
+         *     ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
+         *     straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
+         *     time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
+         *     gaps in which nobody else has to brake, and 1 for those who take any that is safe.
+         *     ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+         */
+        Drivers: {
+            /** Saturation Flow */
+            saturation_flow: number | null;
+            /** Headway */
+            headway: number | null;
+            /**
+             * Gap Acceptance
+             * @default 0.3
+             */
+            gap_acceptance: number;
+            /**
+             * Lane Change Eagerness
+             * @default 1
+             */
+            lane_change_eagerness: number;
+        };
+        /**
          * EdgeColumns
          * @description Edges between nodes; ``relation`` 0 is successor, 1 left, 2 right.
          */
@@ -1563,7 +1589,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -2982,6 +3008,13 @@ export interface components {
              */
             environment: components["schemas"]["Environment"];
             /**
+             * @default {
+             *       "gap_acceptance": 0.3,
+             *       "lane_change_eagerness": 1
+             *     }
+             */
+            drivers: components["schemas"]["Drivers"];
+            /**
              * Actors
              * @default []
              */
@@ -3167,6 +3200,25 @@ export interface components {
             ][];
             /** Counts */
             counts: string;
+        };
+        /**
+         * SetDriversEdit
+         * @description Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`.
+         */
+        SetDriversEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_drivers";
+            /** Saturation Flow */
+            saturation_flow?: number | null;
+            /** Headway */
+            headway?: number | null;
+            /** Gap Acceptance */
+            gap_acceptance?: number;
+            /** Lane Change Eagerness */
+            lane_change_eagerness?: number;
         };
         /**
          * SetEgoEdit
@@ -4007,6 +4059,38 @@ export interface components {
             background?: components["schemas"]["Background-File"][];
         };
         /**
+         * Drivers
+         * @description What drivers of the style ``normal`` do; the other styles are set about it.
+         *
+         *     ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
+         *     straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
+         *     time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
+         *     gaps in which nobody else has to brake, and 1 for those who take any that is safe.
+         *     ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+         */
+        "Drivers-File": {
+            /**
+             * Saturation Flow
+             * @default null
+             */
+            saturation_flow?: number | null;
+            /**
+             * Headway
+             * @default null
+             */
+            headway?: number | null;
+            /**
+             * Gap Acceptance
+             * @default 0.3
+             */
+            gap_acceptance?: number;
+            /**
+             * Lane Change Eagerness
+             * @default 1
+             */
+            lane_change_eagerness?: number;
+        };
+        /**
          * Environment
          * @description Weather and time of day: a preset of the asset catalogue and single values that differ.
          */
@@ -4392,6 +4476,15 @@ export interface components {
              *     }
              */
             environment?: components["schemas"]["Environment-File"];
+            /**
+             * @default {
+             *       "saturation_flow": null,
+             *       "headway": null,
+             *       "gap_acceptance": 0.3,
+             *       "lane_change_eagerness": 1
+             *     }
+             */
+            drivers?: components["schemas"]["Drivers-File"];
             /**
              * Actors
              * @default []

@@ -19,7 +19,7 @@ from odscen.base.frames import XodrPose
 from odscen.lanegraph.graphs import Relation
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.departures import road_users
-from odscen.sumo.realize.driving import KINDS, STYLES, TWO_WHEELER_MIN_GAP
+from odscen.sumo.realize.driving import HEADWAY, KINDS, STYLES, TWO_WHEELER_MIN_GAP
 from odscen.sumo.realize.realization import UNKNOWN_LIMIT
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def _gap(style: DrivingStyle, category: Category) -> float:
     """Metres for ``distance_to_leading_vehicle``: the style's gap and some of its headway."""
     manner = STYLES[style]
     share = TWO_WHEELER_MIN_GAP if category in (Category.MOTORCYCLE, Category.BICYCLE) else 1.0
-    return round(manner.min_gap * share * manner.headway, 2)
+    return round(manner.min_gap * share * manner.headway * HEADWAY, 2)
 
 
 def _points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:

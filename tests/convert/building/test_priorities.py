@@ -26,6 +26,25 @@ def stripped(*what: re.Pattern[str]) -> Converted:
     return of_model(parse(text))
 
 
+def seen_from(name: str) -> dict[tuple[str, str], str | None]:
+    """Metres before the line from which one sees, by edge and direction, of given connections."""
+    links = of_model(parse(named(name).read_bytes())).xml.iter("connection")
+    return {
+        (link.get("from", ""), link.get("dir", "")): link.get("visibility")
+        for link in links
+        if link.get("via") and not link.get("from", "").startswith(":")
+    }
+
+
+def test_at_a_yield_sign_one_sees_others_late_and_who_only_merges_earlier() -> None:
+    seen = seen_from("t_junction_signs")
+    assert (seen["5.1.f", "l"], seen["5.1.f", "r"]) == ("0.3", "1.25")
+    assert {seen["3.1.f", "l"], seen["1.0.b", "s"], seen["1.0.b", "l"]} == {None}, "SUMO's own"
+    entries = seen_from("roundabout")
+    assert entries["1.1.f", "r"] == "1.25"
+    assert {entries["5.0.f", "l"], entries["5.0.f", "r"]} == {None}
+
+
 def _last(made: Converted, link: Element) -> str:
     """The last internal lane of a connection: who turns across waits between two of them."""
     via = link.get("via", "")

@@ -169,6 +169,15 @@ def test_weather_is_looked_up_in_the_catalogue() -> None:
     assert codes(actor(), environment=odd) == ["unknown_parameter"]
 
 
+def test_a_headway_shorter_than_a_step_is_an_error_with_both_numbers() -> None:
+    short = {"drivers": {"headway": 0.6}, "simulation": {"step_length": 1.0}}
+    (problem,) = problems(actor(), **short)
+    assert (problem.code, problem.where) == ("headway_below_step", "drivers.headway")
+    assert "0.6 s" in problem.message
+    assert "1 s" in problem.message
+    assert "headway_below_step" not in codes(actor(), drivers={"headway": 0.6})
+
+
 def test_all_problems_come_at_once() -> None:
     found = problems(
         actor("9.9.9.9", speed=90, ego=True), actor("1.0.1.49", id="b", ego=True), roi=(*WHOLE, "x")

@@ -8,7 +8,7 @@ from hypothesis import given
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.json_form import dumps, loads, schema
-from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
+from odscen.scenario.document.scenario_document import Actor, Drivers, MapReference, Scenario
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.forms.any_form import read_any
 from tests.scenario.strategies import scenarios
@@ -39,6 +39,21 @@ def test_signals_are_written_only_where_they_are_not_the_maps_and_without_defaul
     text = dumps(plain.model_copy(update={"signals": Signals(junctions=(timing,))}))
     line = '  "signals": {"junctions": [{"junction": "54", "green": [20.0, 7.0]}]},'
     assert line in text.splitlines()
+
+
+def test_drivers_are_written_only_where_they_are_not_the_usual_ones() -> None:
+    plain = Scenario(name="one", map=MAP, roi=("r1",))
+    assert "drivers" not in dumps(plain)
+    text = dumps(plain.model_copy(update={"drivers": Drivers(saturation_flow=1900)}))
+    assert '  "drivers": {"saturation_flow": 1900.0},' in text.splitlines()
+
+
+def test_headway_and_saturation_flow_are_not_both_given() -> None:
+    text = dumps(Scenario(name="one", map=MAP, roi=("r1",), drivers=Drivers(headway=1.5)))
+    both = text.replace('"headway": 1.5', '"headway": 1.5, "saturation_flow": 1900')
+    with pytest.raises(ScenarioError) as caught:
+        loads(both, file="x.json")
+    assert "give one of saturation_flow and headway" in "".join(caught.value.problems)
 
 
 def test_all_problems_are_reported_with_their_places() -> None:

@@ -13,7 +13,7 @@ from odscen.scenario.document.scenario_document import Actor, Flow, MapReference
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import from_graph, from_graphml, to_graph, to_graphml
 from tests.graphs import SHA256, fork
-from tests.scenario.strategies import actors, environments, flows, labels, names, signals
+from tests.scenario.strategies import actors, drivers, environments, flows, labels, names, signals
 
 GRAPH = fork()
 WHOLE = ("r1", "j9", "r2", "r3")
@@ -42,6 +42,7 @@ def placed(draw: st.DrawFn) -> Scenario:
         environment=draw(environments),
         actors=tuple(one for one in ones if isinstance(one, Actor)),
         flows=tuple(one for one in ones if isinstance(one, Flow)),
+        drivers=draw(drivers),
         signals=draw(signals),
     )
 

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.saturation import HCM_SATURATION, saturation_flow, straight_road
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.scenario.document.scenario_document import Actor
+from odscen.scenario.document.scenario_document import Actor, Drivers
 from odscen.sumo.realize.driving import KINDS, STYLES, Driver, draw_factor, driver, number
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import (
@@ -32,14 +33,45 @@ def made(category: Category = Category.CAR, **changes: Any) -> Driver:
     return driver(user, DEFAULT_BODY[category], **{**values, **changes})
 
 
-def test_a_normal_car_in_good_weather_is_sumos_own() -> None:
+def test_a_normal_car_in_good_weather_has_the_documented_parameters() -> None:
     attributes = dict(made().attributes)
     assert attributes == {
         "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
         "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
-        "emergencyDecel": "9", "tau": "1", "sigma": "0.5", "minGap": "2.5",
+        "emergencyDecel": "9", "tau": "1.1", "sigma": "0", "minGap": "2", "impatience": "0.3",
         "emissionClass": "HBEFA4/PC_petrol_Euro-4",
     }  # fmt: skip
+
+
+def test_what_a_scenario_says_of_its_drivers_is_set_for_all_styles() -> None:
+    drivers = Drivers(headway=2.0, gap_acceptance=0.4, lane_change_eagerness=0.5)
+    normal = dict(made(drivers=drivers).attributes)
+    assert (normal["tau"], normal["impatience"], normal["lcSpeedGain"]) == ("2", "0.4", "0.5")
+    sporty = dict(made(drivers=drivers, style="sporty").attributes)
+    assert (sporty["tau"], sporty["impatience"]) == ("1.8", "0.6")
+    cautious = dict(made(drivers=drivers, style="cautious").attributes)
+    assert (cautious["tau"], cautious["impatience"]) == ("3", "0.1")
+    assert "impatience" not in dict(made(style="cautious").attributes)
+
+
+def test_nobody_keeps_a_shorter_headway_than_a_step() -> None:
+    assert dict(made(drivers=Drivers(headway=0.5)).attributes)["tau"] == "0.5"
+    assert dict(made(drivers=Drivers(headway=0.5), step_length=1.0).attributes)["tau"] == "1"
+    assert dict(made(style="sporty", step_length=1.0).attributes)["tau"] == "1"
+
+
+def test_the_step_length_does_not_change_the_saturation_flow(tmp_path: Path) -> None:
+    """Vehicles per hour and lane that leave a queue on a straight approach with 50 km/h."""
+    net = tmp_path / "straight.net.xml"
+    straight_road(net)
+
+    def measured(step: str, drivers: Drivers) -> float:
+        return saturation_flow(tmp_path, net, "in out", "in_0", step, 1, drivers)
+
+    short, long = (measured(step, Drivers()) for step in ("0.2", "1"))
+    assert short == pytest.approx(long, rel=0.02)
+    assert short == pytest.approx(HCM_SATURATION, rel=0.15)
+    assert measured("0.5", Drivers(saturation_flow=1600)) == pytest.approx(1600, rel=0.03)
 
 
 @pytest.mark.parametrize("category", Category)

@@ -23,7 +23,14 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import Rules, Sign, find_conflicts, in_turn, requests
+from odscen.convert.model.right_of_way import (
+    Rules,
+    Sign,
+    find_conflicts,
+    in_turn,
+    requests,
+    sight_at_yield,
+)
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
 
@@ -159,7 +166,8 @@ def build_junction(
         side=-1.0 if around.lefthand else 1.0,
         lit=signalled,
     )
-    inside = _Inside(name, passages, states, rows, places)
+    sights = [sight_at_yield(m, r, movements) for m, r in zip(movements, rights, strict=False)]
+    inside = _Inside(name, passages, list(zip(states, sights, strict=True)), rows, places)
     walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
     kind = "traffic_light" if signalled else "allway_stop" if all_stop else ""
@@ -246,7 +254,7 @@ class _Inside:
         self,
         name: str,
         passages: Sequence[Passage],
-        states: Sequence[str],
+        states: Sequence[tuple[str, float | None]],
         rows: Mapping[int, int],
         places: Mapping[int, float],
     ) -> None:
@@ -273,7 +281,7 @@ class _Inside:
     def _connect(
         self,
         passage: Passage,
-        state: str,
+        right: tuple[str, float | None],
         light: tuple[str, int],
         parts: Sequence[tuple[SumoEdgeId, NetLane]],
     ) -> None:
@@ -281,11 +289,9 @@ class _Inside:
         movement, turn = passage.movement, direction(passage.movement.turn)
         (source, source_lane), (edge, target_lane) = movement.source, movement.target
         target = SumoEdgeId(edge)
-        self.links.append(
-            NetLink(
-                SumoEdgeId(source), target, source_lane, target_lane, first.id, turn, state, *light
-            )
-        )
+        ends = SumoEdgeId(source), target, source_lane, target_lane
+        state, sight = right
+        self.links.append(NetLink(*ends, first.id, turn, state, *light, sight))
         for (inner, lane), (_, after) in zip(parts, (*parts[1:], ("", None)), strict=True):
             self.edges.append(NetEdge(inner, INTERNAL, (lane,)))
             onwards, way = (after.id, "m") if after else (None, "M")

@@ -96,7 +96,11 @@ class NetEdge:
 
 @dataclass(frozen=True, slots=True)
 class NetLink:
-    """One ``<connection>`` between lanes given by edge and index."""
+    """One ``<connection>`` between lanes given by edge and index.
+
+    ``visibility`` is how far before the link, m, one sees whom one has to give way to; ``None`` is
+    SUMO's 4.5 m.
+    """
 
     source: SumoEdgeId
     target: SumoEdgeId
@@ -107,6 +111,7 @@ class NetLink:
     state: str = "M"
     light: str = ""
     light_index: int = -1
+    visibility: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,10 +379,11 @@ class Net:
         if path is not None:
             waits = "" if path.waits_at is None else f' contPos="{path.waits_at:.{DIGITS}f}"'
             kept = f'{waits} speed="{path.speed:.2f}" shape="{self._shape(path.shape)}"'
+        sight = "" if link.visibility is None else f' visibility="{link.visibility:g}"'
         return (
             f'    <connection from="{link.source}" to="{link.target}" fromLane="{link.source_lane}"'
-            f' toLane="{link.target_lane}"{via}{light} dir="{link.direction}" state="{link.state}"'
-            f"{kept}/>"
+            f' toLane="{link.target_lane}"{via}{light}{sight} dir="{link.direction}"'
+            f' state="{link.state}"{kept}/>'
         )
 
     def _shape(self, shape: FloatArray) -> str:

@@ -137,6 +137,13 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
     if len(egos) > 1:
         message = f"{', '.join(map(repr, egos))} are all the ego; keep one"
         yield error("several_egos", "actors", message)
+    headway, step = scenario.drivers.headway, scenario.simulation.step_length
+    if headway is not None and headway < step:
+        message = (
+            f"the headway is {headway:g} s, but a step lasts {step:g} s: SUMO cannot keep vehicles"
+            " that are closer from colliding; raise the headway or shorten the step"
+        )
+        yield error("headway_below_step", "drivers.headway", message)
     if not scenario.actors and not scenario.flows and not scenario.demand.parts:
         yield warning(
             "no_actors", "actors", "there are neither actors nor flows; nothing will move"

@@ -55,6 +55,29 @@ class Environment(Part):
     affects_driving: bool = True
 
 
+class Drivers(Part):
+    """What drivers of the style ``normal`` do; the other styles are set about it.
+
+    ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
+    straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
+    time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
+    gaps in which nobody else has to brake, and 1 for those who take any that is safe.
+    ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+    """
+
+    saturation_flow: Annotated[float, Field(ge=800, le=2500)] | None = None
+    headway: Annotated[float, Field(ge=0.5, le=5)] | None = None
+    gap_acceptance: Annotated[float, Field(ge=0, le=1)] = 0.3
+    lane_change_eagerness: Annotated[float, Field(ge=0, le=10)] = 1.0
+
+    @model_validator(mode="after")
+    def _one_headway(self) -> Self:
+        if self.saturation_flow is not None and self.headway is not None:
+            msg = "give one of saturation_flow and headway, not both: each decides the other"
+            raise ValueError(msg)
+        return self
+
+
 class Actor(Part):
     """One road user, placed by hand or sampled.
 
@@ -226,6 +249,8 @@ class Scenario(Part):
         Region of interest: ids of segments.
     environment
         Weather, and time of day.
+    drivers
+        Headway, gap acceptance and eagerness to change lanes.
     actors
         Vehicles and pedestrians, with ``spawn``, ``goal``, ``depart`` (s) and ``speed`` (m/s).
     flows
@@ -248,6 +273,7 @@ class Scenario(Part):
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
     roi: tuple[Label, ...]
     environment: Environment = Environment()
+    drivers: Drivers = Drivers()
     actors: tuple[Actor, ...] = ()
     flows: tuple[Flow, ...] = ()
     demand: Demand = Demand()

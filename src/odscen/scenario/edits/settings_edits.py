@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.document.scenario_document import Simulation
+    from odscen.scenario.document.scenario_document import Drivers, Simulation
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light
 
@@ -94,6 +94,12 @@ def set_environment(
         fields["affects_driving"] = affects_driving
     environment: Environment = changed_part(scenario.environment, fields)
     return with_fields(scenario, environment=environment)
+
+
+@edit("Change how drivers drive")
+def set_drivers(scenario: Scenario, **fields: Annotated[Any, Drivers]) -> Scenario:
+    """Change fields of :class:`~odscen.scenario.document.scenario_document.Drivers`."""
+    return with_fields(scenario, drivers=changed_part(scenario.drivers, fields))
 
 
 @edit("Traffic lights {control}")

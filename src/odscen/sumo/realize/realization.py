@@ -130,7 +130,7 @@ def realize(
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
     demand = RoutesFile((SSM_PARAMETER,) if recording.criticality else ())
-    writer = _Writer(sumo_map, region, assets, scenario.seed, effect, demand)
+    writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length)
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -236,9 +236,10 @@ class _Writer:
         sumo_map: SumoMap,
         region: Region,
         assets: ModelSizes | None,
-        seed: int,
+        scenario: Scenario,
         effect: WeatherEffect,
         demand: RoutesFile,
+        step_length: float,
     ) -> None:
         graph = sumo_map.graph
         self.demand = demand
@@ -247,7 +248,8 @@ class _Writer:
         self._graph = graph
         self._region = region
         self._assets = assets
-        self._seed = seed
+        self._scenario = scenario
+        self._step_length = step_length
         self._effect = effect
         self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
@@ -308,12 +310,14 @@ class _Writer:
         return driver(
             user,
             body,
-            factor=draw_factor(self._seed, user.id, user.design.style, user.category),
+            factor=draw_factor(self._scenario.seed, user.id, user.design.style, user.category),
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
             electric=user.design.model is not None
             and self._assets is not None
             and self._assets.electric(user.design.model),
+            drivers=self._scenario.drivers,
+            step_length=self._step_length,
         )
 
     def _body(self, user: RoadUser) -> Body:
