@@ -126,8 +126,8 @@ def test_an_edited_program_is_reported_and_shown_and_run(place: Place) -> None:
     done = bring_in(place.workspace, NAME, place.changed("tllogic", patch))
     (change,) = done.changes
     assert change.what == "program changed"
-    assert "15, 15 s of 54 s" in change.detail
-    assert "22, 22 s of 68 s" in change.detail
+    assert "13, 13 s of 52 s" in change.detail
+    assert "22, 22 s of 70 s" in change.detail
     assert done.entry.info["lights"][0]["green"] == [22, 22]
     counts = run_of(place)
     assert counts["arrived"] == counts["planned"]

@@ -98,6 +98,10 @@ def test_other_greens_change_the_stages_and_nothing_else() -> None:
     assert params["linkSignalID:0"] == "1"
 
 
+def test_greens_for_the_stages_of_a_former_network_leave_the_light_as_the_map_has_it() -> None:
+    assert signals_text(junctions=[{"junction": JUNCTION, "green": [20, 9, 9, 9, 9, 9, 9]}]) is None
+
+
 def test_actuated_lights_have_bounds_that_move_with_the_green() -> None:
     (logic,) = logics(control="actuated", junctions=[{"junction": JUNCTION, "green": [20, 6]}])
     assert logic.get("type") == "actuated"

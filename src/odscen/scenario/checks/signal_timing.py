@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from odscen.scenario.checks.program_checks import program_problems
-from odscen.scenario.document.problems import error
+from odscen.scenario.document.problems import error, warning
 from odscen.scenario.signals.light import find_light
 
 if TYPE_CHECKING:
@@ -60,9 +60,10 @@ def _green_problems(timing: JunctionTiming, light: Light, where: str) -> Iterato
         program = ", ".join(f"{seconds:g}" for seconds in light.green)
         message = (
             f"the light of junction {timing.junction!r} has {len(light.green)} stages, but "
-            f"green has {len(timing.green)} times; give one for each (the map's are {program})"
+            f"green has {len(timing.green)} times; they are not used: give one for each (the map's "
+            f"are {program})"
         )
-        yield error("wrong_number_of_greens", f"{where}.green", message)
+        yield warning("wrong_number_of_greens", f"{where}.green", message)
     for stage, seconds in enumerate(timing.green):
         if seconds < LEAST_GREEN:
             message = (

@@ -128,7 +128,9 @@ class _Realizing:
     def kept(self) -> RealizedLight:
         """The network's stages, perhaps with other greens, offset or control."""
         light, timing = self._light, self._timing
-        greens = iter(timing.green)
+        stages = sum(phase.is_stage for phase in light.phases)
+        # Times for other stages are those of a network that the map had before.
+        greens = iter(timing.green if len(timing.green) == stages else ())
         phases = []
         for phase in light.phases:
             stage = phase.name.removeprefix(STAGE) if phase.is_stage else ""
