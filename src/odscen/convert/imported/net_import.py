@@ -228,9 +228,9 @@ def _lane(
         msg = f"lane {lane.getID()} has no usable shape"
         raise ValueError(msg)
     shape = shape - np.array([*offset, 0.0])
-    numbers = [float(value) for value in (lane.getLength(), lane.getSpeed(), lane.getWidth())]
-    if not all(map(math.isfinite, numbers)) or numbers[0] <= 0.0 or min(numbers) < 0.0:
-        msg = f"lane {lane.getID()} has no usable length, speed or width: {numbers}"
+    length, speed, width = float(lane.getLength()), float(lane.getSpeed()), float(lane.getWidth())
+    if not (0.0 < length < math.inf and 0.0 <= speed < math.inf and 0.0 <= width < math.inf):
+        msg = f"lane {lane.getID()} has no usable length, speed or width: {length, speed, width}"
         raise ValueError(msg)
     classes = frozenset(lane.getPermissions())
     if classes not in permissions:
@@ -239,7 +239,9 @@ def _lane(
         SumoLaneId(lane.getID()),
         SumoEdgeId(edge.getID()),
         int(lane.getIndex()),
-        *numbers,
+        length,
+        speed,
+        width,
         permissions[classes],
         shape,
     )
