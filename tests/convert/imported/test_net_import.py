@@ -122,6 +122,7 @@ def test_edges_for_walking_are_joined_over_crossings_or_where_they_meet() -> Non
         (NET.replace('shape="100,0 110,0"', 'shape="100,0 nan,0"'), "lane a_0 has no usable shape"),
         (NET.replace('toLane="0"', 'toLane="7"'), "cannot be read"),
         (NET.replace('via=":j_0_0"', 'via=":j_9_0"'), "via :j_9_0, which is no lane"),
+        (NET.replace('length="10"', 'length="nan"', 1), "no usable length, speed or width"),
         (NET[: len(NET) // 2], "is not XML"),
         (NET[: NET.index("<edge")] + "</net>", "no edges"),
     ],

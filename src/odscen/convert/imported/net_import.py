@@ -228,10 +228,9 @@ def _lane(
         msg = f"lane {lane.getID()} has no usable shape"
         raise ValueError(msg)
     shape = shape - np.array([*offset, 0.0])
-    length, speed, width = map(float, (lane.getLength(), lane.getSpeed(), lane.getWidth()))
-    numbers = (length, speed, width)
-    if not all(map(math.isfinite, numbers)) or length <= 0.0 or min(numbers) < 0.0:
-        msg = f"lane {lane.getID()} has no usable length, speed or width: {list(numbers)}"
+    length, speed, width = float(lane.getLength()), float(lane.getSpeed()), float(lane.getWidth())
+    if not (0.0 < length < math.inf and 0.0 <= speed < math.inf and 0.0 <= width < math.inf):
+        msg = f"lane {lane.getID()} has no usable length, speed or width: {length, speed, width}"
         raise ValueError(msg)
     classes = frozenset(lane.getPermissions())
     if classes not in permissions:
