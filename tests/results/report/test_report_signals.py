@@ -62,10 +62,10 @@ def test_each_stage_has_a_picture_with_its_seconds_and_groups() -> None:
     first = root.find("figure")
     assert first is not None
     kinds = [path.get("class") for path in first.iter("path")]
-    assert kinds.count("way green") == 1
-    assert kinds.count("way permissive") == 1
-    assert kinds.count("way red") == 1
-    assert kinds.count("way red walk") == 1
+    assert kinds.count("movement green") == 1
+    assert kinds.count("movement permissive") == 1
+    assert kinds.count("movement red") == 1
+    assert kinds.count("movement red walk") == 1
 
 
 def test_a_light_without_ways_has_no_diagram() -> None:

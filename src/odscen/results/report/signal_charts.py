@@ -99,7 +99,7 @@ def _stage(light: LightProgram, phase: ProgramPhase, frame: _Frame) -> Markup:
             names.append(group.id)
         for link, path in zip(group.links, group.paths, strict=True):
             kind = _LETTERS.get(phase.state[link], "red")
-            style = f"way {kind}" + (" walk" if group.walk else "")
+            style = f"movement {kind}" + (" walk" if group.walk else "")
             line = element("path", d=frame.path(path), class_=style)
             if kind == "red":
                 lines.insert(0, line)
