@@ -8,6 +8,8 @@ time until the end for those that never entered; the time of a trip is that of t
 ``ODSCEN_BENCH_LEVELS`` (100,300,500) and ``ODSCEN_BENCH_SEEDS`` (1,2) widen or narrow it,
 ``ODSCEN_BENCH_MAPS`` names the maps.
 
+Collisions are counted inside junctions, too.
+
 With lights as programmed and with all of them off. netconvert does not read stop and yield signs,
 nor most speed limits; who stops, or slows down from 100 km/h, has delay that one who need not has
 not. So maps with such signs or limits are measured once more without them ("bare"), by both.
@@ -80,7 +82,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             for file, label in _versions(path, Path(folder)):
                 try:
-                    bench = _MapBench(file, Path(folder), label)
+                    bench = _MapBench(file, Path(folder), label, places=path)
                 except subprocess.CalledProcessError:
                     print(f"| {label} | | | netconvert cannot read it |")
                     break
@@ -133,7 +135,7 @@ def _maps() -> list[Path]:
 class _MapBench:
     """One map with both of its networks."""
 
-    def __init__(self, path: Path, folder: Path, label: str) -> None:
+    def __init__(self, path: Path, folder: Path, label: str, *, places: Path) -> None:
         import carla
         import sumolib
 
@@ -144,6 +146,7 @@ class _MapBench:
         left = ["--lefthand"] if 'rule="LHT"' in text else []
         _tool("netconvert", "--opendrive-files", path, "-o", self._files["netconvert"],
               "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+        text = places.read_text(encoding="utf-8", errors="replace")
         lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
         self._waypoints = [
             w
@@ -250,7 +253,9 @@ class _MapBench:
             _tool("sumo", "-n", self._files[name], "-r", files,
                   "--end", "3600", "--step-length", "0.5", "--seed", str(seed),
                   "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
-                  "--statistic-output", stats, "--no-warnings", "--no-step-log", *off)  # fmt: skip
+                  "--statistic-output", stats, "--no-warnings", "--no-step-log",
+                  "--collision.check-junctions", "true", "--collision.action", "warn",
+                  *off)  # fmt: skip
             seen = {t.get("id"): t for t in ET.parse(info).getroot().iter("tripinfo")}
             root = ET.parse(stats).getroot()
             counts = [root.find("teleports"), root.find("safety")]

@@ -67,7 +67,13 @@ def waiting_places(
         if not waiting[number] or side * movement.turn < _TURN:
             continue
         before = rights[number].yields_to
-        if not any(n < len(movements) and _comes_towards(movement, movements[n]) for n in before):
+        towards = {
+            _comes_towards(movement, movements[n]) or movements[n].source[0] == movement.source[0]
+            for n in before
+            if n < len(movements)
+        }
+        # Without lights nobody holds back traffic from the sides for those who stand inside.
+        if not (towards == {True} or (lit and True in towards)):
             continue
         line = lines[number]
         places = [
@@ -126,7 +132,7 @@ def inner_junctions(
         towards = dict.fromkeys(
             lane_id(*movements[n].source)
             for n in sorted(right.yields_to)
-            if n < len(movements) and _comes_towards(movements[number], movements[n])
+            if n < len(movements)
         )
         paths = [
             lane_id(internal_edge_id(name, n)) for n in sorted(right.foes) if n < len(movements)
