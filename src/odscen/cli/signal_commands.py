@@ -12,6 +12,7 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pri
 from odscen.cli.scenario_commands import ScenarioArgument
 
 if TYPE_CHECKING:
+    from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.light_timing import TimedLight
 
 JunctionOption = Annotated[
@@ -154,6 +155,79 @@ def webster(
     for name in timed.oversaturated:
         log(f"junction {name} is oversaturated: more vehicles come than its greens carry")
     log(f"demand of {timed.begin:g} to {timed.end:g} s; wrote {path}")
+
+
+@app.command()
+def coordinate(
+    scenario: ScenarioArgument,
+    along: Annotated[
+        str | None,
+        typer.Option(help="Roads of the corridor: ids, segments or names, with commas between."),
+    ] = None,
+    junctions: Annotated[
+        str | None, typer.Option(help="Or its junctions in driving order, with commas between.")
+    ] = None,
+    direction: Annotated[
+        str, typer.Option(help="Whose band is to be the widest: both, out or back.")
+    ] = "both",
+    speed: Annotated[
+        float | None, typer.Option(help="Progression speed, km/h. [default: the speed limits]")
+    ] = None,
+    cycle: Annotated[
+        float | None, typer.Option(help="Seconds. [default: the longest of the lights]", min=1.0)
+    ] = None,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", help="Write the time-space diagram here.")
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Coordinate lights along a corridor: one cycle, and the offsets with the widest bands."""
+    from odscen.app import scenarios
+    from odscen.app.green_waves import coordinate_signals
+    from odscen.base.text_files import write_text
+    from odscen.workspace.store import Workspace
+
+    found = coordinate_signals(
+        Workspace.open(workspace),
+        scenario,
+        junctions=_listed(junctions),
+        along=_listed(along),
+        favoured=_direction(direction),
+        speed=None if speed is None else speed / 3.6,
+        cycle=cycle,
+    )
+    path = scenarios.write_scenario(found.scenario, out or scenario)
+    if svg is not None:
+        write_text(svg, found.to_svg())
+    if as_json:
+        drawn = {} if svg is None else {"svg": str(svg)}
+        print_json({"scenario": str(path), **drawn, **found.to_dict()})
+        return
+    rows = [
+        (", ".join(one.junctions), round(one.metres), one.offset, one.wave.out_time)
+        for one in found.lights
+    ]
+    print_table(f"Cycle {found.cycle:g} s", ["junction", "m", "offset, s", "drive, s"], rows)
+    for name, band, before in zip(
+        ("out", "back"), (found.out, found.back), found.before, strict=True
+    ):
+        share = 100.0 * band.seconds / found.cycle
+        log(f"band {name}: {band.seconds:.1f} s, {share:.0f} % of the cycle (was {before:.1f} s)")
+    log(f"wrote {path}" + ("" if svg is None else f" and {svg}"))
+
+
+def _listed(text: str | None) -> tuple[str, ...]:
+    return tuple(part.strip() for part in (text or "").split(",") if part.strip())
+
+
+def _direction(text: str) -> Favoured:
+    known: dict[str, Favoured] = {"both": "both", "out": "out", "back": "back"}
+    if text not in known:
+        msg = f"{text!r} is not both, out or back"
+        raise typer.BadParameter(msg, param_hint="--direction")
+    return known[text]
 
 
 def print_timed_light(light: TimedLight) -> None:

@@ -153,14 +153,17 @@ def webster(
         cycle = float(math.ceil(cycle - 1e-9))
     least = between + sum(stage.least for stage in stages)
     cycle = max(cycle, least)
-    greens = _greens(stages, ratios, cycle - between)
+    greens = divided_greens(stages, ratios, cycle - between)
     return Splits(cycle, greens, ratios, lost, wanted)
 
 
-def _greens(
+def divided_greens(
     stages: Sequence[StageNeed], ratios: Sequence[float], seconds: float
 ) -> tuple[float, ...]:
-    """Divide ``seconds`` of green: in proportion to flow ratios, not less than least greens."""
+    """Divide ``seconds`` of green: in proportion to flow ratios, not less than least greens.
+
+    In whole seconds; stages without a flow ratio get their least green, or all are alike.
+    """
     greens = {n: stage.least for n, stage in enumerate(stages)}
     free = {n for n, ratio in enumerate(ratios) if ratio > 0.0 and not stages[n].fixed}
     if not free:  # nobody comes: those who may are alike

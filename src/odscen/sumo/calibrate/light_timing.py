@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from odscen.base.errors import InputError
 from odscen.convert.signals.signal_programs import LEAST_GREEN, WALK_GREEN
 from odscen.scenario.document.signals_document import JunctionTiming
-from odscen.scenario.signals.webster import SATURATION_FLOW, StageNeed, webster
+from odscen.scenario.signals.webster import SATURATION_FLOW, StageNeed, divided_greens, webster
 from odscen.sumo.calibrate.lane_loads import LaneLoad, LightDemand, MovementVolume
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from odscen.scenario.signals.webster import Splits
     from odscen.sumo.calibrate.turning_volumes import Turn, TurnVolume
     from odscen.sumo.realize.sumo_map import SumoMap
+
+_SAME = 1e-6
+"""Seconds by which cycles may differ that are one."""
 
 SATURATED = 1.0
 """Degree of saturation (v/c) above which a lane is oversaturated."""
@@ -199,20 +203,59 @@ def stage_needs(
         least = min(LEAST_GREEN, phase.seconds) if given is None else given
         if green - cars:
             least = max(least, min(WALK_GREEN, phase.seconds))
-        more = 0.0
-        for after in phases[number + 1 :]:
-            if after.stage or any(after.state[n] not in "Gg" for n in cars):
-                break
-            more += after.seconds
+        more = _green_beside(phases[number + 1 :], cars) + _green_beside(
+            phases[:number][::-1], cars
+        )
         found.append(StageNeed(least, more))
     return tuple(found)
 
 
-def retimed(scenario: Scenario, times: LightTimes, **changes: object) -> JunctionTiming:
+def _green_beside(phases: Sequence[ProgramPhase], links: set[int]) -> float:
+    """Seconds in which links keep their green in the phases next to a stage."""
+    seconds = 0.0
+    for phase in phases:
+        if phase.stage or any(phase.state[n] not in "Gg" for n in links):
+            break
+        seconds += phase.seconds
+    return seconds
+
+
+def stretched(
+    shown: LightProgram, view: Light, timing: JunctionTiming | None, cycle: float
+) -> LightTimes:
+    """Times of a light in another cycle: greens in proportion to what they are.
+
+    Raises
+    ------
+    InputError
+        If least greens and intergreens do not fit into it.
+    """
+    before = light_times(shown, timing, 0.0)
+    phases = merged_phases(plan_at(shown, 0.0).phases)
+    needs = stage_needs(phases, view, timing)
+    between = sum(phase.seconds for phase in phases if not phase.stage)
+    least = between + sum(need.least for need in needs)
+    if least > cycle:
+        msg = (
+            f"the light of junction {', '.join(shown.junctions)} needs a cycle of {least:g} s for "
+            f"its least greens and intergreens, but that of the corridor is {cycle:g} s"
+        )
+        raise InputError(msg)
+    if abs(before.cycle - cycle) < _SAME:
+        return before
+    weights = [green + need.more for green, need in zip(before.green, needs, strict=True)]
+    return replace(before, green=divided_greens(needs, weights, cycle - between), cycle=cycle)
+
+
+def retimed(
+    scenario: Scenario, times: LightTimes, *, hold: bool = False, **changes: object
+) -> JunctionTiming:
     """Entry of the scenario for a light with new times.
 
     Parameters
     ----------
+    hold
+        Whether the entry is to say the cycle even where it did not.
     changes
         Further fields of the entry; ``offset`` of one with plans of the day is the plan's.
     """
@@ -224,11 +267,13 @@ def retimed(scenario: Scenario, times: LightTimes, **changes: object) -> Junctio
     greens = dict(zip(times.stages, times.green, strict=True))
     if times.plan is None:
         stages = tuple(_with_green(stage, greens.get(stage.id)) for stage in timing.stages)
-        cycle = None if timing.cycle is None else times.cycle
+        cycle = times.cycle if hold or timing.cycle is not None else None
         return timing.model_copy(update={"stages": stages, "cycle": cycle, **changes})
     own = {"offset": changes.pop("offset")} if "offset" in changes else {}
     plans = tuple(
-        _retimed_plan(plan, times, greens, kept=timing.cycle is not None).model_copy(update=own)
+        _retimed_plan(plan, times, greens, kept=hold or timing.cycle is not None).model_copy(
+            update=own
+        )
         if plan.id == times.plan
         else plan
         for plan in timing.plans
