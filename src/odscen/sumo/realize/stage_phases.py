@@ -12,17 +12,20 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import STAGE
+from odscen.convert.signals.signal_programs import LEAST_GREEN
 from odscen.scenario.signals.stage_sequence import (
     change_length,
     change_steps,
     cycle_length,
     stage_state,
 )
+from odscen.sumo.realize.light_detectors import BUS_GREEN, bus_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
+    from odscen.sumo.realize.light_detectors import BusArea
 
 HOLD = "hold "
 """How the names of phases begin that hold a stage for one that was not called."""
@@ -265,3 +268,56 @@ def _from_its_end(phases: list[SumoPhase], main: int, last: int) -> PhasePlan:
         for old in order
     ]
     return PhasePlan(tuple(turned), main, place[0])
+
+
+def bus_phases(
+    plan: PhasePlan,
+    green: Mapping[str, set[int]],
+    areas: Sequence[BusArea],
+    conditions: dict[str, str],
+) -> PhasePlan:
+    """Phases of a fixed-time program in which buses have priority.
+
+    A green with a bus coming to it is followed by one of the same state, which ends with the bus;
+    one for which none comes ends early, after its least green, while one waits elsewhere.
+
+    Parameters
+    ----------
+    green
+        Movements that have green in each stage.
+    conditions
+        Conditions of the program, to which those of buses are added.
+    """
+    phases = list(plan.phases)
+    main = len(phases)
+    for at in range(main):
+        stage = phases[at]
+        own, other = bus_in(areas, green[stage.stage]) if stage.stage else ("0", "0")
+        if not stage.stage or own == "0":
+            continue
+        conditions[f"bus{stage.stage}"] = own
+        conditions[f"waits{stage.stage}"] = other
+        behind = next(n for n in range(at + 1, at + main) if phases[n % main].stage) % main
+        change = [n % main for n in range(at + 1, at + 1 + (behind - at - 1) % main)]
+        if not change:
+            continue
+        first = len(phases)
+        phases.append(
+            replace(
+                stage, seconds=BUS_GREEN, name=f"{HOLD}{stage.stage}", least=1.0, most=BUS_GREEN,
+                following=(first + 1,), early="0", final=f"bus{stage.stage}",
+            )
+        )  # fmt: skip
+        for n, old in enumerate(change, start=first + 1):
+            after = behind if old == change[-1] else n + 1
+            phases.append(replace(phases[old], following=(after,), early="", final=""))
+        phases[first + 1] = replace(phases[first + 1], early=f"(bus{stage.stage} < 1)", final="1")
+        least = min(stage.least or LEAST_GREEN, stage.seconds)
+        phases[at] = replace(
+            stage, least=least, most=stage.seconds, following=(first, (at + 1) % main)
+        )
+        ended = f"(waits{stage.stage} > 0) and (bus{stage.stage} < 1)"
+        phases[(at + 1) % main] = replace(phases[(at + 1) % main], early=ended, final="1")
+    if len(phases) > main and not phases[main - 1].following:
+        phases[main - 1] = replace(phases[main - 1], following=(0,))
+    return PhasePlan(tuple(phases), main, plan.first)
