@@ -10,6 +10,7 @@ ALL = (
     "lane_graph",
     "maps_add",
     "capacity",
+    "signal_timing",
     "recording",
     "long_run",
     "live_view",

@@ -2033,7 +2033,7 @@ export interface components {
          *     end of green to the begin of green; pairs without a row have what their paths need. With
          *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
          *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-         *     ``coordination`` have one cycle.
+         *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
          */
         JunctionTiming: {
             /** Junction */
@@ -2083,6 +2083,8 @@ export interface components {
              * @default []
              */
             plans: components["schemas"]["DayPlan-Output"][];
+            /** Bus Priority */
+            bus_priority: boolean | null;
         };
         /**
          * LightInfo
@@ -2988,6 +2990,7 @@ export interface components {
             /**
              * @default {
              *       "control": "fixed",
+             *       "bus_priority": false,
              *       "junctions": []
              *     }
              */
@@ -3329,6 +3332,8 @@ export interface components {
             detectors?: components["schemas"]["SignalDetector-Input"][];
             /** Plans */
             plans?: components["schemas"]["DayPlan-Input"][];
+            /** Bus Priority */
+            bus_priority?: boolean | null;
         };
         /**
          * SetZoneEdit
@@ -3464,6 +3469,9 @@ export interface components {
         /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+         *
+         *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
+         *     that waits elsewhere.
          */
         Signals: {
             /**
@@ -3472,6 +3480,11 @@ export interface components {
              * @enum {string}
              */
             control: "fixed" | "actuated";
+            /**
+             * Bus Priority
+             * @default false
+             */
+            bus_priority: boolean;
             /**
              * Junctions
              * @default []
@@ -4070,7 +4083,7 @@ export interface components {
          *     end of green to the begin of green; pairs without a row have what their paths need. With
          *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
          *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-         *     ``coordination`` have one cycle.
+         *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
          */
         "JunctionTiming-File": {
             /** Junction */
@@ -4129,6 +4142,11 @@ export interface components {
              * @default []
              */
             plans?: components["schemas"]["DayPlan-File"][];
+            /**
+             * Bus Priority
+             * @default null
+             */
+            bus_priority?: boolean | null;
         };
         /**
          * MapReference
@@ -4295,6 +4313,9 @@ export interface components {
         /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+         *
+         *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
+         *     that waits elsewhere.
          */
         "Signals-File": {
             /**
@@ -4303,6 +4324,11 @@ export interface components {
              * @enum {string}
              */
             control?: "fixed" | "actuated";
+            /**
+             * Bus Priority
+             * @default false
+             */
+            bus_priority?: boolean;
             /**
              * Junctions
              * @default []
@@ -4399,6 +4425,7 @@ export interface components {
             /**
              * @default {
              *       "control": "fixed",
+             *       "bus_priority": false,
              *       "junctions": []
              *     }
              */
