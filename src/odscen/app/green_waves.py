@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import JunctionTiming
     from odscen.scenario.signals.green_wave import Favoured
+    from odscen.sumo.calibrate.corridor_lights import CorridorDirection
     from odscen.sumo.calibrate.light_timing import LightTimes
     from odscen.workspace.store import Workspace
 
@@ -191,15 +192,13 @@ def _coordinated(
     if out is None and back is None:
         msg = f"one cannot drive through junctions {' - '.join(names)} in this order, nor back"
         raise InputError(msg)
-    realized = realized_lights(scenario, loaded.sumo)
-    shown = [realized[n].shown for n in numbers]
-    timings = [timing_of(scenario, view.names) for view in views]
-    cycle = cycle or max(plan_at(one, 0.0).cycle for one in shown)
+    shown = [one.shown for one in realized_lights(scenario, loaded.sumo)]
+    plans = [plan_at(shown[n], 0.0) for n in numbers]
+    cycle = cycle or max(plan.cycle for plan in plans)
     times = [
-        stretched(one, view, timing, cycle)
-        for one, view, timing in zip(shown, views, timings, strict=True)
+        stretched(shown[n], view, timing_of(scenario, view.names), cycle)
+        for n, view in zip(numbers, views, strict=True)
     ]
-    plans = [plan_at(one, 0.0) for one in shown]
     phases = [
         with_greens(merged_phases(plan.phases), one.green)
         for plan, one in zip(plans, times, strict=True)
@@ -212,7 +211,7 @@ def _coordinated(
     ]
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))
-    metres = out.metres if out else tuple(back.metres[-1] - m for m in back.metres[::-1])  # type: ignore[union-attr]
+    metres = _metres(out, back)
     lights = tuple(
         CoordinatedLight(view.names, at, offset, wave)
         for view, at, offset, wave in zip(views, metres, offsets, waves, strict=True)
@@ -220,6 +219,14 @@ def _coordinated(
     before = green_bands(waves, [plan.offset for plan in plans], cycle)
     bands = green_bands(waves, offsets, cycle)
     return Coordination(new, cycle, lights, *bands, (before[0].seconds, before[1].seconds))
+
+
+def _metres(out: CorridorDirection | None, back: CorridorDirection | None) -> tuple[float, ...]:
+    """Metres of each light from the first one."""
+    if out is not None:
+        return out.metres
+    assert back is not None
+    return tuple(back.metres[-1] - metres for metres in back.metres[::-1])
 
 
 def _entry(

@@ -110,7 +110,8 @@ def bus_areas(light: SumoLight, view: Light) -> tuple[BusArea, ...]:
 
 def bus_in(areas: Iterable[BusArea], green: set[int]) -> tuple[str, str]:
     """SUMO's expressions for: a bus comes to one of the green movements, and to another one."""
-    own, other = [], []
+    own: list[str] = []
+    other: list[str] = []
     for area in areas:
         (own if green & set(area.movements) else other).append(f"(a:{area.id} > 0)")
     return " or ".join(own) or "0", " or ".join(other) or "0"

@@ -38,8 +38,10 @@ from odscen.sumo.realize.stage_phases import (
     PhasePlan,
     SumoPhase,
     bus_phases,
+    calling_crossings,
     kept_cycle,
     plan_phases,
+    started_offset,
 )
 
 if TYPE_CHECKING:
@@ -170,7 +172,7 @@ class _Realizing:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
         program = SumoProgram(
-            ONLY_PLAN, kind, _started(plan, offset), plan, conditions, self._params(loops)
+            ONLY_PLAN, kind, started_offset(plan, offset), plan, conditions, self._params(loops)
         )
         return RealizedLight(shown, (program,), loops, buses=self._buses)
 
@@ -204,7 +206,7 @@ class _Realizing:
         program = DesignedProgram(self._timing, self._view, self._control)
         plans = program.plans()
         active = active_plans(plans, clock=clock, until=until)
-        calling = self._calling(program)
+        calling = calling_crossings(program)
         loops = waiting_places(self._light, self._net, calling)
         if loops and self._control == "fixed":
             first = program.plans()[0].stages[0]
@@ -237,22 +239,8 @@ class _Realizing:
         groups = tuple(
             self._shown_group(group.id, group.movements) for group in program.groups.values()
         )
-        shown = self._shown(groups, tuple(shown_plans), loops, own=True)
-        return RealizedLight(shown, tuple(made), loops, active, self._buses)
-
-    def _calling(self, program: DesignedProgram) -> dict[str, set[int]]:
-        """Crossings that call each stage on call: those that have no green otherwise, if any."""
-        stages = program.timing.stages
-        walks = {name for name, group in program.groups.items() if group.walk}
-        served = {name for stage in stages if not stage.on_call for name in stage.groups}
-        found = {}
-        for stage in stages:
-            if stage.on_call:
-                own = walks & set(stage.groups)
-                found[stage.id] = {
-                    n for name in own - served or own for n in program.groups[name].movements
-                }
-        return found
+        told = self._shown(groups, tuple(shown_plans), loops, own=True)
+        return RealizedLight(told, tuple(made), loops, active, self._buses)
 
     def _program(
         self, program: DesignedProgram, plan: TimedPlan, loops: Sequence[PlacedLoop]
@@ -286,7 +274,7 @@ class _Realizing:
             # The cycle is counted from the end of the first stage; SUMO errs before a positive one.
             offset = -(-(offset + plan.stages[0].green) % cycle)
         else:
-            offset = _started(phases, offset)
+            offset = started_offset(phases, offset)
         return SumoProgram(
             plan.id, "static" if free else "actuated", offset, phases, conditions, params
         )
@@ -403,10 +391,3 @@ class _Realizing:
 
 def _green(state: str) -> set[int]:
     return {n for n, letter in enumerate(state) if letter in "Gg"}
-
-
-def _started(plan: PhasePlan, offset: float) -> float:
-    """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
-    cycle = sum(phase.seconds for phase in plan.cycle)
-    total = sum(phase.seconds for phase in plan.phases)
-    return offset if total == cycle else (total - (-offset % cycle)) % total

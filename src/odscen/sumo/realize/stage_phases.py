@@ -91,6 +91,28 @@ def kept_cycle(program: DesignedProgram, plan: TimedPlan) -> float | None:
     return None
 
 
+def started_offset(plan: PhasePlan, offset: float) -> float:
+    """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
+    cycle = sum(phase.seconds for phase in plan.cycle)
+    total = sum(phase.seconds for phase in plan.phases)
+    return offset if total == cycle else (total - (-offset % cycle)) % total
+
+
+def calling_crossings(program: DesignedProgram) -> dict[str, set[int]]:
+    """Crossings that call each stage on call: those that have no green otherwise, if any."""
+    stages = program.timing.stages
+    walks = {name for name, group in program.groups.items() if group.walk}
+    served = {name for stage in stages if not stage.on_call for name in stage.groups}
+    found = {}
+    for stage in stages:
+        if stage.on_call:
+            own = walks & set(stage.groups)
+            found[stage.id] = {
+                n for name in own - served or own for n in program.groups[name].movements
+            }
+    return found
+
+
 def plan_phases(
     program: DesignedProgram,
     plan: TimedPlan,
@@ -293,31 +315,40 @@ def bus_phases(
     for at in range(main):
         stage = phases[at]
         own, other = bus_in(areas, green[stage.stage]) if stage.stage else ("0", "0")
-        if not stage.stage or own == "0":
+        after = (at + 1) % main
+        if own == "0" or phases[after].stage:
             continue
-        conditions[f"bus{stage.stage}"] = own
-        conditions[f"waits{stage.stage}"] = other
-        behind = next(n for n in range(at + 1, at + main) if phases[n % main].stage) % main
-        change = [n % main for n in range(at + 1, at + 1 + (behind - at - 1) % main)]
-        if not change:
-            continue
-        first = len(phases)
-        phases.append(
-            replace(
-                stage, seconds=BUS_GREEN, name=f"{HOLD}{stage.stage}", least=1.0, most=BUS_GREEN,
-                following=(first + 1,), early="0", final=f"bus{stage.stage}",
-            )
-        )  # fmt: skip
-        for n, old in enumerate(change, start=first + 1):
-            after = behind if old == change[-1] else n + 1
-            phases.append(replace(phases[old], following=(after,), early="", final=""))
-        phases[first + 1] = replace(phases[first + 1], early=f"(bus{stage.stage} < 1)", final="1")
+        came, waits = f"bus{stage.stage}", f"waits{stage.stage}"
+        conditions |= {came: own, waits: other}
+        longer = len(phases)
+        phases += _bus_green(phases[:main], at, longer, came)
         least = min(stage.least or LEAST_GREEN, stage.seconds)
-        phases[at] = replace(
-            stage, least=least, most=stage.seconds, following=(first, (at + 1) % main)
-        )
-        ended = f"(waits{stage.stage} > 0) and (bus{stage.stage} < 1)"
-        phases[(at + 1) % main] = replace(phases[(at + 1) % main], early=ended, final="1")
+        following = (longer, after)
+        phases[at] = replace(stage, least=least, most=stage.seconds, following=following)
+        early = f"({waits} > 0) and ({came} < 1)"
+        phases[after] = replace(phases[after], early=early, final="1")
     if len(phases) > main and not phases[main - 1].following:
         phases[main - 1] = replace(phases[main - 1], following=(0,))
     return PhasePlan(tuple(phases), main, plan.first)
+
+
+def _bus_green(main: Sequence[SumoPhase], at: int, first: int, came: str) -> list[SumoPhase]:
+    """Longer green of the stage at ``at``, and its own change to the next stage.
+
+    ``first`` is the index that it will have; ``came`` the condition that a bus comes to it.
+    """
+    count = len(main)
+    order = [n % count for n in range(at + 1, at + count)]
+    behind = next((n for n in order if main[n].stage), at)
+    change = [main[n] for n in order[: order.index(behind) if behind != at else None]]
+    longer = replace(
+        main[at], seconds=BUS_GREEN, name=f"{HOLD}{main[at].stage}", least=1.0, most=BUS_GREEN,
+        following=(first + 1,), early="0", final=came,
+    )  # fmt: skip
+    found = [longer]
+    for number, phase in enumerate(change, start=first + 1):
+        last = number == first + len(change)
+        early, final = (f"({came} < 1)", "1") if number == first + 1 else ("", "")
+        following = (behind if last else number + 1,)
+        found.append(replace(phase, following=following, early=early, final=final))
+    return found
