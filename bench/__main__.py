@@ -11,6 +11,7 @@ ALL = (
     "maps_add",
     "capacity",
     "saturation",
+    "signal_timing",
     "recording",
     "long_run",
     "live_view",

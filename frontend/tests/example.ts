@@ -39,7 +39,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   actors,
   flows,
   demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
-  signals: { control: "fixed", junctions: [] },
+  signals: { control: "fixed", bus_priority: false, junctions: [] },
   simulation: { duration: 60, step_length: 0.5 },
 });
 export const problem = (where: string, nodes: string[] = []): Problem => ({

@@ -13,6 +13,8 @@ from tests.signal_case import MAP, one_plan, scenario
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from odscen.scenario.document.scenario_document import Scenario
+
 
 def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
     space = tmp_path / "space"
@@ -37,3 +39,44 @@ def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
     wrong = odscen("signals", "import", file, file, "--workspace", space, "--json")
     assert wrong.code != 0
     assert "not XML" in wrong.json["error"]["message"]
+
+
+def placed(space: Path, one: Scenario, name: str, file: Path) -> Path:
+    sha256 = Workspace.open(space).map(name).info["sha256"]
+    reference = MapReference(name=name, sha256=sha256)
+    file.write_text(dumps(one.model_copy(update={"map": reference})))
+    return file
+
+
+def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> None:
+    file = placed(workspace, scenario(None), "signal_crossing", tmp_path / "one.scenario.json")
+    out = tmp_path / "timed.scenario.json"
+    told = odscen("signals", "webster", file, "-o", out, "--workspace", workspace, "--json").json
+    (light,) = told["lights"]
+    assert told["scenario"] == str(out)
+    assert light["junctions"] == ["10001"]
+    assert {"volume", "flow_ratio", "v_c"} <= light["lanes"][0].keys()
+    shown = odscen("signals", "show", out, "--workspace", workspace, "--json").json
+    seconds = [one["seconds"] if isinstance(one, dict) else one[0]
+               for one in shown["lights"][0]["plans"][0]["phases"]]  # fmt: skip
+    assert sum(seconds) == light["cycle"]
+    table = odscen("signals", "webster", file, "-o", out, "--workspace", workspace).out
+    assert "flow ratio" in table
+    assert "v/c" in table
+    wrong = odscen("signals", "webster", file, "--end", 9000, "--workspace", workspace, "--json")
+    assert wrong.code != 0
+    assert "which lasts 600 s" in wrong.json["error"]["message"]
+
+
+def test_a_corridor_without_two_lights_is_refused(workspace: Path, tmp_path: Path) -> None:
+    file = placed(workspace, scenario(None), "signal_crossing", tmp_path / "one.scenario.json")
+    command = ("signals", "coordinate", file, "--workspace", workspace, "--json")
+    for options, message in (
+        (("--along", "r1"), "a corridor needs two traffic lights, but r1 has 1"),
+        (("--junctions", "10001"), "a corridor needs two traffic lights, but 10001 has 1"),
+        (("--along", "Nowhere"), "Nowhere"),
+        ((), "name either the junctions"),
+    ):
+        wrong = odscen(*command, *options)
+        assert wrong.code != 0
+        assert message in wrong.json["error"]["message"]

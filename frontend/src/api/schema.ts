@@ -2061,7 +2061,7 @@ export interface components {
          *     end of green to the begin of green; pairs without a row have what their paths need. With
          *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
          *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-         *     ``coordination`` have one cycle.
+         *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
          */
         JunctionTiming: {
             /** Junction */
@@ -2111,6 +2111,8 @@ export interface components {
              * @default []
              */
             plans: components["schemas"]["DayPlan-Output"][];
+            /** Bus Priority */
+            bus_priority: boolean | null;
         };
         /**
          * LightInfo
@@ -3038,6 +3040,7 @@ export interface components {
             /**
              * @default {
              *       "control": "fixed",
+             *       "bus_priority": false,
              *       "junctions": []
              *     }
              */
@@ -3398,6 +3401,8 @@ export interface components {
             detectors?: components["schemas"]["SignalDetector-Input"][];
             /** Plans */
             plans?: components["schemas"]["DayPlan-Input"][];
+            /** Bus Priority */
+            bus_priority?: boolean | null;
         };
         /**
          * SetZoneEdit
@@ -3533,6 +3538,9 @@ export interface components {
         /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+         *
+         *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
+         *     that waits elsewhere.
          */
         Signals: {
             /**
@@ -3541,6 +3549,11 @@ export interface components {
              * @enum {string}
              */
             control: "fixed" | "actuated";
+            /**
+             * Bus Priority
+             * @default false
+             */
+            bus_priority: boolean;
             /**
              * Junctions
              * @default []
@@ -4171,7 +4184,7 @@ export interface components {
          *     end of green to the begin of green; pairs without a row have what their paths need. With
          *     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
          *     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-         *     ``coordination`` have one cycle.
+         *     ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
          */
         "JunctionTiming-File": {
             /** Junction */
@@ -4230,6 +4243,11 @@ export interface components {
              * @default []
              */
             plans?: components["schemas"]["DayPlan-File"][];
+            /**
+             * Bus Priority
+             * @default null
+             */
+            bus_priority?: boolean | null;
         };
         /**
          * MapReference
@@ -4396,6 +4414,9 @@ export interface components {
         /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+         *
+         *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
+         *     that waits elsewhere.
          */
         "Signals-File": {
             /**
@@ -4404,6 +4425,11 @@ export interface components {
              * @enum {string}
              */
             control?: "fixed" | "actuated";
+            /**
+             * Bus Priority
+             * @default false
+             */
+            bus_priority?: boolean;
             /**
              * Junctions
              * @default []
@@ -4509,6 +4535,7 @@ export interface components {
             /**
              * @default {
              *       "control": "fixed",
+             *       "bus_priority": false,
              *       "junctions": []
              *     }
              */

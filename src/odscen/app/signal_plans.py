@@ -52,13 +52,19 @@ def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
     InputError
         If the scenario leaves all lights as they are in the map.
     """
+    from odscen.sumo.folder.layout import SIGNALS_FILE
     from odscen.sumo.realize.light_realization import realized_lights
     from odscen.sumo.realize.program_files import signals_xml
+    from odscen.sumo.realize.realization import realize
 
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
     refuse_errors(signal_problems(scenario.signals, loaded.lights))
-    text = signals_xml(realized_lights(scenario, loaded.sumo))
+    lights = realized_lights(scenario, loaded.sumo)
+    if any(light.buses for light in lights):  # detectors name the types of the demand's buses
+        text = realize(scenario, loaded.sumo, workspace.assets()).files.get(SIGNALS_FILE)
+    else:
+        text = signals_xml(lights)
     if text is None:
         msg = "the scenario changes no traffic light: all run the programs of the network"
         raise InputError(msg)

@@ -1,15 +1,27 @@
-"""``odscen signals``: programs of traffic lights, shown, and from and to SUMO's files."""
+"""``odscen signals``: programs of lights, shown, timed, and from and to SUMO's files."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
 from odscen.cli.scenario_commands import ScenarioArgument
+
+if TYPE_CHECKING:
+    from odscen.scenario.signals.green_wave import Favoured
+    from odscen.sumo.calibrate.light_timing import TimedLight
+
+JunctionOption = Annotated[
+    list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
+]
 
 app = typer.Typer(
     help="Programs of traffic lights: what they show, and from and to SUMO's files.",
@@ -20,9 +32,7 @@ app = typer.Typer(
 @app.command()
 def show(
     scenario: ScenarioArgument,
-    junction: Annotated[
-        list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
-    ] = None,
+    junction: JunctionOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -56,13 +66,8 @@ def import_(
         Path,
         typer.Argument(help="SUMO's programs: .tll.xml, .add.xml or .net.xml.", metavar="FILE"),
     ],
-    junction: Annotated[
-        list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
-    ] = None,
+    junction: JunctionOption = None,
+    out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -105,6 +110,153 @@ def export(
         print_json({"file": str(path)})
     else:
         log(f"wrote {path}")
+
+
+@app.command()
+def webster(
+    scenario: ScenarioArgument,
+    junction: JunctionOption = None,
+    begin: Annotated[
+        float | None,
+        typer.Option(help="Second of the scenario. [default: the busiest hour]", min=0.0),
+    ] = None,
+    end: Annotated[float | None, typer.Option(help="Second of the scenario.", min=0.0)] = None,
+    saturation: Annotated[
+        float, typer.Option(help="Saturation flow of a lane that goes straight, vehicles an hour.")
+    ] = 1900.0,
+    shortest: Annotated[float, typer.Option(help="Shortest cycle, seconds.")] = 40.0,
+    longest: Annotated[float, typer.Option(help="Longest cycle, seconds.")] = 120.0,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Time lights after the demand: cycle and splits by Webster's method."""
+    from odscen.app import scenarios
+    from odscen.app.signal_optimisation import time_signals
+    from odscen.workspace.store import Workspace
+
+    timed = time_signals(
+        Workspace.open(workspace),
+        scenario,
+        junctions=junction or (),
+        begin=begin,
+        end=end,
+        saturation=saturation,
+        bounds=(shortest, longest),
+    )
+    path = scenarios.write_scenario(timed.scenario, out or scenario)
+    if as_json:
+        print_json({"scenario": str(path), **timed.to_dict()})
+        return
+    for light in timed.lights:
+        print_timed_light(light)
+    for name in timed.without:
+        log(f"junction {name}: no vehicle comes to its light, which keeps its times")
+    for name in timed.oversaturated:
+        log(f"junction {name} is oversaturated: more vehicles come than its greens carry")
+    log(f"demand of {timed.begin:g} to {timed.end:g} s; wrote {path}")
+
+
+@app.command()
+def coordinate(
+    scenario: ScenarioArgument,
+    along: Annotated[
+        str | None,
+        typer.Option(help="Roads of the corridor: ids, segments or names, with commas between."),
+    ] = None,
+    junctions: Annotated[
+        str | None, typer.Option(help="Or its junctions in driving order, with commas between.")
+    ] = None,
+    direction: Annotated[
+        str, typer.Option(help="Whose band is to be the widest: both, out or back.")
+    ] = "both",
+    speed: Annotated[
+        float | None, typer.Option(help="Progression speed, km/h. [default: the speed limits]")
+    ] = None,
+    cycle: Annotated[
+        float | None, typer.Option(help="Seconds. [default: the longest of the lights]", min=1.0)
+    ] = None,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", help="Write the time-space diagram here.")
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Coordinate lights along a corridor: one cycle, and the offsets with the widest bands."""
+    from odscen.app import scenarios
+    from odscen.app.green_waves import coordinate_signals
+    from odscen.base.text_files import write_text
+    from odscen.workspace.store import Workspace
+
+    found = coordinate_signals(
+        Workspace.open(workspace),
+        scenario,
+        junctions=_listed(junctions),
+        along=_listed(along),
+        favoured=_direction(direction),
+        speed=None if speed is None else speed / 3.6,
+        cycle=cycle,
+    )
+    path = scenarios.write_scenario(found.scenario, out or scenario)
+    if svg is not None:
+        write_text(svg, found.to_svg())
+    if as_json:
+        drawn = {} if svg is None else {"svg": str(svg)}
+        print_json({"scenario": str(path), **drawn, **found.to_dict()})
+        return
+    rows = [
+        (", ".join(one.junctions), round(one.metres), one.offset, one.wave.out_time)
+        for one in found.lights
+    ]
+    print_table(f"Cycle {found.cycle:g} s", ["junction", "m", "offset, s", "drive, s"], rows)
+    for name, band, before in zip(
+        ("out", "back"), (found.out, found.back), found.before, strict=True
+    ):
+        share = 100.0 * band.seconds / found.cycle
+        log(f"band {name}: {band.seconds:.1f} s, {share:.0f} % of the cycle (was {before:.1f} s)")
+    log(f"wrote {path}" + ("" if svg is None else f" and {svg}"))
+
+
+def _listed(text: str | None) -> tuple[str, ...]:
+    return tuple(part.strip() for part in (text or "").split(",") if part.strip())
+
+
+def _direction(text: str) -> Favoured:
+    known: dict[str, Favoured] = {"both": "both", "out": "out", "back": "back"}
+    if text not in known:
+        msg = f"{text!r} is not both, out or back"
+        raise typer.BadParameter(msg, param_hint="--direction")
+    return known[text]
+
+
+def print_timed_light(light: TimedLight) -> None:
+    """Write the tables of a light that was timed."""
+    splits, before = light.splits, light.before
+    title = (
+        f"Junction {', '.join(light.times.junctions)}: cycle {light.times.cycle:g} s "
+        f"(was {before.cycle:g} s), lost time {splits.lost:g} s, flow ratio {splits.flow_ratio:.2f}"
+    )
+    rows = list(
+        zip(light.times.stages, before.green, light.times.green, splits.ratios, strict=True)
+    )
+    print_table(title, ["stage", "green before, s", "green, s", "flow ratio"], rows)
+    moved = [(one.movement, one.turn, round(one.vehicles)) for one in light.movements]
+    print_table("", ["movement", "turn", "vehicles/h"], moved)
+    lanes = [
+        (
+            lane.load.lane,
+            ", ".join(lane.load.turns),
+            round(lane.load.volume),
+            round(lane.load.saturation),
+            lane.load.ratio,
+            lane.green,
+            lane.degree,
+        )
+        for lane in light.lanes
+    ]
+    columns = ["lane", "turns", "vehicles/h", "saturation flow", "flow ratio", "green, s", "v/c"]
+    print_table("", columns, lanes)
 
 
 def _green(groups: tuple[object, ...], state: str) -> str:

@@ -130,9 +130,7 @@ def inner_junctions(
     for number, lane in beyond.items():
         right = rights[number]
         towards = dict.fromkeys(
-            lane_id(*movements[n].source)
-            for n in sorted(right.yields_to)
-            if n < len(movements)
+            lane_id(*movements[n].source) for n in sorted(right.yields_to) if n < len(movements)
         )
         paths = [
             lane_id(internal_edge_id(name, n)) for n in sorted(right.foes) if n < len(movements)

@@ -52,6 +52,13 @@ def signal_problems(
         yield from _green_problems(timing, light, where)
         control = timing.control or signals.control
         yield from program_problems(timing, light, control, where, clock=clock, until=until)
+        asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
+        if asked and timing.stages and control == "fixed":
+            message = (
+                f"the light of junction {timing.junction!r} has a fixed-time program of its own, "
+                "which buses cannot change; make its control actuated or its bus_priority false"
+            )
+            yield error("bus_priority_needs_actuation", f"{where}.bus_priority", message)
     yield from _coordination_problems(signals)
 
 

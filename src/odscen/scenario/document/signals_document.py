@@ -100,7 +100,7 @@ class JunctionTiming(Part):
     end of green to the begin of green; pairs without a row have what their paths need. With
     ``cycle``, greens and intergreens have to add up to it, and actuated control keeps to it. The
     program begins ``offset`` seconds into the scenario, as if it had run before. Lights of one
-    ``coordination`` have one cycle.
+    ``coordination`` have one cycle. ``bus_priority`` ``None`` is the scenario's.
     """
 
     junction: Label
@@ -114,6 +114,7 @@ class JunctionTiming(Part):
     intergreens: tuple[tuple[Identifier, Identifier, SignalSeconds], ...] = ()
     detectors: tuple[SignalDetector, ...] = ()
     plans: tuple[DayPlan, ...] = ()
+    bus_priority: bool | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -130,7 +131,12 @@ class JunctionTiming(Part):
 
 
 class Signals(Part):
-    """How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens)."""
+    """How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+
+    With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
+    that waits elsewhere.
+    """
 
     control: Control = "fixed"
+    bus_priority: bool = False
     junctions: tuple[JunctionTiming, ...] = ()

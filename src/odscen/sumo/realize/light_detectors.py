@@ -36,6 +36,12 @@ take all that stand between loop and stop line."""
 STANDING, MOVED_OFF = 10.0, 5.0
 """A vehicle on a loop for more seconds waits for a gap, once a queue would have moved off."""
 
+BUS_AREA = 80.0
+"""Metres before the stop line in which a bus is seen."""
+
+BUS_GREEN = 15.0
+"""Seconds by which a bus may prolong the green of a fixed-time light."""
+
 WAVE = 3.0
 """m/s, at least, at which a queue moves off from the stop line backwards."""
 
@@ -78,6 +84,37 @@ class PlacedLoop:
     def walk(self) -> bool:
         """Whether it is for people on foot."""
         return not self.before
+
+
+@dataclass(frozen=True, slots=True)
+class BusArea:
+    """The last metres before the stop line of a lane, in which buses are seen.
+
+    ``movements`` are places in the light's states of the movements of the lane.
+    """
+
+    id: str
+    lane: str
+    movements: tuple[int, ...]
+
+
+def bus_areas(light: SumoLight, view: Light) -> tuple[BusArea, ...]:
+    """One in each lane of vehicles."""
+    every = [n for n, one in enumerate(view.movements) if not one.walk]
+    lanes = _by_lane(light, every).items()
+    return tuple(
+        BusArea(f"{light.id}.bus.{number}", lane, movements)
+        for number, (lane, movements) in enumerate(lanes)
+    )
+
+
+def bus_in(areas: Iterable[BusArea], green: set[int]) -> tuple[str, str]:
+    """SUMO's expressions for: a bus comes to one of the green movements, and to another one."""
+    own: list[str] = []
+    other: list[str] = []
+    for area in areas:
+        (own if green & set(area.movements) else other).append(f"(a:{area.id} > 0)")
+    return " or ".join(own) or "0", " or ".join(other) or "0"
 
 
 def vehicle_loops(
@@ -132,6 +169,14 @@ def idle_loop(light: SumoLight, net: RoadNet, movement: int) -> PlacedLoop:
     """Make a loop that prolongs nothing: without any SUMO could not load the state of a light."""
     lane = light.links[movement].source
     return _placed(net, f"{light.id}.idle", lane, (movement,), ahead=LOOP, stages=())
+
+
+def idle_loops(light: SumoLight, net: RoadNet, areas: Iterable[BusArea]) -> tuple[PlacedLoop, ...]:
+    """Make one in each lane: SUMO warns of actuated greens without a loop."""
+    return tuple(
+        _placed(net, f"{light.id}.idle.{number}", area.lane, area.movements, ahead=LOOP, stages=())
+        for number, area in enumerate(areas)
+    )
 
 
 def waiting_places(

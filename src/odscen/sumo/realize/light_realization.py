@@ -24,14 +24,25 @@ from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.plan_times import active_plans
 from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
 from odscen.sumo.realize.light_detectors import (
+    bus_areas,
+    bus_in,
     called,
     idle_loop,
+    idle_loops,
     may_end,
     vehicle_loops,
     waiting_places,
 )
 from odscen.sumo.realize.light_views import scenario_lights
-from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase, kept_cycle, plan_phases
+from odscen.sumo.realize.stage_phases import (
+    PhasePlan,
+    SumoPhase,
+    bus_phases,
+    calling_crossings,
+    kept_cycle,
+    plan_phases,
+    started_offset,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -40,7 +51,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light
-    from odscen.sumo.realize.light_detectors import PlacedLoop
+    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 
 TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
@@ -76,6 +87,7 @@ class RealizedLight:
     programs: tuple[SumoProgram, ...] = ()
     loops: tuple[PlacedLoop, ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
+    buses: tuple[BusArea, ...] = ()
 
     @property
     def watched(self) -> bool:
@@ -103,7 +115,9 @@ def realized_lights(
     for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True):
         own = [timings[name] for name in view.names if name in timings]
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
-        one = _Realizing(light, view, timing, timing.control or signals.control, sumo_map)
+        asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
+        control = timing.control or signals.control
+        one = _Realizing(light, view, timing, control, sumo_map, buses=asked)
         found.append(one.designed(scenario.demand.clock, until) if timing.stages else one.kept())
     return tuple(found)
 
@@ -118,7 +132,10 @@ class _Realizing:
         timing: JunctionTiming,
         control: Control,
         sumo_map: SumoMap,
+        *,
+        buses: bool = False,
     ) -> None:
+        self._buses = bus_areas(light, view) if buses else ()
         self._light = light
         self._view = view
         self._timing = timing
@@ -146,15 +163,20 @@ class _Realizing:
             loops = self._loops({p.stage: p for p in phases if p.prolonged})
             phases = self._ending(phases, loops, conditions)
         plan = PhasePlan(tuple(phases), len(phases))
+        if self._buses and self._control == "fixed":
+            plan = bus_phases(plan, {p.stage: _green(p.state) for p in phases}, self._buses,
+                              conditions)  # fmt: skip
+            loops = idle_loops(light, self._net, self._buses)
         shown = self._shown(
             self._own_groups(), (self._shown_plan(ONLY_PLAN, offset, plan),), loops, own=False
         )
-        if self._control == "fixed" and not changed and offset == light.offset:
+        if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
+        kind = "actuated" if self._buses else TYPES[self._control]
         program = SumoProgram(
-            ONLY_PLAN, TYPES[self._control], offset, plan, conditions, self._params(loops)
+            ONLY_PLAN, kind, started_offset(plan, offset), plan, conditions, self._params(loops)
         )
-        return RealizedLight(shown, (program,), loops)
+        return RealizedLight(shown, (program,), loops, buses=self._buses)
 
     def _ending(
         self, phases: Sequence[SumoPhase], loops: Sequence[PlacedLoop], conditions: dict[str, str]
@@ -169,17 +191,24 @@ class _Realizing:
                 result[index] = replace(result[index], least=0.0, most=0.0)
                 continue
             name = f"end{phase.stage}"
-            conditions[name] = expression
+            conditions[name] = self._with_buses(expression, _green(phase.state))
             after = (index + 1) % len(phases)
             result[after] = replace(result[after], early=name, final="1")
         return result
+
+    def _with_buses(self, ended: str, green: set[int]) -> str:
+        """When a prolonged stage ends: not for a bus that comes to it, but for one elsewhere."""
+        if not self._buses:
+            return ended
+        own, other = bus_in(self._buses, green)
+        return f"(({ended}) or ({other})) and (({own}) < 1)"
 
     def designed(self, clock: float, until: float) -> RealizedLight:
         """A program of the scenario."""
         program = DesignedProgram(self._timing, self._view, self._control)
         plans = program.plans()
         active = active_plans(plans, clock=clock, until=until)
-        calling = self._calling(program)
+        calling = calling_crossings(program)
         loops = waiting_places(self._light, self._net, calling)
         if loops and self._control == "fixed":
             first = program.plans()[0].stages[0]
@@ -212,23 +241,8 @@ class _Realizing:
         groups = tuple(
             self._shown_group(group.id, group.movements) for group in program.groups.values()
         )
-        return RealizedLight(
-            self._shown(groups, tuple(shown_plans), loops, own=True), tuple(made), loops, active
-        )
-
-    def _calling(self, program: DesignedProgram) -> dict[str, set[int]]:
-        """Crossings that call each stage on call: those that have no green otherwise, if any."""
-        stages = program.timing.stages
-        walks = {name for name, group in program.groups.items() if group.walk}
-        served = {name for stage in stages if not stage.on_call for name in stage.groups}
-        found = {}
-        for stage in stages:
-            if stage.on_call:
-                own = walks & set(stage.groups)
-                found[stage.id] = {
-                    n for name in own - served or own for n in program.groups[name].movements
-                }
-        return found
+        told = self._shown(groups, tuple(shown_plans), loops, own=True)
+        return RealizedLight(told, tuple(made), loops, active, self._buses)
 
     def _program(
         self, program: DesignedProgram, plan: TimedPlan, loops: Sequence[PlacedLoop]
@@ -239,7 +253,7 @@ class _Realizing:
             expression = may_end(loops, stage.id, green)
             if self._control == "actuated" and expression and stage.most > stage.least:
                 ends[stage.id] = f"end{stage.id}"
-                conditions[ends[stage.id]] = expression
+                conditions[ends[stage.id]] = self._with_buses(expression, green)
             if stage.on_call:
                 calls[stage.id] = f"call{stage.id}"
                 conditions[calls[stage.id]] = called(loops, stage.id)
@@ -262,7 +276,7 @@ class _Realizing:
             # The cycle is counted from the end of the first stage; SUMO errs before a positive one.
             offset = -(-(offset + plan.stages[0].green) % cycle)
         else:
-            offset = _started(phases, offset)
+            offset = started_offset(phases, offset)
         return SumoProgram(
             plan.id, "static" if free else "actuated", offset, phases, conditions, params
         )
@@ -379,10 +393,3 @@ class _Realizing:
 
 def _green(state: str) -> set[int]:
     return {n for n, letter in enumerate(state) if letter in "Gg"}
-
-
-def _started(plan: PhasePlan, offset: float) -> float:
-    """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
-    cycle = sum(phase.seconds for phase in plan.cycle)
-    total = sum(phase.seconds for phase in plan.phases)
-    return offset if total == cycle else (total - (-offset % cycle)) % total

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+from odscen.sumo.realize.light_detectors import BUS_AREA
 
-    from odscen.sumo.realize.light_detectors import PlacedLoop
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
     from odscen.sumo.realize.stage_phases import SumoPhase
 
@@ -19,12 +21,19 @@ _PERIOD = 86_400
 """Seconds over which SUMO would aggregate what a loop counts; nothing of it is written."""
 
 
-def signals_xml(lights: Iterable[RealizedLight]) -> str | None:
-    """Text of ``signals.add.xml``; ``None`` if all lights keep the program of the network."""
+def signals_xml(lights: Iterable[RealizedLight], *, buses: Sequence[str] = ()) -> str | None:
+    """Text of ``signals.add.xml``; ``None`` if all lights keep the program of the network.
+
+    Parameters
+    ----------
+    buses
+        Ids of the vTypes that have priority where buses have it.
+    """
     lines: list[str] = []
     for light in lights:
         if light.programs:
             lines += [_loop_xml(loop) for loop in light.loops]
+            lines += [_bus_xml(area, buses) for area in light.buses]
             for program in light.programs:
                 lines += _program_xml(light.shown.id, program)
             lines += _switches_xml(light)
@@ -43,6 +52,15 @@ def _loop_xml(loop: PlacedLoop) -> str:
     if not loop.name:
         return text + "/>"
     return f'{text}><param key="{DETECTOR_PARAM}" value="{loop.name}"/></inductionLoop>'
+
+
+def _bus_xml(area: BusArea, buses: Sequence[str]) -> str:
+    # Without types SUMO would count all vehicles; a type that is not there counts none.
+    return (
+        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-0.1"'
+        f' length="{BUS_AREA:g}" friendlyPos="true" vTypes="{" ".join(buses) or "bus"}"'
+        f' file="NUL" period="{_PERIOD}"/>'
+    )
 
 
 def _program_xml(light: str, program: SumoProgram) -> Iterator[str]:

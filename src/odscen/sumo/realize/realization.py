@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from odscen.base.categories import DEFAULT_BODY, Body
+from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.base.errors import ScenarioError
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import Router
@@ -145,7 +145,7 @@ def realize(
     if settings.meso:
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
     lights = realized_lights(scenario, sumo_map, until=until)
-    signals = signals_xml(lights)
+    signals = signals_xml(lights, buses=demand.types_of(Category.BUS))
     files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals, lights)}
     return Realization(
         files,

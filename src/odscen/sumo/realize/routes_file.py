@@ -88,6 +88,10 @@ class RoutesFile:
             ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>", *head, *body, "</routes>", ""]
         )
 
+    def types_of(self, category: Category) -> tuple[str, ...]:
+        """Ids of the vTypes of a category."""
+        return tuple(f"{category.value}.{n}" for n in range(self._counts.get(category.value, 0)))
+
     def _type_lines(self, name: str, attributes: tuple[tuple[str, str], ...]) -> list[str]:
         start = f'    <vType id="{name}"{_xml(attributes)}'
         if not self._parameters or name in self._on_foot:

@@ -12,17 +12,20 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from odscen.convert.model.net import STAGE
+from odscen.convert.signals.signal_programs import LEAST_GREEN
 from odscen.scenario.signals.stage_sequence import (
     change_length,
     change_steps,
     cycle_length,
     stage_state,
 )
+from odscen.sumo.realize.light_detectors import BUS_GREEN, bus_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
+    from odscen.sumo.realize.light_detectors import BusArea
 
 HOLD = "hold "
 """How the names of phases begin that hold a stage for one that was not called."""
@@ -86,6 +89,28 @@ def kept_cycle(program: DesignedProgram, plan: TimedPlan) -> float | None:
     if any(stage.on_call for stage in plan.stages):
         return cycle_length(program, plan.stages)
     return None
+
+
+def started_offset(plan: PhasePlan, offset: float) -> float:
+    """Offset by which SUMO, which counts all phases as one cycle, starts where ours does."""
+    cycle = sum(phase.seconds for phase in plan.cycle)
+    total = sum(phase.seconds for phase in plan.phases)
+    return offset if total == cycle else (total - (-offset % cycle)) % total
+
+
+def calling_crossings(program: DesignedProgram) -> dict[str, set[int]]:
+    """Crossings that call each stage on call: those that have no green otherwise, if any."""
+    stages = program.timing.stages
+    walks = {name for name, group in program.groups.items() if group.walk}
+    served = {name for stage in stages if not stage.on_call for name in stage.groups}
+    found = {}
+    for stage in stages:
+        if stage.on_call:
+            own = walks & set(stage.groups)
+            found[stage.id] = {
+                n for name in own - served or own for n in program.groups[name].movements
+            }
+    return found
 
 
 def plan_phases(
@@ -265,3 +290,65 @@ def _from_its_end(phases: list[SumoPhase], main: int, last: int) -> PhasePlan:
         for old in order
     ]
     return PhasePlan(tuple(turned), main, place[0])
+
+
+def bus_phases(
+    plan: PhasePlan,
+    green: Mapping[str, set[int]],
+    areas: Sequence[BusArea],
+    conditions: dict[str, str],
+) -> PhasePlan:
+    """Phases of a fixed-time program in which buses have priority.
+
+    A green with a bus coming to it is followed by one of the same state, which ends with the bus;
+    one for which none comes ends early, after its least green, while one waits elsewhere.
+
+    Parameters
+    ----------
+    green
+        Movements that have green in each stage.
+    conditions
+        Conditions of the program, to which those of buses are added.
+    """
+    phases = list(plan.phases)
+    main = len(phases)
+    for at in range(main):
+        stage = phases[at]
+        own, other = bus_in(areas, green[stage.stage]) if stage.stage else ("0", "0")
+        after = (at + 1) % main
+        if own == "0" or phases[after].stage:
+            continue
+        came, waits = f"bus{stage.stage}", f"waits{stage.stage}"
+        conditions |= {came: own, waits: other}
+        longer = len(phases)
+        phases += _bus_green(phases[:main], at, longer, came)
+        least = min(stage.least or LEAST_GREEN, stage.seconds)
+        following = (longer, after)
+        phases[at] = replace(stage, least=least, most=stage.seconds, following=following)
+        early = f"({waits} > 0) and ({came} < 1)"
+        phases[after] = replace(phases[after], early=early, final="1")
+    if len(phases) > main and not phases[main - 1].following:
+        phases[main - 1] = replace(phases[main - 1], following=(0,))
+    return PhasePlan(tuple(phases), main, plan.first)
+
+
+def _bus_green(main: Sequence[SumoPhase], at: int, first: int, came: str) -> list[SumoPhase]:
+    """Longer green of the stage at ``at``, and its own change to the next stage.
+
+    ``first`` is the index that it will have; ``came`` the condition that a bus comes to it.
+    """
+    count = len(main)
+    order = [n % count for n in range(at + 1, at + count)]
+    behind = next((n for n in order if main[n].stage), at)
+    change = [main[n] for n in order[: order.index(behind) if behind != at else None]]
+    longer = replace(
+        main[at], seconds=BUS_GREEN, name=f"{HOLD}{main[at].stage}", least=1.0, most=BUS_GREEN,
+        following=(first + 1,), early="0", final=came,
+    )  # fmt: skip
+    found = [longer]
+    for number, phase in enumerate(change, start=first + 1):
+        last = number == first + len(change)
+        early, final = (f"({came} < 1)", "1") if number == first + 1 else ("", "")
+        following = (behind if last else number + 1,)
+        found.append(replace(phase, following=following, early=early, final=final))
+    return found

@@ -1,0 +1,258 @@
+"""What timing lights after demand gains: delay, paired over five seeds, with 95 % intervals.
+
+Four comparisons on shipped maps, twenty minutes each: Webster's splits against equal ones
+with the same cycle; a green wave against lights that begin at once; actuated against fixed-time
+control at half the demand; priority for buses. Prints the table of ``docs/signals.md``. A change is
+significant where its interval does not contain 0.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import polars as pl
+
+from odscen.app.demands import add_background
+from odscen.app.green_waves import coordinate_signals
+from odscen.app.maps import load_map
+from odscen.app.runs import run
+from odscen.app.signal_optimisation import time_signals
+from odscen.base.categories import Category
+from odscen.lanegraph.query import node_id
+from odscen.scenario import edits
+from odscen.scenario.document.signals_document import Signals
+from odscen.scenario.edits.edited_parts import changed_part, with_fields
+from odscen.scenario.signals.webster import whole_seconds
+from odscen.workspace.store import Workspace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.scenario_document import Scenario
+
+MAPS = Path(__file__).parents[1] / "maps"
+SEEDS = (1, 2, 3, 4, 5)
+UNTIL = 1200.0
+T_FOUR = 2.776
+"""Student's t for 95 % of five pairs."""
+
+DEMANDS = ((400, 100), (500, 100), (600, 100))
+"""Vehicles an hour on each leg of the main road, and of the side road."""
+
+
+CYCLES = (60.0, 120.0)
+"""Seconds: shorter cycles would leave nothing to divide beyond least greens."""
+
+
+class Delays(NamedTuple):
+    """Mean time loss with insertion delay, seconds; ``along`` of those along a corridor."""
+
+    every: float
+    buses: float
+    others: float
+    along: float
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        workspace = Workspace.open(Path(folder))
+        for name in ("signal_crossing", "town_5x5"):
+            workspace.add_map(MAPS / f"{name}.xodr")
+        print("| comparison | without, s | with, s | change of mean delay, s (95 %) |")
+        print("|---|---|---|---|")
+        bench = _Bench(workspace)
+        bench.splits()
+        bench.wave()
+        bench.actuation()
+        bench.buses()
+
+
+class _Bench:
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self._runs = 0
+
+    def splits(self) -> None:
+        for major, minor in DEMANDS:
+
+            def made(seed: int, demand: tuple[int, int] = (major, minor)) -> Scenario:
+                return self._crossing(seed, *demand)
+
+            self._compare(
+                f"Webster's splits against equal ones, {major} and {minor} veh/h a leg",
+                lambda seed, made=made: self._timed(made(seed), equal=True),
+                lambda seed, made=made: self._timed(made(seed)),
+                ("every",),
+            )
+
+    def wave(self) -> None:
+        for favoured, words in (("out", "along"), ("both", "both directions")):
+            found = coordinate_signals(
+                self._workspace, self._avenue(1), along=["Avenue"], favoured=favoured
+            )
+            bands = ", ".join(
+                f"{name} {band.seconds:.0f} s ({100 * band.seconds / found.cycle:.0f} %)"
+                for name, band in (("along", found.out), ("back", found.back))
+            )
+            name = f"green wave on the Avenue, {words}: bands {bands} of {found.cycle:.0f} s"
+            self._compare(
+                name,
+                lambda seed, f=favoured: self._waved(seed, f, offsets=False),
+                lambda seed, f=favoured: self._waved(seed, f, offsets=True),
+                ("along", "every"),
+            )
+
+    def actuation(self) -> None:
+        def made(seed: int, control: str) -> Scenario:
+            full = time_signals(self._workspace, self._crossing(seed, 600, 150)).scenario
+            half = self._crossing(seed, 300, 75)
+            return with_fields(half, signals=changed_part(full.signals, {"control": control}))
+
+        self._compare(
+            "actuated against fixed-time, half of the demand it is timed for",
+            lambda seed: made(seed, "fixed"), lambda seed: made(seed, "actuated"), ("every",),
+        )  # fmt: skip
+
+    def buses(self) -> None:
+        for control in ("fixed", "actuated"):
+
+            def made(seed: int, asked: bool, control: str = control) -> Scenario:
+                one = self._crossing(seed, 450, 250, buses=0.1)
+                timed = time_signals(self._workspace, one).scenario
+                changes = {"control": control, "bus_priority": asked}
+                return with_fields(timed, signals=changed_part(timed.signals, changes))
+
+            self._compare(
+                f"bus priority, {control} control",
+                lambda seed, made=made: made(seed, False),
+                lambda seed, made=made: made(seed, True),
+                ("buses", "others"),
+            )
+
+    def _compare(
+        self,
+        name: str,
+        without: Callable[[int], Scenario],
+        including: Callable[[int], Scenario],
+        fields: tuple[str, ...],
+    ) -> None:
+        pairs = [(self._run(without(seed)), self._run(including(seed))) for seed in SEEDS]
+        for field in fields:
+            before = [getattr(one, field) for one, _ in pairs]
+            after = [getattr(other, field) for _, other in pairs]
+            changes = [b - a for a, b in zip(before, after, strict=True)]
+            half = T_FOUR * statistics.stdev(changes) / math.sqrt(len(changes))
+            mean = statistics.fmean(changes)
+            words = {"every": "all", "along": "those along the Avenue"}.get(field, field)
+            mark = "" if abs(mean) > half else ", not significant"
+            print(
+                f"| {name}: {words} | {statistics.fmean(before):.1f} | "
+                f"{statistics.fmean(after):.1f} | {mean:+.1f} ({mean - half:+.1f} to "
+                f"{mean + half:+.1f}){mark} |",
+                flush=True,
+            )
+
+    def _run(self, scenario: Scenario) -> Delays:
+        self._runs += 1
+        done = run(self._workspace, scenario, name=f"run{self._runs}")
+        plan = json.loads((done.folder / "plan.json").read_text())
+        kinds = {actor["id"]: actor["category"] for actor in plan["actors"]}
+        planned = {actor["id"]: actor["depart"] for actor in plan["actors"]}
+        flows = {actor["id"]: actor.get("flow") or "" for actor in plan["actors"]}
+        delays: dict[str, float] = {name: UNTIL - depart for name, depart in planned.items()}
+        rows = pl.read_parquet(done.folder / "trips.parquet").filter(~pl.col("person"))
+        for name, depart, loss in rows.select("id", "depart", "time_loss").iter_rows():
+            delays[name] = loss + max(0.0, depart - planned[name])
+        return Delays(
+            _mean(delays, lambda name: name in kinds),
+            _mean(delays, lambda name: kinds[name] == "bus"),
+            _mean(delays, lambda name: kinds[name] != "bus"),
+            _mean(delays, lambda name: flows[name].startswith("flow-")),
+        )
+
+    def _timed(self, scenario: Scenario, *, equal: bool = False) -> Scenario:
+        timed = time_signals(self._workspace, scenario, bounds=CYCLES)
+        if not equal:
+            return timed.scenario
+        (light,) = timed.lights
+        greens = light.times.green
+        share = sum(greens) / len(greens)
+        same = whole_seconds(dict.fromkeys(range(len(greens)), share), sum(greens))
+        (timing,) = timed.scenario.signals.junctions
+        entry = changed_part(timing, {"green": same})
+        return with_fields(scenario, signals=Signals(junctions=(entry,)))
+
+    def _waved(self, seed: int, favoured: str, *, offsets: bool) -> Scenario:
+        found = coordinate_signals(
+            self._workspace, self._avenue(seed), along=["Avenue"], favoured=favoured
+        ).scenario
+        if offsets:
+            return found
+        plain = tuple(changed_part(one, {"offset": 0.0}) for one in found.signals.junctions)
+        return with_fields(found, signals=changed_part(found.signals, {"junctions": plain}))
+
+    def _crossing(self, seed: int, major: float, minor: float, *, buses: float = 0.0) -> Scenario:
+        graph = self._graph("signal_crossing")
+        one = edits.new_scenario(graph, name="crossing", roi=graph.segments.ids, seed=seed)
+        mix = {Category.CAR: 1.0 - buses, Category.BUS: buses} if buses else {Category.CAR: 1.0}
+        for road, spawn in _entries(graph).items():
+            volume = major if road in ("1", "3") else minor
+            one = edits.add_flow(one, graph, spawn=spawn, per_hour=volume, mix=mix, end=UNTIL)
+        return edits.set_simulation(one, duration=UNTIL)
+
+    def _avenue(self, seed: int) -> Scenario:
+        graph = self._graph("town_5x5")
+        one = edits.new_scenario(graph, name="avenue", roi=graph.segments.ids, seed=seed)
+        one = edits.set_simulation(one, duration=UNTIL)
+        for first, last in (("r2", "r50"), ("r51", "r4")):
+            spawn, goal = _through(graph, first, last)
+            one = edits.add_flow(
+                one, graph, spawn=spawn, goal=goal, per_hour=200.0, end=UNTIL,
+                mix={Category.CAR: 1.0},
+            )  # fmt: skip
+        return add_background(self._workspace, one, name="others", per_km=4.0)
+
+    def _graph(self, name: str) -> MapGraph:
+        return load_map(self._workspace.map(name)).sumo.graph
+
+
+def _mean(delays: Mapping[str, float], chosen: Callable[[str], bool]) -> float:
+    found = [delay for name, delay in delays.items() if chosen(name)]
+    return statistics.fmean(found) if found else 0.0
+
+
+def _entries(graph: MapGraph) -> dict[str, str]:
+    """First node of the second car lane of each leg."""
+    lanes = graph.lanes
+    starts = np.setdiff1d(np.arange(len(lanes.x)), lanes.target)
+    found = {}
+    for node in starts.tolist():
+        key = lanes.lanes.keys[lanes.lane[node]]
+        if key.lane == -2:
+            found[str(key.road)] = node_id(graph, node)
+    return dict(sorted(found.items()))
+
+
+def _through(graph: MapGraph, first: str, last: str) -> tuple[str, str]:
+    """Nodes in the middle of two segments, one of which can be driven to from the other."""
+    from odscen.lanegraph.shortest_paths import Router
+
+    lanes = graph.lanes
+    row = {str(name): n for n, name in enumerate(graph.segments.ids)}
+    starts, goals = (np.flatnonzero(lanes.segment == row[name]) for name in (first, last))
+    router = Router(graph, None)
+    best = None
+    for start in starts[:: max(len(starts) // 12, 1)].tolist():
+        far = router.distances(start)[goals]
+        if np.isfinite(far).any():
+            found = float(far.min()), start, int(goals[np.isfinite(far)][-1])
+            best = found if best is None else min(best, found)
+    assert best is not None
+    return node_id(graph, best[1]), node_id(graph, best[2])

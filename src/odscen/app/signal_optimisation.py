@@ -1,0 +1,246 @@
+"""Traffic lights timed after the demand of a scenario: cycles and splits, and green waves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.app.maps import map_of
+from odscen.app.scenarios import given_scenario
+from odscen.base.errors import InputError, NotFoundError
+from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.signals.webster import LONGEST_CYCLE, SATURATION_FLOW, SHORTEST_CYCLE
+from odscen.sumo.calibrate.light_timing import (
+    TimedLight,
+    retimed,
+    timed_light,
+    timing_of,
+    with_timings,
+)
+from odscen.sumo.calibrate.turning_volumes import planned_vehicles, turning_volumes
+from odscen.sumo.realize.light_realization import realized_lights
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from odscen.app.maps import LoadedMap
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.calibrate.turning_volumes import Volumes
+    from odscen.workspace.store import Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class TimedSignals:
+    """Lights timed by Webster's method.
+
+    Attributes
+    ----------
+    scenario
+        With the new times.
+    begin, end
+        Seconds of the scenario whose demand it is.
+    lights
+        In the order of the map.
+    without
+        Lights that no vehicle comes to; they keep their times.
+    """
+
+    scenario: Scenario
+    begin: float
+    end: float
+    lights: tuple[TimedLight, ...]
+    without: tuple[str, ...]
+
+    @property
+    def oversaturated(self) -> tuple[str, ...]:
+        """Junctions at which more vehicles come to a lane than have green."""
+        return tuple(
+            ", ".join(light.times.junctions) for light in self.lights if light.oversaturated
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it but the scenario, as data."""
+        return {
+            "begin": self.begin,
+            "end": self.end,
+            "lights": [_light_fields(light) for light in self.lights],
+            "without_demand": list(self.without),
+            "oversaturated": list(self.oversaturated),
+        }
+
+
+def time_signals(
+    workspace: Workspace,
+    scenario: Scenario | Path,
+    *,
+    junctions: Sequence[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
+    saturation: float = SATURATION_FLOW,
+    bounds: tuple[float, float] = (SHORTEST_CYCLE, LONGEST_CYCLE),
+) -> TimedSignals:
+    """Give lights the cycle and greens of Webster's method for the demand of the scenario.
+
+    Volumes are those of the routes that a run has, of vehicles that depart in the interval. Stages,
+    intergreens and offsets stay.
+
+    Parameters
+    ----------
+    junctions
+        Lights; all if empty.
+    begin, end
+        Seconds of the scenario; the busiest hour if not given.
+    saturation
+        Base saturation flow: passenger cars an hour and lane that drive straight on.
+    bounds
+        Shortest and longest cycle, seconds.
+
+    Raises
+    ------
+    InputError
+        If the map has no light, no vehicle comes to any, or the interval or a bound is none.
+    NotFoundError
+        If a junction has no light.
+    ScenarioError
+        With every problem of the signals or of the demand.
+    """
+    scenario = given_scenario(scenario)
+    loaded = map_of(workspace, scenario)
+    _refuse_settings(scenario, begin, end, saturation, bounds)
+    chosen = chosen_lights(loaded, junctions)
+    refuse_errors(signal_problems(scenario.signals, loaded.lights))
+    vehicles = list(planned_vehicles(scenario, loaded.sumo))
+    volumes = turning_volumes(vehicles, duration=scenario.simulation.duration, begin=begin, end=end)
+    timer = _Timer(scenario, loaded, volumes, saturation, bounds)
+    lights = {number: timer.timed(number) for number in chosen}
+    timed = timer.in_step({n: one for n, one in lights.items() if one is not None})
+    if not timed:
+        msg = (
+            f"no vehicle that departs between {volumes.begin:g} and {volumes.end:g} s comes to a "
+            "traffic light"
+        )
+        raise InputError(msg)
+    without = tuple(", ".join(loaded.lights[n].names) for n, one in lights.items() if one is None)
+    entries = [retimed(scenario, one.times) for one in timed.values()]
+    new = with_timings(scenario, entries)
+    refuse_errors(signal_problems(new.signals, loaded.lights))
+    return TimedSignals(new, volumes.begin, volumes.end, tuple(timed.values()), without)
+
+
+def chosen_lights(loaded: LoadedMap, junctions: Sequence[str]) -> list[int]:
+    """Numbers of lights by their junctions; all if none are named.
+
+    Raises
+    ------
+    InputError
+        If the map has no light.
+    NotFoundError
+        If a junction has none.
+    """
+    names = {name: number for number, light in enumerate(loaded.lights) for name in light.names}
+    if not names:
+        msg = f"map {loaded.entry.name!r} has no traffic lights"
+        raise InputError(msg)
+    found = []
+    for name in junctions:
+        if name not in names:
+            what = "traffic light in junction"
+            raise NotFoundError(what, name, list(names))
+        found.append(names[name])
+    return list(dict.fromkeys(found)) if junctions else list(range(len(loaded.lights)))
+
+
+def _refuse_settings(
+    scenario: Scenario,
+    begin: float | None,
+    end: float | None,
+    saturation: float,
+    bounds: tuple[float, float],
+) -> None:
+    duration = scenario.simulation.duration
+    first, last = begin or 0.0, duration if end is None else end
+    if not 0.0 <= first < last <= duration:
+        msg = f"{first:g} to {last:g} s is no part of the scenario, which lasts {duration:g} s"
+        raise InputError(msg)
+    if not 0.0 < bounds[0] <= bounds[1]:
+        msg = f"a shortest cycle of {bounds[0]:g} s and a longest of {bounds[1]:g} s: none is both"
+        raise InputError(msg)
+    if not saturation > 0.0:
+        msg = f"a saturation flow of {saturation:g} vehicles an hour: it has to be positive"
+        raise InputError(msg)
+
+
+class _Timer:
+    """Times the lights of one scenario."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        loaded: LoadedMap,
+        volumes: Volumes,
+        saturation: float,
+        bounds: tuple[float, float],
+    ) -> None:
+        self._scenario, self._loaded, self._volumes = scenario, loaded, volumes
+        self._saturation, self._bounds = saturation, bounds
+        self._shown = [light.shown for light in realized_lights(scenario, loaded.sumo)]
+
+    def timed(self, number: int, cycle: float | None = None) -> TimedLight | None:
+        sumo, view = self._loaded.sumo, self._loaded.lights[number]
+        return timed_light(
+            sumo.lights[number], view, self._shown[number], sumo, self._volumes.by_turn,
+            timing=timing_of(self._scenario, view.names), begin=self._volumes.begin,
+            bounds=self._bounds, saturation=self._saturation, cycle=cycle,
+        )  # fmt: skip
+
+    def in_step(self, lights: dict[int, TimedLight]) -> dict[int, TimedLight]:
+        """Give lights of one coordination the longest of their cycles, those left out too."""
+        groups: dict[str, list[int]] = {}
+        for number, view in enumerate(self._loaded.lights):
+            timing = timing_of(self._scenario, view.names)
+            if timing is not None and timing.coordination is not None:
+                groups.setdefault(timing.coordination, []).append(number)
+        for members in groups.values():
+            own = [lights[n].times.cycle for n in members if n in lights]
+            if not own:
+                continue
+            for number in members:
+                again = self.timed(number, cycle=max(own))
+                if again is not None:
+                    lights[number] = again
+        return lights
+
+
+def _light_fields(light: TimedLight) -> dict[str, Any]:
+    times, splits = light.times, light.splits
+    return {
+        "junctions": list(times.junctions),
+        "plan": times.plan,
+        "cycle": times.cycle,
+        "cycle_before": light.before.cycle,
+        "cycle_wanted": splits.wanted if splits.wanted < float("inf") else None,
+        "lost_time": splits.lost,
+        "flow_ratio": splits.flow_ratio,
+        "oversaturated": bool(light.oversaturated),
+        "stages": [
+            {"id": name, "green": green, "green_before": before, "flow_ratio": ratio}
+            for name, green, before, ratio in zip(
+                times.stages, times.green, light.before.green, splits.ratios, strict=True
+            )
+        ],
+        "movements": [one._asdict() for one in light.movements],
+        "lanes": [
+            {
+                "lane": lane.load.lane,
+                "turns": list(lane.load.turns),
+                "volume": lane.load.volume,
+                "saturation_flow": lane.load.saturation,
+                "flow_ratio": lane.load.ratio,
+                "green": lane.green,
+                "v_c": lane.degree,
+            }
+            for lane in light.lanes
+        ],
+    }

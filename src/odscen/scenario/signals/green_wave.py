@@ -1,0 +1,149 @@
+"""Green waves: offsets of lights along a corridor, and the bands in which one passes all of them.
+
+A band is a stretch of time in which vehicles that begin to drive through the corridor at the
+progression speed have green at every light. The offsets are those of the widest bands, as MAXBAND
+has them for given cycle, splits and speeds (J. D. C. Little, M. D. Kelson, N. H. Gartner, 1981),
+found by trial of all: once it is given how late the band of one direction is after that of the
+other, whether bands of some widths fit through a light is a question of that light alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.base.arrays import FloatArray
+
+Favoured = Literal["both", "out", "back"]
+
+_NEAR = 1e-6
+
+
+class GreenWindow(NamedTuple):
+    """Seconds of a program at which green begins, and for which it lasts."""
+
+    begin: float
+    seconds: float
+
+
+class WaveLight(NamedTuple):
+    """A light of a corridor.
+
+    Attributes
+    ----------
+    out, back
+        Windows of green for those who drive along the corridor, and back; none where one cannot.
+    out_time
+        Seconds from the first light of the corridor to this one.
+    back_time
+        Seconds from the last light to this one.
+    """
+
+    out: tuple[GreenWindow, ...]
+    back: tuple[GreenWindow, ...]
+    out_time: float
+    back_time: float
+
+
+class Band(NamedTuple):
+    """When a band begins at the first light of its direction, and how long it lasts; seconds."""
+
+    begin: float
+    seconds: float
+
+
+def green_bands(
+    lights: Sequence[WaveLight], offsets: Sequence[float], cycle: float
+) -> tuple[Band, Band]:
+    """Widest band of either direction with given offsets; none lasts 0 s."""
+    pairs = list(zip(lights, offsets, strict=True))
+    return (
+        _widest([(one.out, offset - one.out_time) for one, offset in pairs], cycle),
+        _widest([(one.back, offset - one.back_time) for one, offset in pairs], cycle),
+    )
+
+
+def _widest(windows: Sequence[tuple[Sequence[GreenWindow], float]], cycle: float) -> Band:
+    """Longest common stretch of windows that are shifted, on the circle of a cycle."""
+    free = [(0.0, 2.0 * cycle)]
+    for own, shift in windows:
+        shown = [
+            (begin + turn * cycle, begin + turn * cycle + min(one.seconds, cycle))
+            for one in own
+            for begin in ((one.begin + shift) % cycle,)
+            for turn in (-1, 0, 1)
+        ]
+        if any(one.seconds >= cycle for one in own):
+            continue
+        free = [
+            (max(a, c), min(b, d)) for a, b in free for c, d in shown if min(b, d) - max(a, c) > 0.0
+        ]
+    # What the end of the two cycles cuts is whole in the first of them.
+    best = max(free, key=lambda one: (round(min(one[1] - one[0], cycle), 6), -one[0]), default=None)
+    if best is None:
+        return Band(0.0, 0.0)
+    return Band(best[0] % cycle, min(best[1] - best[0], cycle))
+
+
+def widest_offsets(
+    lights: Sequence[WaveLight], cycle: float, *, favoured: Favoured = "both"
+) -> tuple[float, ...]:
+    """Offsets in whole seconds with which the bands are widest; that of the first light is 0.
+
+    Parameters
+    ----------
+    favoured
+        ``both``: the narrower band is made as wide as can be, then the sum; otherwise the band of
+        that direction, then the other.
+    """
+    grid = max(math.floor(cycle + _NEAR), 1)
+    steps: FloatArray = np.arange(2 * grid, dtype=np.float64)
+    out = [_room(one.out, one.out_time - steps[:grid], cycle) for one in lights]
+    # By seconds that the band back begins after the one out, less the offset.
+    back = [_room(one.back, steps + (one.back_time - grid), cycle) for one in lights]
+    places = np.arange(grid)[None, :] - np.arange(grid)[:, None] + grid
+    rooms = [one[places] for one in back]  # by offset, then by the lateness of the band back
+    widest = math.floor(min(float(room.max()) for room in out) + _NEAR)
+    best: tuple[tuple[float, float], int, float, int] | None = None
+    for width in range(widest + 1):
+        through = np.full(grid, cycle)
+        for room, other in zip(out, rooms, strict=True):
+            fits = room >= width - _NEAR if width else room > -np.inf  # no band fits anywhere
+            through = np.minimum(through, other[fits].max(axis=0))
+        for late in np.flatnonzero(through >= through.max() - _NEAR).tolist()[:1]:
+            value = _value(float(width), max(float(through[late]), 0.0), favoured)
+            if best is None or value > best[0]:
+                best = value, width, float(through[late]), late
+    if best is None:
+        return (0.0,) * len(lights)
+    _, width, returned, late = best
+    offsets = []
+    for room, other in zip(out, rooms, strict=True):
+        spare = other[:, late] - returned
+        if width:
+            spare = np.minimum(room - width, spare)
+        offsets.append(int(np.flatnonzero(spare >= spare.max() - _NEAR)[0]))
+    return tuple(float((one - offsets[0]) % grid) for one in offsets)
+
+
+def _value(out: float, back: float, favoured: Favoured) -> tuple[float, float]:
+    if favoured == "out":
+        return round(out, 6), round(back, 6)
+    if favoured == "back":
+        return round(back, 6), round(out, 6)
+    return round(min(out, back), 6), round(out + back, 6)
+
+
+def _room(windows: Sequence[GreenWindow], times: FloatArray, cycle: float) -> FloatArray:
+    """Seconds of green that are left at times of the program; negative without any."""
+    room = np.full(len(times), -1.0)
+    for window in windows:
+        since = np.mod(times - window.begin + _NEAR, cycle) - _NEAR
+        left = window.seconds - since
+        room = np.maximum(room, left if window.seconds < cycle else cycle)
+    return room

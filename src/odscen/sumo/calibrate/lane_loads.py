@@ -1,0 +1,178 @@
+"""What the volumes at a light ask of its lanes: flow ratios, green and degree of saturation."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from odscen.scenario.signals.webster import (
+    HEAVY,
+    PROTECTED_LEFT,
+    RIGHT_TURN,
+    LaneNeed,
+    left_turn_equivalent,
+)
+from odscen.sumo.calibrate.turning_volumes import TurnVolume, turns_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.results.records.light_programs import ProgramPhase
+    from odscen.scenario.signals.light import Light
+    from odscen.sumo.calibrate.turning_volumes import Turn
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+_SHARES = 40
+"""Parts in which the vehicles of a movement choose among its lanes."""
+
+
+class MovementVolume(NamedTuple):
+    """Vehicles an hour of one movement, from segment to segment."""
+
+    movement: str
+    turn: str
+    vehicles: float
+    heavy: float
+
+
+@dataclass(frozen=True, slots=True)
+class LaneLoad:
+    """A lane at the stop line.
+
+    Attributes
+    ----------
+    lane
+        OpenDRIVE lane, ``12.0.-1``.
+    turns
+        Turns of the vehicles on it.
+    volume
+        Vehicles an hour.
+    saturation
+        Vehicles an hour of green that it carries with these turns and vehicles.
+    links
+        Places in the light's states of the movements that use it.
+    """
+
+    lane: str
+    turns: tuple[str, ...]
+    volume: float
+    saturation: float
+    links: tuple[int, ...]
+
+    @property
+    def ratio(self) -> float:
+        """Flow ratio."""
+        return self.volume / self.saturation
+
+    def green(self, phases: Sequence[ProgramPhase]) -> float:
+        """Seconds of a cycle in which all movements that use it have green."""
+        shown = (phase for phase in phases if all(phase.state[n] in "Gg" for n in self.links))
+        return sum(phase.seconds for phase in shown)
+
+
+class LightDemand:
+    """Volumes at one light, on its movements and lanes.
+
+    Parameters
+    ----------
+    phases
+        Of its program: they say which turns give way.
+    saturation
+        Base saturation flow, passenger cars an hour and lane.
+    """
+
+    def __init__(
+        self,
+        light: SumoLight,
+        view: Light,
+        sumo_map: SumoMap,
+        volumes: Mapping[Turn, TurnVolume],
+        *,
+        phases: Sequence[ProgramPhase],
+        saturation: float,
+    ) -> None:
+        self._light, self._view, self._phases = light, view, phases
+        self._base = saturation
+        self._near_side = "left" if sumo_map.net.lefthand else "right"
+        self._turns = turns_of(light, sumo_map)
+        nothing = TurnVolume(0.0, 0.0)
+        self._volumes = {turn: volumes.get(turn, nothing) for turn in self._turns}
+        self.lanes = self._lanes()
+
+    @property
+    def movements(self) -> tuple[MovementVolume, ...]:
+        """Volume of each movement of vehicles."""
+        found = []
+        for turn, links in self._turns.items():
+            one = self._view.movements[links[0]]
+            found.append(MovementVolume(one.name, one.turn, *self._volumes[turn]))
+        return tuple(found)
+
+    def needs(self) -> tuple[LaneNeed, ...]:
+        """Flow ratio of each lane, with the numbers of the stages in which it has green."""
+        stages = [phase for phase in self._phases if phase.stage]
+        found = []
+        for lane in self.lanes:
+            for quorum in (all, any):
+                green = tuple(
+                    number
+                    for number, phase in enumerate(stages)
+                    if quorum(phase.state[n] in "Gg" for n in lane.links)
+                )
+                if green:
+                    break
+            found.append(LaneNeed(lane.ratio, green))
+        return tuple(found)
+
+    def _lanes(self) -> tuple[LaneLoad, ...]:
+        """Divide movements among their lanes: each part takes the lane of least ratio."""
+        work: dict[str, float] = defaultdict(float)
+        cars: dict[str, float] = defaultdict(float)
+        links: dict[str, set[int]] = defaultdict(set)
+        for turn, own in sorted(self._turns.items(), key=lambda item: (len(item[1]), item[0])):
+            volume = self._volumes[turn]
+            if not volume.vehicles:
+                continue
+            weight = 1.0 + (HEAVY - 1.0) * volume.heavy / volume.vehicles
+            needs = {n: weight * self._equivalent(n) / self._base for n in own}
+            for _ in range(_SHARES):
+                n = min(own, key=lambda n: (work[self._light.links[n].source] + needs[n], n))
+                lane = self._light.links[n].source
+                work[lane] += volume.vehicles / _SHARES * needs[n]
+                cars[lane] += volume.vehicles / _SHARES
+                links[lane].add(n)
+        return tuple(
+            LaneLoad(
+                self._view.movements[min(links[lane])].lanes[0],
+                tuple(dict.fromkeys(self._view.movements[n].turn for n in sorted(links[lane]))),
+                cars[lane], cars[lane] / work[lane], tuple(sorted(links[lane])),
+            )
+            for lane in sorted(cars, key=lambda lane: min(links[lane]))
+        )  # fmt: skip
+
+    def _equivalent(self, link: int) -> float:
+        turn = self._view.movements[link].turn
+        if turn == "straight":
+            return 1.0
+        if turn == self._near_side:
+            return RIGHT_TURN
+        letters = {phase.state[link] for phase in self._phases if phase.stage}
+        if "G" in letters or "g" not in letters:
+            return PROTECTED_LEFT
+        return left_turn_equivalent(self._opposing(link), self._base)
+
+    def _opposing(self, link: int) -> float:
+        """Vehicles an hour that a permissive movement gives way to while both have green."""
+        greens = [phase.state for phase in self._phases if phase.stage and phase.state[link] == "g"]
+        before = {
+            meeting.other if meeting.one == link else meeting.one
+            for meeting in self._view.meetings
+            if meeting.yields == link
+        }
+        return sum(
+            self._volumes[turn].vehicles
+            for turn, links in self._turns.items()
+            if any(n in before and state[n] in "Gg" for n in links for state in greens)
+        )

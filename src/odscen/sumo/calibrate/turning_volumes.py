@@ -1,0 +1,145 @@
+"""Vehicles that a scenario brings to the movements of each traffic light, by their routes."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.convert.model.net import CROSSED
+from odscen.lanegraph.shortest_paths import Router
+from odscen.scenario.placing.region import Region
+from odscen.sumo.realize.driving import KINDS
+from odscen.sumo.realize.realization import all_road_users
+from odscen.sumo.realize.route_paths import each_path
+from odscen.sumo.realize.route_planner import NoRouteError, RoutePlanner
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+HOUR = 3600.0
+
+_STEP = 300.0
+"""Seconds between the hours among which the busiest one is looked for."""
+
+HEAVY_CATEGORIES = frozenset({Category.TRUCK, Category.BUS})
+
+
+class Turn(NamedTuple):
+    """Edges before and behind a light."""
+
+    source: str
+    target: str
+
+
+class TurnVolume(NamedTuple):
+    """Vehicles an hour, and how many of them are trucks and buses."""
+
+    vehicles: float
+    heavy: float
+
+
+class PlannedVehicle(NamedTuple):
+    """When a vehicle departs, and at which lights it turns where."""
+
+    depart: float
+    category: Category
+    turns: tuple[Turn, ...]
+
+
+class Volumes(NamedTuple):
+    """Volumes at all lights in an interval of the scenario, seconds."""
+
+    begin: float
+    end: float
+    by_turn: Mapping[Turn, TurnVolume]
+
+
+def planned_vehicles(scenario: Scenario, sumo_map: SumoMap) -> Iterator[PlannedVehicle]:
+    """Yield vehicles that pass lights on the routes that a run gives them.
+
+    Raises
+    ------
+    ScenarioError
+        With every actor and flow whose spawn or goal is not usable.
+    """
+    known = {turn for light in sumo_map.lights for turn in turns_of(light, sumo_map)}
+    region = Region.of(sumo_map.graph, scenario.roi)
+    users, _ = all_road_users(scenario, sumo_map, region, until=scenario.simulation.duration)
+    vehicles = [user for user in users if not user.person]
+    router = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
+    planner = RoutePlanner(sumo_map.graph.lanes, sumo_map.net, sumo_map.lane_places)
+    for index, path in each_path(vehicles, region, router):
+        user = vehicles[index]
+        vclass = KINDS[user.category].vclass
+        try:
+            length = DEFAULT_BODY[user.category].length
+            route = planner.plan(path, length=length, vclass=vclass, lateral_offset=0.0)
+        except NoRouteError:
+            continue
+        steps = zip(route.edges[:-1], route.edges[1:], strict=True)
+        passed = tuple(turn for step in steps if (turn := Turn(*step)) in known)
+        if passed:
+            yield PlannedVehicle(user.depart, user.category, passed)
+
+
+def turns_of(light: SumoLight, sumo_map: SumoMap) -> dict[Turn, tuple[int, ...]]:
+    """Links of a light by the turn that they are for; crossings are left out."""
+    lanes = sumo_map.net.lanes
+    found: dict[Turn, list[int]] = {}
+    for number, link in enumerate(light.links):
+        if link.turn != CROSSED:
+            turn = Turn(lanes[link.source].edge, lanes[link.target].edge)
+            found.setdefault(turn, []).append(number)
+    return {turn: tuple(numbers) for turn, numbers in found.items()}
+
+
+def turning_volumes(
+    vehicles: Sequence[PlannedVehicle],
+    *,
+    duration: float,
+    begin: float | None = None,
+    end: float | None = None,
+) -> Volumes:
+    """Count the vehicles that depart in an interval, per hour.
+
+    By their departures, wherever they then are: so a flow counts in full from its first second.
+
+    Parameters
+    ----------
+    duration
+        Of the scenario, seconds.
+    begin, end
+        Seconds; without both the hour with most passages, or all of a shorter scenario.
+    """
+    if begin is None and end is None:
+        begin = _busiest(vehicles, duration)
+        end = min(begin + HOUR, duration)
+    begin, end = begin or 0.0, duration if end is None else end
+    every: Counter[Turn] = Counter()
+    heavy: Counter[Turn] = Counter()
+    for one in vehicles:
+        if begin <= one.depart < end:
+            every.update(one.turns)
+            if one.category in HEAVY_CATEGORIES:
+                heavy.update(one.turns)
+    hours = (end - begin) / HOUR
+    found = {turn: TurnVolume(every[turn] / hours, heavy[turn] / hours) for turn in sorted(every)}
+    return Volumes(begin, end, found)
+
+
+def _busiest(vehicles: Sequence[PlannedVehicle], duration: float) -> float:
+    if duration <= HOUR:
+        return 0.0
+    passages = np.zeros(math.ceil(duration / _STEP))
+    for one in vehicles:
+        passages[min(int(one.depart // _STEP), len(passages) - 1)] += len(one.turns)
+    sums = np.convolve(passages, np.ones(int(HOUR / _STEP)), mode="valid")
+    return float(sums.argmax()) * _STEP if len(sums) else 0.0
