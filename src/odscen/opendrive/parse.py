@@ -13,7 +13,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.base.errors import in_file
+from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_checks import check_numbers
+from odscen.opendrive.parse_coincident import merge_coincident_roads
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_references import check_references
 from odscen.opendrive.parse_repairs import repair_junction_tables
@@ -28,7 +30,6 @@ from odscen.opendrive.parse_xml import (
     only,
     optional_number,
     refusal,
-    shown,
 )
 from odscen.opendrive.road_model import Controller, Header, Junction, OpenDrive, Road
 
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
+NO_HEADER: Final = Header(1, 4, "", None, None, None, None, "", None)
+"""What stands for a missing ``<header>``: the oldest version, no bounds, no projection."""
 _CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
 K = TypeVar("K")
 V = TypeVar("V")
@@ -69,7 +72,7 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
 
 def _parse_root(root: Element) -> OpenDrive:
     if root.tag != "OpenDRIVE":
-        raise refusal(root, f"the root element is <{str(root.tag)[:60]}>, not <OpenDRIVE>")
+        raise refusal(root, f"the root element is <{shown_id(str(root.tag))}>, not <OpenDRIVE>")
     notes = Notes()
     groups = children(root)
     for tag, found in groups.items():
@@ -92,6 +95,7 @@ def _parse_root(root: Element) -> OpenDrive:
         controller = parse_controller(element, notes)
         _add(controllers, controller.id, controller, element)
     check_numbers(roads, notes)
+    roads, junctions = merge_coincident_roads(roads, junctions, notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
     odr = repair_junction_tables(OpenDrive(header, roads, junctions, controllers), notes)
     return replace(odr, notes=notes.sentences())
@@ -105,7 +109,9 @@ def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:
 
 def _header(root: Element, element: Element | None, notes: Notes) -> Header:
     if element is None:
-        raise refusal(root, "there is no <header>")
+        detail = "there is no <header>; the file is read by the rules of 1.4 to 1.8"
+        notes.add(Rule.MISSING_HEADER, root, detail)
+        return NO_HEADER
     major, minor = integer(element, "revMajor"), integer(element, "revMinor")
     if major != 1 or minor < 0:
         raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.ids import LaneKey
+from odscen.base.shown import shown_id
 from odscen.convert.building.one_way import one_way_ends
 from odscen.convert.model.access import BICYCLE_TYPES, is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
@@ -104,7 +105,7 @@ def _kept(lengths: Mapping[str, float], found: PlannedConnections) -> Iterator[R
 
 
 def _place(road: str, section: int, lane: int) -> str:
-    return f"road {road} > laneSection {section} > lane {lane}"
+    return f"road {shown_id(road)} > laneSection {section} > lane {lane}"
 
 
 def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
@@ -146,7 +147,7 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
-            yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
+            yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
 
 
 def _lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str, float]:
@@ -194,7 +195,7 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
         for item in road.objects:
             if not is_crosswalk(item):
                 continue
-            element = f"road {road.id} > object {item.id}"
+            element = f"road {shown_id(road.id)} > object {shown_id(item.id)}"
             if (road.id, item.id) in kept:
                 yield ReportEntry(
                     ElementOutcome.KEPT, element, "crosswalk, as a crossing of its place and width"
@@ -210,7 +211,7 @@ def _signals(
     crossed = _lit_crossings(net)
     for road in odr.roads.values():
         for signal in road.signals:
-            element = f"road {road.id} > signal {signal.id}"
+            element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
             kind = signal_kind(signal)
             if element in unplaced:
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
@@ -243,7 +244,7 @@ def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:
     for junction in odr.junctions.values():
         bare = [key for key in junction.controllers if not odr.controllers[key].controls]
         if bare and junction.id not in lit:
-            reason = f"no lights: controller {bare[0]} names no signal of the file"
+            reason = f"no lights: controller {shown_id(bare[0])} names no signal of the file"
             yield ReportEntry(ElementOutcome.LOST, f"junction {junction.id}", reason)
 
 
