@@ -22,10 +22,12 @@ from odscen.opendrive.parse_repairs import repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
 from odscen.opendrive.parse_xml import (
+    CONTROLS,
     Element,
     children,
     integer,
     load,
+    may_have_controls,
     number_or,
     only,
     optional_number,
@@ -67,13 +69,26 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
         element and the value.
     """
     with in_file(file) if file else nullcontext():
-        return _parse_root(load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS))
+        root = load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
+        notes = Notes()
+        if may_have_controls(text):
+            _space_controls(root, notes)
+        return _parse_root(root, notes)
 
 
-def _parse_root(root: Element) -> OpenDrive:
+def _space_controls(root: Element, notes: Notes) -> None:
+    """Put spaces for control characters in attributes, and note each."""
+    for element in root.iter():
+        for name, value in [(str(key), text) for key, text in element.attrib.items()]:
+            if CONTROLS.search(str(value)):
+                detail = f"{name}={shown(str(value))} has control characters; they are spaces"
+                element.set(name, CONTROLS.sub(" ", str(value)))
+                notes.add(Rule.CONTROL_CHARACTER, element, detail)
+
+
+def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     if root.tag != "OpenDRIVE":
         raise refusal(root, f"the root element is <{shown_id(str(root.tag))}>, not <OpenDRIVE>")
-    notes = Notes()
     groups = children(root)
     for tag, found in groups.items():
         if tag not in READ:
@@ -95,7 +110,7 @@ def _parse_root(root: Element) -> OpenDrive:
         controller = parse_controller(element, notes)
         _add(controllers, controller.id, controller, element)
     check_numbers(roads, notes)
-    roads, junctions = merge_coincident_roads(roads, junctions, notes)
+    roads = merge_coincident_roads(roads, junctions.values(), notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
     odr = repair_junction_tables(OpenDrive(header, roads, junctions, controllers), notes)
     return replace(odr, notes=notes.sentences())

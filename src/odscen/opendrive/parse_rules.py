@@ -16,6 +16,9 @@ class Rule(StrEnum):
     """Versions before 1.4 and after 1.8 are read as far as their elements are known."""
     MISSING_HEADER = "missing-header"
     """A file without ``<header>`` is read by the rules of 1.4 to 1.8, without a projection."""
+    CONTROL_CHARACTER = "control-character"
+    """Line ends and control characters in attributes are spaces, as XML has it where they are not
+    escaped: names with them could not stand in lists and other files."""
     GEO_REFERENCE = "geo-reference"
     """A geoReference that pyproj does not understand is kept as text; coordinates do not change."""
     JUNCTION_ATTRIBUTE = "junction-attribute"
@@ -30,7 +33,7 @@ class Rule(StrEnum):
     DUPLICATE_ID = "duplicate-id"
     """Objects and signals may share an id; references mean the first."""
     COINCIDENT_ROAD = "coincident-road"
-    """Of roads outside junctions that are alike in all but id and name the first is kept."""
+    """Of roads that no junction names and that are alike in all but id and name the first stays."""
     PLAN_VIEW_S = "plan-view-s"
     """Lengths of geometries and the next s may disagree by up to a metre: s decides."""
     PLAN_VIEW_GAP = "plan-view-gap"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
@@ -31,6 +32,17 @@ _CONTAINERS = frozenset(
 )
 _NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection", "controller"})
 _SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
+
+
+CONTROLS: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+"""Characters that XML permits in attributes, and that no line of text can show."""
+
+
+def may_have_controls(text: str | bytes) -> bool:
+    """Whether attributes of a file may have :data:`CONTROLS`: only if escaped, or beyond ASCII."""
+    if isinstance(text, str):
+        return not text.isascii() or "&#" in text
+    return not text.isascii() or b"&#" in text or b"\0" in text  # UTF-16 has NUL bytes
 
 
 def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
