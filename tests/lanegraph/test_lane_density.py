@@ -51,6 +51,14 @@ def test_lane_sections_that_lie_on_each_other_are_refused() -> None:
         built(document(road(lanes=sections)))
 
 
+def test_walks_that_lie_on_each_other_are_refused_as_lanes_are() -> None:
+    walk = section(lane(-1, kind="sidewalk"))
+    offset = '<laneOffset s="0" a="{}" b="0" c="0" d="0"/>'
+    roads = [road(str(k), lanes=offset.format(k / 1000) + walk) for k in range(200)]
+    with pytest.raises(OpenDriveError, match=r"\d+ lanes lie on each other at"):
+        built(document(*roads))
+
+
 def test_lanes_above_each_other_do_not_lie_together() -> None:
     height = "<elevationProfile><elevation s='0' a='{}' b='0' c='0' d='0'/></elevationProfile>"
     roads = [road(str(k), lanes=section(lane(-1)), inside=height.format(5 * k)) for k in range(80)]

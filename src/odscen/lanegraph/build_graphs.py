@@ -62,7 +62,7 @@ def build_map_graph(
     table = RoadTable.of(odr) if table is None else table
     successors = lane_successors(odr)
     nodes = place_nodes(table, spacing)
-    check_density(table, nodes)
+    check_density(table, nodes.lines.rows[nodes.lane], np.stack([nodes.x, nodes.y, nodes.z]))
     segments = build_segments(odr)
     row = {road: index for index, road in enumerate(odr.roads)}
     road_rows = np.array([row[road] for road in table.road_ids], dtype=np.int64)

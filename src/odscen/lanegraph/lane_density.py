@@ -10,28 +10,36 @@ from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown_id
 
 if TYPE_CHECKING:
-    from odscen.lanegraph.lane_nodes import NodeTable
+    from odscen.base.arrays import FloatArray, IntArray
     from odscen.opendrive.lanes import RoadTable
 
 MOST_TOGETHER = 64
-"""Drivable lanes that may pass through one cube of :data:`CUBE`; junctions of towns have 15."""
+"""Drivable lanes, or walks, through one cube of :data:`CUBE`; junctions of towns have 15."""
 
 CUBE = 1.0
 """Metres."""
 
 
-def check_density(table: RoadTable, nodes: NodeTable) -> None:
+def check_density(table: RoadTable, lane: IntArray, places: FloatArray) -> None:
     """Refuse a map on which more lanes than :data:`MOST_TOGETHER` lie in one place.
+
+    Parameters
+    ----------
+    table
+        The roads.
+    lane
+        Shape ``(N,)``: row of the table of each node.
+    places
+        Shape ``(3, N)``: x, y, z of the nodes in metres.
 
     Raises
     ------
     OpenDriveError
         Naming the place and two of the roads.
     """
-    if len(nodes.lane) <= MOST_TOGETHER:
+    if len(lane) <= MOST_TOGETHER:
         return
-    cubes = np.floor(np.stack([nodes.x, nodes.y, nodes.z]) / CUBE)
-    rows = np.stack([*cubes, nodes.lane])
+    rows = np.stack([*np.floor(places / CUBE), lane])
     rows = rows[:, np.lexsort(rows[::-1])]
     rows = rows[:, np.append(True, np.any(np.diff(rows, axis=1), axis=0))]  # lanes once a cube
     begins = np.flatnonzero(np.append(True, np.any(np.diff(rows[:3], axis=1), axis=0)))
@@ -40,9 +48,7 @@ def check_density(table: RoadTable, nodes: NodeTable) -> None:
     if counts[worst] <= MOST_TOGETHER:
         return
     first, last = begins[worst], begins[worst] + counts[worst] - 1
-    one, other = (
-        table.lane_keys[int(nodes.lines.rows[int(rows[3, column])])] for column in (first, last)
-    )
+    one, other = (table.lane_keys[int(rows[3, column])] for column in (first, last))
     x, y = (float(value) * CUBE for value in rows[:2, first])
     problem = (
         f"{counts[worst]} lanes lie on each other at ({x:g}, {y:g}), the last of them lane "
