@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from odscen.base.errors import GraphFormatError
 from odscen.base.ids import LaneKey, RoadId
+from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graph_files import (
     from_graphml,
     from_npz_bytes,
@@ -22,7 +23,9 @@ from odscen.lanegraph.graph_files import (
     to_npz_bytes,
 )
 from odscen.lanegraph.map_graphml import EDGE_KEYS, GRAPH_KEYS, NODE_KEYS
+from odscen.opendrive.parse import parse
 from tests.graphs import ToyLane, ToyWalk, fork, line_of_segments, map_graph, ring, two_lane_road
+from tests.opendrive.snippets import document, road
 
 if TYPE_CHECKING:
     from odscen.lanegraph.graphs import MapGraph
@@ -201,3 +204,12 @@ def test_damaged_npz_is_read_or_refused_but_never_crashes(data: st.DataObject) -
         good[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))
     with contextlib.suppress(GraphFormatError):
         from_npz_bytes(bytes(good))
+
+
+def test_ids_of_any_characters_come_back_from_both_files() -> None:
+    odd = "a>b \u202e'1\"&<: \u200b é]]>"
+    text = document(road("".join(f"&#{ord(letter)};" for letter in odd)))
+    graph = build_map_graph(parse(text), name="m", sha256="0" * 64)
+    assert {key.road for key in graph.lanes.lanes.keys} == {odd}
+    assert differences(from_npz_bytes(to_npz_bytes(graph)), graph) == []
+    assert differences(from_graphml(to_graphml(graph)), graph) == []

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from odscen.base.ids import RoadId
 from odscen.lanegraph.graphs import SegmentPart
 from odscen.lanegraph.query import is_connected
-from odscen.lanegraph.segments import TARGET_LENGTH, build_segments
+from odscen.lanegraph.segments import TARGET_LENGTH, build_segments, segment_name
 from tests.lanegraph.roads import junction, lane, network, road, section
 
 if TYPE_CHECKING:
@@ -128,3 +128,10 @@ def test_segments_are_equal_and_cover_all_roads_once(lengths: list[float], ring:
         for part in of:
             middle = np.array([(part.s_from + part.s_to) / 2])
             assert found.at(np.array([int(part.road)]), middle).tolist() == [row]
+
+
+def test_an_id_with_the_separator_of_movements_has_a_segment_whose_name_has_none() -> None:
+    names = [segment_name("road", "a>b"), segment_name("junction", "9>"), segment_name("road", "7")]
+    assert names == ["ra%3Eb", "j9%3E", "r7"]
+    odr = network(road("a&gt;b", ONE, length=100.0))
+    assert build_segments(odr).segments.ids == ("ra%3Eb",)

@@ -12,6 +12,7 @@ from lxml import etree
 
 from odscen.base.errors import OpenDriveError
 from odscen.opendrive.parse import parse
+from odscen.opendrive.parse_rules import Rule
 from odscen.opendrive.road_model import OpenDrive
 from tests.opendrive.full import FULL
 from tests.opendrive.standard import VERSIONS, schema_folder, schema_rows
@@ -148,3 +149,9 @@ def test_the_table_names_every_element_and_attribute_of_the_standard(version: st
         and (key not in table or (name and name not in table[key][0] | table[key][1]))
     }
     assert missing == set()
+
+
+def test_the_document_lists_every_tolerance_once() -> None:
+    tolerances = TABLE.read_text(encoding="utf-8").partition("## Tolerances")[2]
+    listed = re.findall(r"^\| `([a-z0-9-]+)` \|", tolerances, re.MULTILINE)
+    assert sorted(listed) == sorted(Rule)

@@ -17,9 +17,9 @@ from odscen.lanegraph.query import largest_part, node_id
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.scenario_document import Flow, MapReference, Scenario, Simulation
 from odscen.scenario.placing.region import Region
-from odscen.sumo.realize.network_fit import route_fit
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
+from odscen.sumo.runner.network_fit import route_fit
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:

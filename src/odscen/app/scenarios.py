@@ -14,7 +14,7 @@ from odscen.scenario.document.sampling_config import SamplingConfig, loads_confi
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
-from odscen.sumo.realize.network_fit import place_fit, route_fit
+from odscen.sumo.runner.network_fit import place_fit, route_fit
 from odscen.workspace.store import plain_name
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Pro
     """Find every problem of a scenario on its map; :mod:`odscen.scenario.checks` has the rules.
 
     What the SUMO network of the map does not hold of it are warnings:
-    :mod:`odscen.sumo.realize.network_fit`.
+    :mod:`odscen.sumo.runner.network_fit`.
 
     Parameters
     ----------

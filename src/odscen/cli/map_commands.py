@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from odscen.base.errors import InputError, OdscenError
+from odscen.base.shown import printable
 from odscen.cli.console import (
     JsonOption,
     WorkspaceOption,
@@ -89,7 +90,7 @@ def add(
         except OdscenError as error:
             worst = max(worst, error.exit_code)
             rows.append({"name": map_name, "source": str(file), "error": error_fields(error)})
-            log(f"{file}: refused: {error}")
+            log(f"{printable(str(file))}: refused: {error}")
         else:
             rows.append({**_row(entry), "source": str(file)})
             log(_added(entry))

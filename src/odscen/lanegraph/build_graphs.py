@@ -8,6 +8,7 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.lanegraph.graphs import LaneGraph, Lanes, MapGraph
+from odscen.lanegraph.lane_density import check_density
 from odscen.lanegraph.lane_edges import connect
 from odscen.lanegraph.lane_nodes import NodeTable, place_nodes
 from odscen.lanegraph.pedestrian_graph import build_pedestrians
@@ -53,7 +54,7 @@ def build_map_graph(
     InputError
         If ``spacing`` is out of range.
     OpenDriveError
-        If the lanes together are longer than 1,000 km.
+        If the lanes together are longer than 1,000 km, need too many nodes, or lie on each other.
     """
     if not MIN_SPACING <= spacing <= MAX_SPACING:
         problem = f"spacing {spacing} m is not within {MIN_SPACING} to {MAX_SPACING} m"
@@ -61,6 +62,7 @@ def build_map_graph(
     table = RoadTable.of(odr) if table is None else table
     successors = lane_successors(odr)
     nodes = place_nodes(table, spacing)
+    check_density(table, nodes.lines.rows[nodes.lane], np.stack([nodes.x, nodes.y, nodes.z]))
     segments = build_segments(odr)
     row = {road: index for index, road in enumerate(odr.roads)}
     road_rows = np.array([row[road] for road in table.road_ids], dtype=np.int64)

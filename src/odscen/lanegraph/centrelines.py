@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import OpenDriveError
+from odscen.base.shown import shown_id
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
@@ -23,6 +24,10 @@ SAMPLE_STEP = 1.0
 
 MAX_SAMPLES = 1_000_000
 """More samples than this (1,000 km of lanes) are refused; they take about 0.3 kB of memory each."""
+
+
+MAX_NODES = 2_000_000
+"""Nodes of all lanes, or of all walks, of a map; they take about 0.5 kB of memory each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +89,7 @@ class CentreLines:
                 f"the lanes of the map are {np.sum(extent):.3g} m long together, "
                 f"more than {MAX_SAMPLES * SAMPLE_STEP:.3g} m; this road has the longest"
             )
-            raise OpenDriveError(problem, element=f"road {longest.road}")
+            raise OpenDriveError(problem, element=f"road {shown_id(longest.road)}")
         count = np.ceil(extent / SAMPLE_STEP).astype(np.int64) + 1
         count = np.maximum(count, 2)
         first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -95,7 +100,9 @@ class CentreLines:
         chords = np.sqrt(np.diff(points.x) ** 2 + np.diff(points.y) ** 2 + np.diff(points.z) ** 2)
         gone = np.concatenate([[0.0], np.cumsum(np.where(np.diff(lane) == 0, chords, 0.0))])
         distance = gone - gone[first[:-1]][lane]
-        return cls(rows, s0, s1, forward, first, distance, distance[first[1:] - 1])
+        lengths = distance[first[1:] - 1]
+        _check_lengths(table, rows, extent, lengths)
+        return cls(rows, s0, s1, forward, first, distance, lengths)
 
     def s_at(self, lane: IntArray, offset: FloatArray) -> FloatArray:
         """Road coordinate s at ``offset`` metres along each lane, in its direction."""
@@ -126,6 +133,23 @@ class CentreLines:
         return offset
 
 
+def _check_lengths(
+    table: RoadTable, rows: IntArray, extent: FloatArray, lengths: FloatArray
+) -> None:
+    """Refuse lanes that wind so much that they are longer than the roads they lie on permit."""
+    total = float(np.sum(lengths))
+    if total <= MAX_SAMPLES * SAMPLE_STEP:  # not so for NaN, too
+        return
+    longest = int(np.argmax(np.where(np.isnan(lengths), np.inf, lengths)))
+    road, section, lane = table.lane_keys[int(rows[longest])]
+    problem = (
+        f"is {lengths[longest]:.3g} m long on {extent[longest]:.3g} m of its road; all lanes "
+        f"together are {total:.3g} m, the limit is {MAX_SAMPLES * SAMPLE_STEP:.3g} m"
+    )
+    place = f"road {shown_id(road)} > laneSection {section} > lane {lane}"
+    raise OpenDriveError(problem, element=place)
+
+
 def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArray, FloatArray]:
     """Place nodes along lanes at equal gaps as near to ``spacing`` as a whole number allows.
 
@@ -141,7 +165,19 @@ def node_offsets(lengths: FloatArray, spacing: float) -> tuple[IntArray, IntArra
     Shape ``(L + 1,)``: first node of each lane; shapes ``(N,)``: lane and offset of each node. A
     lane has ``n = max(1, round(length / spacing))`` nodes, node k at ``(k + 0.5) length / n``, so
     that the gap across the joint of two lanes is about one spacing too.
+
+    Raises
+    ------
+    OpenDriveError
+        If there are more nodes than :data:`MAX_NODES`.
     """
+    wanted = float(np.sum(lengths)) / spacing
+    if not wanted <= MAX_NODES:
+        problem = (
+            f"{np.sum(lengths):.3g} m of lanes have {wanted:.3g} nodes at a spacing of {spacing:g} "
+            f"m; the limit is {MAX_NODES:g}: choose a larger spacing"
+        )
+        raise OpenDriveError(problem)
     count = np.maximum(np.rint(lengths / spacing), 1).astype(np.int64)
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     lane = np.repeat(np.arange(len(lengths), dtype=np.int64), count)

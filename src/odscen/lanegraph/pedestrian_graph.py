@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from odscen.lanegraph.centrelines import CentreLines, node_offsets
 from odscen.lanegraph.graphs import PedestrianGraph, WalkKind
+from odscen.lanegraph.lane_density import check_density
 from odscen.lanegraph.lane_nodes import wrapped
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
@@ -114,9 +115,15 @@ def build_pedestrians(
         Lanes that follow each lane in driving direction.
     crosswalks
         The map's crosswalks.
+
+    Raises
+    ------
+    OpenDriveError
+        If the walks are too long together, or too many lie on each other.
     """
     walks = _walks(odr, table)
     nodes = _place(table, walks, spacing)
+    check_density(table, walks.rows[nodes.lane], nodes.place.T)
     used = np.flatnonzero(np.diff(nodes.first))
     number = np.cumsum(np.diff(nodes.first) > 0) - 1
     keys = tuple(table.lane_keys[row] for row in walks.rows[used].tolist())
@@ -260,9 +267,10 @@ def _linked(
 def _near(nodes: _WalkNodes, vehicles: NodeTable) -> list[_Edge]:
     """Joints between ends of different walks within reach of each other, not across a lane."""
     ends = nodes.ends.reshape(-1, 3)
-    if not len(ends):
+    some = np.flatnonzero(np.repeat(np.diff(nodes.first) > 0, 2))  # ends of walks with nodes
+    if not len(some):
         return []
-    pairs = cKDTree(ends).query_pairs(JOINT_DISTANCE, output_type="ndarray")
+    pairs = some[cKDTree(ends[some]).query_pairs(JOINT_DISTANCE, output_type="ndarray")]
     pairs = pairs[pairs[:, 0] // 2 != pairs[:, 1] // 2]
     middle = (ends[pairs[:, 0]] + ends[pairs[:, 1]]) / 2
     apart = pairs[~_on_lane(middle, vehicles)]

@@ -9,7 +9,7 @@ roads) has nothing that could be placed in it: the chains that meet there are ne
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -140,7 +140,7 @@ class _SegmentRows:
 
     def add_chain(self, chain: _RoadChain, odr: OpenDrive) -> None:
         self.places.update(_places(chain, odr, base=len(self.ids)))
-        name = f"r{chain.steps[0].road}"
+        name = segment_name("road", chain.steps[0].road)
         self.ids += [name] if chain.count == 1 else [f"{name}-{k}" for k in range(chain.count)]
         self.parts += _parts(chain, odr)
         self.lengths += [chain.segment_length] * chain.count
@@ -149,9 +149,18 @@ class _SegmentRows:
         row = len(self.ids)
         self.junctions[junction] = row
         self.places.update({road.id: _SegmentSpan(row, 0.0, 1.0, 1.0, 0) for road in roads})
-        self.ids.append(f"j{junction}")
+        self.ids.append(segment_name("junction", junction))
         self.parts.append(tuple(SegmentPart(road.id, 0.0, road.length) for road in roads))
         self.lengths.append(sum(road.length for road in roads))
+
+
+def segment_name(kind: Literal["road", "junction"], own: str) -> str:
+    """Give the name of the segment of a road or junction with the id ``own``.
+
+    Names of segments are joined with ``>`` for movements and count stations, so that it is written
+    ``%3E`` where an id has one.
+    """
+    return f"{kind[0]}{own.replace('>', '%3E')}"
 
 
 def _distinct(ids: list[str]) -> tuple[SegmentId, ...]:

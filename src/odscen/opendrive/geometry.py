@@ -30,6 +30,7 @@ _KINDS = {
 }
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _PIECES = 32
+_EVEN = 3.0
 _PIECE_NODES, _PIECE_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -228,13 +229,34 @@ class CubicCurves:
         p: FloatArray = start + (wanted - before) / span * width
         coefficients = self.coefficients[row].transpose(1, 2, 0)
         for _ in range(4):  # Newton: the derivative of arc length by p is the speed
-            half = 0.5 * (p - start)
-            nodes = start[:, None] + half[:, None] * (_PIECE_NODES + 1.0)
-            speed = np.hypot(*_derivatives(coefficients[..., None], nodes)[1])
-            length = before + half * (speed @ _PIECE_WEIGHTS)
+            length = before + _arc(coefficients, start, p)
             here = np.hypot(*_derivatives(coefficients, p)[1])
             p += (wanted - length) / np.maximum(here, 1e-9)
         return p
+
+    def astray(self) -> FloatArray:
+        """Metres of arc length that :meth:`parameter` is off at most, tried along each curve.
+
+        Shape ``(M,)``. Newton's method does not arrive where a curve bends within far less than a
+        piece of its table; where it runs through all pieces about as fast it does, untried.
+        """
+        worst = np.zeros(len(self.p_end))
+        pieces = np.diff(self.lengths, axis=1)
+        doubted = np.flatnonzero(~(pieces.max(axis=1) <= _EVEN * pieces.min(axis=1)))
+        tried = np.arange(1, 2 * _PIECES + 1) / (2 * _PIECES)
+        row = np.repeat(doubted, len(tried))
+        # Of a poly3 and of a paramPoly3 alike p_end is the length in s.
+        ds = (self.p_end[doubted, None] * tried).ravel()
+        p = self.parameter(row, ds)
+        width = self.p_end[row] / _PIECES
+        piece = np.clip(np.floor(p / width), 0, _PIECES - 1)
+        before = self.lengths[row, piece.astype(np.int64)]
+        coefficients = self.coefficients[row].transpose(1, 2, 0)
+        gone = before + _arc(coefficients, piece * width, p)
+        off = np.abs(gone - ds * self.stretch[row]).reshape(-1, len(tried))
+        off[np.isnan(off)] = np.inf
+        worst[doubted] = off.max(axis=1, initial=0.0)
+        return worst
 
     def at(
         self, row: IntArray, ds: FloatArray
@@ -252,6 +274,15 @@ class CubicCurves:
         change = (u1 * v3 - v1 * u3) / (speed2 * speed2)
         change -= 3.0 * cross * (u1 * u2 + v1 * v2) / (speed2 * speed2 * speed2)
         return u, v, np.arctan2(v1, u1), curvature, change
+
+
+def _arc(coefficients: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Arc length of each curve between two parameters within one piece of its table."""
+    half = 0.5 * (end - start)
+    nodes = start[:, None] + half[:, None] * (_PIECE_NODES + 1.0)
+    speed = np.hypot(*_derivatives(coefficients[..., None], nodes)[1])
+    length: FloatArray = half * (speed @ _PIECE_WEIGHTS)
+    return length
 
 
 ArrayPair = tuple[FloatArray, FloatArray]

@@ -13,22 +13,25 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.base.errors import in_file
+from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_checks import check_numbers
+from odscen.opendrive.parse_coincident import merge_coincident_roads
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_references import check_references
 from odscen.opendrive.parse_repairs import repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
 from odscen.opendrive.parse_xml import (
+    CONTROLS,
     Element,
     children,
     integer,
     load,
+    may_have_controls,
     number_or,
     only,
     optional_number,
     refusal,
-    shown,
 )
 from odscen.opendrive.road_model import Controller, Header, Junction, OpenDrive, Road
 
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 
 READ: Final = frozenset({"header", "road", "controller", "junction", "userData"})
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
+NO_HEADER: Final = Header(1, 4, "", None, None, None, None, "", None)
+"""What stands for a missing ``<header>``: the oldest version, no bounds, no projection."""
 _CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
 K = TypeVar("K")
 V = TypeVar("V")
@@ -64,13 +69,26 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
         element and the value.
     """
     with in_file(file) if file else nullcontext():
-        return _parse_root(load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS))
+        root = load(text, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
+        notes = Notes()
+        if may_have_controls(text):
+            _space_controls(root, notes)
+        return _parse_root(root, notes)
 
 
-def _parse_root(root: Element) -> OpenDrive:
+def _space_controls(root: Element, notes: Notes) -> None:
+    """Put spaces for control characters in attributes, and note each."""
+    for element in root.iter():
+        for name, value in [(str(key), text) for key, text in element.attrib.items()]:
+            if CONTROLS.search(str(value)):
+                detail = f"{name}={shown(str(value))} has control characters; they are spaces"
+                element.set(name, CONTROLS.sub(" ", str(value)))
+                notes.add(Rule.CONTROL_CHARACTER, element, detail)
+
+
+def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     if root.tag != "OpenDRIVE":
-        raise refusal(root, f"the root element is <{str(root.tag)[:60]}>, not <OpenDRIVE>")
-    notes = Notes()
+        raise refusal(root, f"the root element is <{shown_id(str(root.tag))}>, not <OpenDRIVE>")
     groups = children(root)
     for tag, found in groups.items():
         if tag not in READ:
@@ -92,6 +110,7 @@ def _parse_root(root: Element) -> OpenDrive:
         controller = parse_controller(element, notes)
         _add(controllers, controller.id, controller, element)
     check_numbers(roads, notes)
+    roads = merge_coincident_roads(roads, junctions.values(), notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
     odr = repair_junction_tables(OpenDrive(header, roads, junctions, controllers), notes)
     return replace(odr, notes=notes.sentences())
@@ -105,7 +124,9 @@ def _add(known: dict[K, V], key: K, value: V, element: Element) -> None:
 
 def _header(root: Element, element: Element | None, notes: Notes) -> Header:
     if element is None:
-        raise refusal(root, "there is no <header>")
+        detail = "there is no <header>; the file is read by the rules of 1.4 to 1.8"
+        notes.add(Rule.MISSING_HEADER, root, detail)
+        return NO_HEADER
     major, minor = integer(element, "revMajor"), integer(element, "revMinor")
     if major != 1 or minor < 0:
         raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import OpenDriveError
+from odscen.base.shown import shown_id
 from odscen.opendrive import parse_rules as rules
 from odscen.opendrive.geometry import PlanView
 from odscen.opendrive.parse_rules import Notes, Rule
@@ -51,7 +52,7 @@ def _namer(roads: list[Road], groups: list[int], tag: str) -> NameOf:
 
     def name(row: int) -> str:
         road = int(np.searchsorted(first, row, side="right")) - 1
-        return f"road {roads[road].id} > {tag} {row - first[road]}"
+        return f"road {shown_id(roads[road].id)} > {tag} {row - first[road]}"
 
     return name
 
@@ -140,6 +141,15 @@ def _check_curves(plan: PlanView, name: NameOf, notes: Notes) -> None:
             f"but length={plan.length[i]:.6g}"
         ),
     )
+    astray = np.zeros(plan.s.size)
+    astray[rows] = plan.curves.astray()
+    _refuse_any(
+        ~(astray <= np.maximum(rules.MAX_ASTRAY, rules.CURVE_TOLERANCE * plan.length)),
+        name,
+        lambda i: (
+            f"the curve bends too sharply to be followed over its length of {plan.length[i]:.6g} m"
+        ),
+    )
     for i in _rows(np.abs(stretch - 1.0) > rules.CURVE_TOLERANCE):
         detail = f"the curve is {stretch[i] * plan.length[i]:.6g} m long, not {plan.length[i]:.6g}"
         notes.add(Rule.CURVE_LENGTH, name(i), detail)
@@ -171,7 +181,7 @@ def _check_road_profiles(roads: list[Road], notes: Notes) -> None:
 
 def _check_lane_widths(roads: list[Road], notes: Notes) -> None:
     lanes = [
-        (f"road {road.id} > laneSection {number} > lane {lane.id}", section, lane)
+        (f"road {shown_id(road.id)} > laneSection {number} > lane {lane.id}", section, lane)
         for road in roads
         for number, section in enumerate(road.sections)
         for lane in section.lanes.values()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from odscen.opendrive.parse_rules import MAX_COORDINATE, Notes, Rule
+from odscen.base.errors import OpenDriveError
+from odscen.base.shown import shown
+from odscen.opendrive.parse_rules import MAX_COORDINATE, MAX_FAULTY_OBJECTS, Notes, Rule
 from odscen.opendrive.parse_values import speed_factor, validities
 from odscen.opendrive.parse_xml import (
     Element,
@@ -15,7 +17,6 @@ from odscen.opendrive.parse_xml import (
     only,
     optional_number,
     required,
-    shown,
 )
 from odscen.opendrive.road_model import (
     Corner,
@@ -37,9 +38,17 @@ def parse_objects(container: Element | None, notes: Notes) -> tuple[RoadObject, 
     if container is None:
         return ()
     objects = []
+    faulty = 0
     for element in container:
         if element.tag == "object":
-            objects.append(_object(element, notes))
+            try:
+                objects.append(_object(element, notes))
+            except OpenDriveError as error:
+                faulty += 1
+                if faulty > MAX_FAULTY_OBJECTS:
+                    raise
+                detail = f"{error.problem}; the object is left out"
+                notes.add(Rule.OBJECT_LEFT_OUT, error.element or element, detail)
         elif element.tag != "userData":
             rule = Rule.IGNORED if element.tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "objects", str(element.tag))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from odscen.base.ids import JunctionId, RoadId
+from odscen.base.shown import shown
 from odscen.opendrive.parse_rules import MAX_LANE_ID, Notes, Rule
 from odscen.opendrive.parse_xml import (
     Element,
@@ -13,7 +14,6 @@ from odscen.opendrive.parse_xml import (
     integer,
     refusal,
     required,
-    shown,
     unread,
 )
 from odscen.opendrive.road_model import (

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 import sys
+from operator import attrgetter
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from odscen.base.shown import shown_id
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
     MAX_ROAD_LENGTH,
@@ -14,7 +16,7 @@ from odscen.opendrive.parse_rules import (
     Notes,
     Rule,
 )
-from odscen.opendrive.parse_values import cubics, speed
+from odscen.opendrive.parse_values import cubics, ordered_s, speed
 from odscen.opendrive.parse_xml import (
     Element,
     boolean,
@@ -53,7 +55,7 @@ _LANE_CHANGES: Final[dict[str | None, LaneChange]] = {
     "decrease": "decrease",
     "none": "none",
 }
-R = TypeVar("R", LaneHeight, LaneSpeed, RoadMark)
+R = TypeVar("R", LaneHeight, LaneSpeed)
 
 
 def parse_sections(
@@ -62,16 +64,25 @@ def parse_sections(
     """All lane sections of a road of ``length`` metres."""
     elements = groups.get("laneSection", [])
     if not elements:
+        layers = [tag for tag in groups if "layer" in tag.lower()]
+        if layers:
+            problem = (
+                f"the lanes are in <{shown_id(layers[0])}> elements: lane layers, as OpenDRIVE 1.9 "
+                "has them, are not supported; save the map as 1.8 or older"
+            )
+            raise refusal(lanes, problem)
         raise refusal(lanes, "there is no laneSection")
     starts: list[float] = []
     for element in elements:
         s = number(element, "s", limit=MAX_ROAD_LENGTH)
         if starts and s < starts[-1]:
-            problem = f"s={s:g} is below the s={starts[-1]:g} of the section before"
-            raise refusal(element, problem)
-        if s > length:
+            s = ordered_s(element, "s", s, starts[-1], notes)
+        if s > length + S_TOLERANCE:
             raise refusal(element, f"s={s:g} is beyond the road's length of {length:g}")
-        starts.append(s)
+        if s > length:
+            detail = f"s={s:.9g} is beyond the road's length of {length:.9g}; it starts there"
+            notes.add(Rule.RECORD_ORDER, element, detail)
+        starts.append(min(s, length))
     if abs(starts[0]) > S_TOLERANCE:
         raise refusal(elements[0], f"the first laneSection starts at s={starts[0]:g}, not at 0")
     ends = [*starts[1:], length]
@@ -92,7 +103,7 @@ def _section(element: Element, s: float, s_end: float, notes: Notes) -> LaneSect
             continue
         for child in container:
             if child.tag == "lane":
-                found.append(_lane(child, side, s, notes))
+                found.append(_lane(child, side, s, s_end, notes))
             elif child.tag != "userData":
                 notes.skip(Rule.UNKNOWN, side, str(child.tag))
     if not any(lane.id == 0 for lane in found):
@@ -121,7 +132,7 @@ def _check_ids(element: Element, ids: list[int], notes: Notes) -> None:
 _SIDES: Final = {"left": 1, "center": 0, "right": -1}
 
 
-def _lane(element: Element, side: str, s0: float, notes: Notes) -> Lane:
+def _lane(element: Element, side: str, s0: float, s_end: float, notes: Notes) -> Lane:
     lane_id = integer(element, "id", limit=MAX_LANE_ID)
     if (lane_id > 0) - (lane_id < 0) != _SIDES[side]:
         raise refusal(element, f"lane {lane_id} is in <{side}>")
@@ -130,8 +141,8 @@ def _lane(element: Element, side: str, s0: float, notes: Notes) -> Lane:
         for tag, count in unread(groups, READ).items():
             notes.skip(Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN, "lane", tag, count)
     predecessors, successors = _lane_links(only(groups, "link"))
-    widths = cubics(groups.get("width", ()), "sOffset", s0, notes)
-    borders = cubics(groups.get("border", ()), "sOffset", s0, notes)
+    widths = cubics(groups.get("width", ()), "sOffset", s0, s_end, notes)
+    borders = cubics(groups.get("border", ()), "sOffset", s0, s_end, notes)
     if lane_id:
         _check_widths(element, groups, notes)
     return Lane(
@@ -140,8 +151,8 @@ def _lane(element: Element, side: str, s0: float, notes: Notes) -> Lane:
         level=boolean(element, "level"),
         widths=widths,
         borders=borders,
-        heights=_heights(groups.get("height", ()), s0),
-        road_marks=_road_marks(groups.get("roadMark", ()), s0),
+        heights=_heights(groups.get("height", ()), s0, notes),
+        road_marks=_road_marks(groups.get("roadMark", ()), s0, notes),
         speeds=_speeds(groups.get("speed", ()), s0, notes),
         access=_access(groups.get("access", ()), s0),
         predecessors=predecessors,
@@ -183,21 +194,26 @@ def _s(element: Element, s0: float) -> float:
     return s0 + number_or(element, "sOffset", 0.0)
 
 
-def _heights(elements: Sequence[Element], s0: float) -> tuple[LaneHeight, ...]:
-    return _ordered(
-        elements,
-        tuple(
-            LaneHeight(_s(element, s0), number(element, "inner"), number(element, "outer"))
-            for element in elements
-        ),
-    )
+def _heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneHeight, ...]:
+    found = []
+    for element in elements:
+        names = ("inner", "outer")
+        if not any(element.get(name) for name in names):
+            names = ("heightInner", "heightOuter")
+            if not any(element.get(name) for name in names):
+                names = ("inner", "outer")  # missing is what the message then says
+            else:
+                notes.add(Rule.OLD_NAMES, element, "heightInner, heightOuter are inner, outer")
+        inner, outer = (number(element, name) for name in names)
+        found.append((element, LaneHeight(_s(element, s0), inner, outer)))
+    return _ordered(found, notes)
 
 
 def _speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneSpeed, ...]:
-    found = ((element, speed(element, notes)) for element in elements)
+    read = ((element, speed(element, notes)) for element in elements)
+    found = ((element, value) for element, value in read if value is not None)
     return _ordered(
-        elements,
-        tuple(LaneSpeed(_s(element, s0), value) for element, value in found if value is not None),
+        [(element, LaneSpeed(_s(element, s0), value)) for element, value in found], notes
     )
 
 
@@ -212,7 +228,7 @@ def _access(elements: Sequence[Element], s0: float) -> tuple[LaneAccess, ...]:
     return tuple(records)
 
 
-def _road_marks(elements: Sequence[Element], s0: float) -> tuple[RoadMark, ...]:
+def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[RoadMark, ...]:
     intern = sys.intern
     marks: list[RoadMark] = []
     for element in elements:
@@ -228,12 +244,25 @@ def _road_marks(elements: Sequence[Element], s0: float) -> tuple[RoadMark, ...]:
                 lane_change,
             )
         )
-    return _ordered(elements, tuple(marks))
+    for (before, mark), element in zip(itertools.pairwise(marks), elements[1:], strict=True):
+        if mark.s < before.s:
+            offsets = f"{element.get('sOffset')} is below that of the mark before"
+            notes.add(Rule.MARK_ORDER, element, f"sOffset={offsets}; marks are put in order")
+            marks.sort(key=_start)  # stable: of marks at the same s the later one holds
+            break
+    return tuple(marks)
 
 
-def _ordered(elements: Sequence[Element], records: tuple[R, ...]) -> tuple[R, ...]:
-    for i in range(1, len(records)):
-        if records[i].s < records[i - 1].s:
-            problem = f"sOffset={records[i].s:g} is below that of the record before"
-            raise refusal(elements[min(i, len(elements) - 1)], problem)
-    return records
+_start = attrgetter("s")
+
+
+def _ordered(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
+    """Records with the elements that they are from, in ascending order of s."""
+    records: list[R] = []
+    for element, record in found:
+        if records and record.s < records[-1].s:
+            own = number_or(element, "sOffset", 0.0)
+            ordered_s(element, "sOffset", own, own + records[-1].s - record.s, notes)
+            record = record._replace(s=records[-1].s)  # noqa: PLW2901
+        records.append(record)
+    return tuple(records)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from odscen.base.ids import JunctionId, RoadId
+from odscen.base.shown import shown_id
 from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
 from odscen.opendrive.road_model import (
     Connection,
@@ -51,13 +52,13 @@ def _signal_ids(roads: Roads, notes: Notes) -> set[str]:
     for road in roads.values():
         for signal in road.signals:
             if signal.id in seen:
-                place = f"road {road.id} > signal {signal.id}"
+                place = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
                 notes.add(Rule.DUPLICATE_ID, place, "another signal has the same id")
             seen.add(signal.id)
         objects: set[str] = set()
         for obj in road.objects:
             if obj.id in objects:
-                place = f"road {road.id} > object {obj.id}"
+                place = f"road {shown_id(road.id)} > object {shown_id(obj.id)}"
                 notes.add(Rule.DUPLICATE_ID, place, "another object of the road has the same id")
             objects.add(obj.id)
     return seen
@@ -65,7 +66,7 @@ def _signal_ids(roads: Roads, notes: Notes) -> set[str]:
 
 def _road(road: Road, roads: Roads, junctions: Junctions, signals: set[str], notes: Notes) -> Road:
     """Return the road itself, or a copy without what leads nowhere."""
-    place = f"road {road.id}"
+    place = f"road {shown_id(road.id)}"
     changes: dict[str, object] = {}
     if road.junction is not None and road.junction not in junctions:
         detail = f"there is no junction {road.junction!r}; the road is in no junction"
@@ -113,7 +114,8 @@ def _note_lane_links(road: Road, roads: Roads, notes: Notes) -> None:
             ):
                 for lane_id in ids:
                     if target is not None and lane_id not in target.lanes:
-                        place = f"road {road.id} > laneSection {number} > lane {lane.id} > {name}"
+                        where = f"road {shown_id(road.id)} > laneSection {number} > lane {lane.id}"
+                        place = f"{where} > {name}"
                         detail = f"there is no lane {lane_id} there; the link is not followed"
                         notes.add(Rule.DANGLING_LINK, place, detail)
 
@@ -126,7 +128,7 @@ def _note_places(road: Road, notes: Notes) -> None:
     )
     for tag, item_id, s in placed:
         if not -S_TOLERANCE <= s <= road.length + S_TOLERANCE:
-            place = f"road {road.id} > {tag} {item_id}"
+            place = f"road {shown_id(road.id)} > {tag} {shown_id(item_id)}"
             detail = f"s={s:.6g} is outside the road of {road.length:.6g} m"
             notes.add(Rule.OUTSIDE_ROAD, place, detail)
 
@@ -135,7 +137,7 @@ def _junction(
     junction: Junction, roads: Roads, controllers: dict[str, Controller], notes: Notes
 ) -> Junction:
     """Return the junction itself, or a copy without what leads nowhere."""
-    place = f"junction {junction.id}"
+    place = f"junction {shown_id(junction.id)}"
     connections = tuple(_connections(junction, roads, notes))
     kept_controllers = tuple(key for key in junction.controllers if key in controllers)
     for key in junction.controllers:
@@ -154,7 +156,7 @@ def _junction(
 
 def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Connection]:
     for connection in junction.connections:
-        place = f"junction {junction.id} > connection {connection.id}"
+        place = f"junction {shown_id(junction.id)} > connection {shown_id(connection.id)}"
         ends = (connection.incoming_road, connection.connecting_road)
         missing = [road_id for road_id in ends if road_id not in roads]
         if missing:
@@ -171,7 +173,9 @@ def _connections(junction: Junction, roads: Roads, notes: Notes) -> Iterator[Con
         for from_id, to_id in connection.lane_links:
             if from_id not in here or to_id not in there:
                 lane, road = (to_id, connecting) if from_id in here else (from_id, incoming)
-                detail = f"there is no lane {lane} on road {road.id}; the link is left out"
+                detail = (
+                    f"there is no lane {lane} on road {shown_id(road.id)}; the link is left out"
+                )
                 notes.add(Rule.DANGLING_LINK, f"{place} > laneLink {from_id} {to_id}", detail)
         yield connection._replace(lane_links=links)
 
@@ -183,5 +187,5 @@ def _controller(controller: Controller, signals: set[str], notes: Notes) -> Cont
     for signal_id, _ in controller.controls:
         if signal_id not in signals:
             detail = f"there is no signal {signal_id!r}; the control is left out"
-            notes.add(Rule.DANGLING_LINK, f"controller {controller.id}", detail)
+            notes.add(Rule.DANGLING_LINK, f"controller {shown_id(controller.id)}", detail)
     return replace(controller, controls=kept)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from odscen.base.ids import LaneKey
+from odscen.base.shown import shown_id
 from odscen.opendrive.lanes import RoadTable, is_forward
 from odscen.opendrive.parse_rules import Notes, Rule
 from odscen.opendrive.road_model import DRIVABLE_TYPES, Connection, RoadLink
@@ -74,12 +75,11 @@ def repair_junction_tables(odr: OpenDrive, notes: Notes) -> OpenDrive:
         if dead not in left:
             way = "leads to no lane" if dead.leads else "is reached from no lane"
             begins = "begins" if dead.leads else "ends"
-            place = (
-                f"road {dead.lane.road} > laneSection {dead.lane.section} > lane {dead.lane.lane}"
-            )
+            road, section, lane = dead.lane
+            place = f"road {shown_id(road)} > laneSection {section} > lane {lane}"
             detail = (
                 f"{way} by the junction's table; joined to lane {other.lane.lane} of road "
-                f"{other.lane.road}, which {begins} {gap:.2f} m from it"
+                f"{shown_id(other.lane.road)}, which {begins} {gap:.2f} m from it"
             )
             notes.add(Rule.JUNCTION_TABLE, place, detail)
     return repaired

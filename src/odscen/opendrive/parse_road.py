@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
+
+from odscen.base.errors import OpenDriveError
 from odscen.base.ids import JunctionId, RoadId
+from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_furniture import parse_objects, parse_signals
 from odscen.opendrive.parse_lanes import parse_sections
 from odscen.opendrive.parse_rules import (
@@ -12,6 +16,7 @@ from odscen.opendrive.parse_rules import (
     MAX_ROAD_LENGTH,
     MAX_TURNING,
     S_TOLERANCE,
+    SLIVER_LENGTH,
     Notes,
     Rule,
 )
@@ -77,10 +82,10 @@ def parse_road(element: Element, notes: Notes) -> Road:
         types=tuple(_road_type(found, notes) for found in groups.get("type", ())),
         geometry=_plan_view(element, groups, length, notes),
         elevation=_profile(
-            _container(groups, "elevationProfile", {"elevation"}, notes), "elevation", notes
+            _container(groups, "elevationProfile", {"elevation"}, notes), "elevation", length, notes
         ),
-        superelevation=_profile(lateral, "superelevation", notes),
-        lane_offset=_profile(lane_groups, "laneOffset", notes),
+        superelevation=_profile(lateral, "superelevation", length, notes),
+        lane_offset=_profile(lane_groups, "laneOffset", length, notes),
         sections=parse_sections(lanes, lane_groups, length, notes),
         objects=parse_objects(only(groups, "objects"), notes),
         signals=signals,
@@ -103,7 +108,11 @@ def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
     element = only(children(link), tag)
     if element is None:
         return None
-    element_type = choice(element, "elementType", {"road": "road", "junction": "junction"})
+    element_type = element.get("elementType")
+    if element_type not in {"road", "junction"}:
+        detail = f"elementType={shown(element_type)} is neither road nor junction"
+        notes.add(Rule.DANGLING_LINK, element, f"{detail}; the link is left out")
+        return None
     contact_point = choice(element, "contactPoint", _CONTACT_POINTS)
     element_s = element.get("elementS")
     if element_type == "road" and contact_point is None and element_s is None:
@@ -152,14 +161,9 @@ def _plan_view(
         raise refusal(road, "there is no planView geometry")
     geometry: list[Geometry] = []
     for element in elements:
-        s = number(element, "s", limit=MAX_ROAD_LENGTH)
-        if number(element, "length", limit=MAX_ROAD_LENGTH) == 0.0:
-            notes.add(Rule.ZERO_LENGTH, element, "length is 0; the geometry is left out")
-            continue
-        if geometry and s <= geometry[-1].s:
-            problem = f"s={s:g} is not beyond the s={geometry[-1].s:g} of the geometry before"
-            raise refusal(element, problem)
-        geometry.append(_geometry(element, s))
+        found = _holding_a_point(element, notes)
+        if found is not None and _behind(geometry, found, element, notes):
+            geometry.append(found)
     if not geometry:
         raise refusal(road, "every planView geometry has the length 0")
     if abs(geometry[0].s) > S_TOLERANCE:
@@ -170,6 +174,49 @@ def _plan_view(
     return tuple(geometry)
 
 
+def _holding_a_point(element: Element, notes: Notes) -> Geometry | None:
+    """A geometry, or ``None`` if it is too short to hold a point or to say anything sensible."""
+    s = number(element, "s", limit=MAX_ROAD_LENGTH)
+    length = number(element, "length", limit=MAX_ROAD_LENGTH)
+    if -SLIVER_LENGTH <= length <= 0.0:
+        notes.add(Rule.ZERO_LENGTH, element, f"length is {length:g}; the geometry is left out")
+        return None
+    if not 0.0 < length <= SLIVER_LENGTH:
+        return _geometry(element, s)
+    try:
+        return _geometry(element, s)
+    except OpenDriveError as error:
+        detail = f"{error.problem}; the geometry of {length:.3g} m is left out"
+        notes.add(Rule.SLIVER, error.element or element, detail)
+        return None
+
+
+def _behind(geometry: list[Geometry], new: Geometry, element: Element, notes: Notes) -> bool:
+    """Whether ``new`` goes on behind ``geometry``, of which slivers that it starts at are dropped.
+
+    Raises
+    ------
+    OpenDriveError
+        If it starts at or before a geometry, and neither of both is a sliver.
+    """
+    while geometry and new.s <= geometry[-1].s:
+        before = geometry[-1]
+        # Files of single precision do not tell s apart that are nearer to each other than this.
+        least = max(S_TOLERANCE, float(np.spacing(np.float32(before.s))))
+        if new.s < before.s - S_TOLERANCE or min(new.length, before.length) > least:
+            problem = f"s={new.s:g} is not beyond the s={before.s:g} of the geometry before"
+            raise refusal(element, problem)
+        rule = Rule.SAME_S if new.s == before.s else Rule.RECORD_ORDER
+        which = "geometry" if new.length <= before.length else "geometry before"
+        detail = f"s={new.s:.9g} is not beyond the s={before.s:.9g} of the geometry before"
+        short = min(new.length, before.length)
+        notes.add(rule, element, f"{detail}; the {which}, of {short:.3g} m, is left out")
+        if new.length <= before.length:
+            return False
+        geometry.pop()
+    return True
+
+
 def _geometry(element: Element, s: float) -> Geometry:
     shapes = [shape for shape in element if shape.tag != "userData"]
     if len(shapes) != 1:
@@ -178,7 +225,7 @@ def _geometry(element: Element, s: float) -> Geometry:
     try:
         kind = GeometryKind(str(shape.tag))
     except ValueError as err:
-        raise refusal(element, f"<{shape.tag}> is no known shape") from err
+        raise refusal(element, f"<{shown_id(str(shape.tag))}> is no known shape") from err
     length = positive(element, "length", limit=MAX_ROAD_LENGTH)
     params = _params(shape, kind, length)
     turning = length * max(map(abs, params), default=0.0)
@@ -220,10 +267,12 @@ def _params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, .
     return tuple(value / length ** (i % 4) for i, value in enumerate(values))
 
 
-def _profile(groups: dict[str, list[Element]], tag: str, notes: Notes) -> tuple[Cubic, ...]:
+def _profile(
+    groups: dict[str, list[Element]], tag: str, length: float, notes: Notes
+) -> tuple[Cubic, ...]:
     """Records of a whole road; zero where the file starts late."""
     elements = groups.get(tag, [])
-    records = cubics(elements, "s", 0.0, notes)
+    records = cubics(elements, "s", 0.0, length, notes)
     if records and records[0].s > S_TOLERANCE:
         detail = f"starts at s={records[0].s:g}; the {tag} is 0 before"
         notes.add(Rule.LATE_START, elements[0], detail)

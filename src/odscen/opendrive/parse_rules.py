@@ -14,18 +14,26 @@ class Rule(StrEnum):
 
     VERSION = "version"
     """Versions before 1.4 and after 1.8 are read as far as their elements are known."""
+    MISSING_HEADER = "missing-header"
+    """A file without ``<header>`` is read by the rules of 1.4 to 1.8, without a projection."""
+    CONTROL_CHARACTER = "control-character"
+    """Line ends and control characters in attributes are spaces, as XML has it where they are not
+    escaped: names with them could not stand in lists and other files."""
     GEO_REFERENCE = "geo-reference"
     """A geoReference that pyproj does not understand is kept as text; coordinates do not change."""
     JUNCTION_ATTRIBUTE = "junction-attribute"
     """A road without ``junction``, or with an empty one, belongs to no junction."""
     DANGLING_LINK = "dangling-link"
-    """A reference to something that is not in the file is left out: the road or lane ends there."""
+    """A reference to something that is not in the file, or is neither road nor junction, is left
+    out: the road or lane ends there."""
     JUNCTION_TABLE = "junction-table"
     """A connecting lane that leads nowhere is joined to the one lane that it meets in the plane."""
     MISSING_CONTACT = "missing-contact-point"
     """A road link without ``contactPoint`` is left out: which end it means is not guessed."""
     DUPLICATE_ID = "duplicate-id"
     """Objects and signals may share an id; references mean the first."""
+    COINCIDENT_ROAD = "coincident-road"
+    """Of roads that no junction names and that are alike in all but id and name the first stays."""
     PLAN_VIEW_S = "plan-view-s"
     """Lengths of geometries and the next s may disagree by up to a metre: s decides."""
     PLAN_VIEW_GAP = "plan-view-gap"
@@ -34,10 +42,19 @@ class Rule(StrEnum):
     """A paramPoly3 may be up to twice or half as long as its ``length``; the run is evened."""
     ZERO_LENGTH = "zero-length"
     """Geometries and lane sections too short to hold a point have no effect."""
+    SLIVER = "sliver"
+    """Of a geometry of up to 0.1 mm whose numbers are beyond the limits, the rest of the road is
+    kept; of such a record of a profile its first coefficient."""
+    RECORD_ORDER = "record-order"
+    """A record, section or geometry that starts less than 1 mm before the one in front of it starts
+    where that one does; of geometries the one of less than 1 mm is left out."""
+    MARK_ORDER = "mark-order"
+    """Road marks may be written in any order; each holds from its ``sOffset`` to the next."""
     LATE_START = "late-start"
     """A profile of the road that starts after s = 0 is zero before."""
     SAME_S = "same-s"
-    """Of two records at the same s the later one holds."""
+    """Of two records at the same s the later one holds; of two geometries the one that is not
+    longer than 1 mm, or than single precision tells apart at that s, is left out."""
     JUMP = "jump"
     """Elevations and lane widths may jump within a road or section; they do so in the model."""
     WIDTH_AND_BORDER = "width-and-border"
@@ -52,6 +69,10 @@ class Rule(StrEnum):
     """A lane section without centre lane has an unmarked centre line."""
     SPEED = "speed"
     """A speed that is no positive number, "no limit" or "undefined" counts as not given."""
+    OLD_NAMES = "old-names"
+    """``heightInner`` and ``heightOuter`` of a lane's height are read as ``inner``, ``outer``."""
+    OBJECT_LEFT_OUT = "object-left-out"
+    """An object without an id, or with a number that is missing or none, is left out."""
     OUTSIDE_ROAD = "outside-road"
     """Objects and signals may lie before the start or behind the end of their road."""
     IGNORED = "ignored"
@@ -87,6 +108,10 @@ MAX_WIDTH: Final = 1000.0
 
 S_TOLERANCE: Final = 1e-3
 """Metres by which s values may disagree without a note."""
+SLIVER_LENGTH: Final = 1e-4
+"""Metres of geometries and records whose numbers may be beyond all limits (:attr:`Rule.SLIVER`)."""
+MAX_FAULTY_OBJECTS: Final = 1000
+"""Objects of a road that may be left out (:attr:`Rule.OBJECT_LEFT_OUT`)."""
 MAX_S_GAP: Final = 1.0
 """Metres by which s values of the plan view may disagree with a note (:attr:`Rule.PLAN_VIEW_S`)."""
 GAP_TOLERANCE: Final = 0.01
@@ -97,6 +122,8 @@ JUMP_TOLERANCE: Final = 0.05
 """Metres that elevations and widths may jump without a note."""
 CURVE_TOLERANCE: Final = 0.01
 """Share by which the length of a paramPoly3 may be off without a note."""
+MAX_ASTRAY: Final = 0.05
+"""Metres by which places on a poly3 or paramPoly3 may be off, or the curve cannot be followed."""
 MAX_GAP: Final = 10.0
 """Metres between successive geometries with a note (:attr:`Rule.PLAN_VIEW_GAP`)."""
 WIDTH_TOLERANCE: Final = 1e-3

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Final, cast
 
-from odscen.opendrive.parse_rules import MAX_LANE_ID, MAX_NUMBER, Notes, Rule
-from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal, shown
+from odscen.base.shown import shown
+from odscen.opendrive.parse_rules import (
+    MAX_LANE_ID,
+    MAX_NUMBER,
+    S_TOLERANCE,
+    SLIVER_LENGTH,
+    Notes,
+    Rule,
+)
+from odscen.opendrive.parse_xml import Element, choice, integer, number, refusal
 from odscen.opendrive.road_model import Cubic, Validity
 
 if TYPE_CHECKING:
@@ -21,8 +30,12 @@ _SPEED_UNITS: Final[dict[str | None, float]] = {
 }
 
 
-def cubics(elements: Sequence[Element], s_name: str, s0: float, notes: Notes) -> tuple[Cubic, ...]:
+def cubics(
+    elements: Sequence[Element], s_name: str, s0: float, s_end: float, notes: Notes
+) -> tuple[Cubic, ...]:
     """Records ``a + b ds + c ds^2 + d ds^3``; each starts at ``s0`` plus its ``s_name``.
+
+    The last one ends at ``s_end``, metres of s.
 
     Raises
     ------
@@ -31,7 +44,7 @@ def cubics(elements: Sequence[Element], s_name: str, s0: float, notes: Notes) ->
     """
     records: list[Cubic] = []
     last = -math.inf
-    for element in elements:
+    for row, element in enumerate(elements):
         get = element.get
         texts = (get(s_name), get("a"), get("b"), get("c"), get("d"))
         try:
@@ -43,19 +56,46 @@ def cubics(elements: Sequence[Element], s_name: str, s0: float, notes: Notes) ->
             plain = False
         if not plain:
             # The slow way finds the attribute at fault and says so.
-            s, a, b, c, d = (number(element, name) for name in (s_name, "a", "b", "c", "d"))
+            following = elements[row + 1] if row + 1 < len(elements) else None
+            end = s_end - s0 if following is None else number(following, s_name)
+            s, a, b, c, d = _record(element, s_name, end, notes)
         if s <= last:
-            _check_same(element, s_name, s, last, notes)
+            s = ordered_s(element, s_name, s, last, notes)
         last = s
         records.append(Cubic(s0 + s, a, b, c, d))
     return tuple(records)
 
 
-def _check_same(element: Element, s_name: str, s: float, last: float, notes: Notes) -> None:
-    """A record that does not start after the one before it."""
-    if s < last:
+def _record(element: Element, s_name: str, end: float, notes: Notes) -> tuple[float, ...]:
+    """Start and coefficients of a record; those of a sliver may be beyond the limit."""
+    s = number(element, s_name)
+    if not abs(end - s) <= SLIVER_LENGTH:
+        return (s, *(number(element, name) for name in "abcd"))
+    b, c, d = (number(element, name, limit=sys.float_info.max) for name in "bcd")
+    if max(map(abs, (b, c, d))) <= MAX_NUMBER:
+        return (s, number(element, "a"), b, c, d)
+    detail = f"b={b:g}, c={c:g}, d={d:g} on {max(end - s, 0.0):.3g} m count as 0"
+    notes.add(Rule.SLIVER, element, detail)
+    return (s, number(element, "a"), 0.0, 0.0, 0.0)
+
+
+def ordered_s(element: Element, s_name: str, s: float, last: float, notes: Notes) -> float:
+    """Where a record starts that does not start behind the one before it, at ``last``.
+
+    Raises
+    ------
+    OpenDriveError
+        If it starts before that one by more than :data:`S_TOLERANCE`.
+    """
+    if s < last - S_TOLERANCE:
         raise refusal(element, f"{s_name}={s:g} is below the {last:g} of the record before")
-    notes.add(Rule.SAME_S, element, f"{s_name}={s:g} is that of the record before; this one holds")
+    if s < last:
+        detail = f"{s_name}={s:.9g} is below the {last:.9g} of the record before; it starts there"
+        notes.add(Rule.RECORD_ORDER, element, detail)
+    else:
+        detail = f"{s_name}={s:g} is that of the record before; this one holds"
+        notes.add(Rule.SAME_S, element, detail)
+    return last
 
 
 def speed(element: Element, notes: Notes) -> float | None:

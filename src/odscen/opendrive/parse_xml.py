@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
 
-from odscen.base.errors import OpenDriveError
+from odscen.base.errors import OpenDriveError, ToolError
+from odscen.base.shown import shown, shown_id
 
 if TYPE_CHECKING:
     from collections.abc import Container, Mapping
@@ -32,6 +34,17 @@ _NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection"
 _SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
 
 
+CONTROLS: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+"""Characters that XML permits in attributes, and that no line of text can show."""
+
+
+def may_have_controls(text: str | bytes) -> bool:
+    """Whether attributes of a file may have :data:`CONTROLS`: only if escaped, or beyond ASCII."""
+    if isinstance(text, str):
+        return not text.isascii() or "&#" in text
+    return not text.isascii() or b"&#" in text or b"\0" in text  # UTF-16 has NUL bytes
+
+
 def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     """Root element without namespaces, comments and processing instructions.
 
@@ -41,6 +54,8 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     ------
     OpenDriveError
         For anything that is not well-formed XML of a sensible size.
+    ToolError
+        If there is not enough memory.
     """
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     if len(data) > max_bytes:
@@ -62,7 +77,15 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     )
     try:
         root = etree.fromstring(data, parser)
-    except (etree.XMLSyntaxError, ValueError, LookupError) as err:
+    except MemoryError as err:
+        raise _out_of_memory(len(data)) from err
+    except etree.XMLSyntaxError as err:
+        if getattr(err, "code", None) == etree.ErrorTypes.ERR_NO_MEMORY:
+            raise _out_of_memory(len(data)) from err
+        # What lxml's own text adds is "(<string>, line 1)".
+        msg = f"not well-formed XML: {err.msg}"
+        raise OpenDriveError(msg) from err
+    except (ValueError, LookupError) as err:
         msg = f"not well-formed XML: {err}"
         raise OpenDriveError(msg) from err
     if root is None:
@@ -77,23 +100,20 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     return root
 
 
+def _out_of_memory(size: int) -> ToolError:
+    return ToolError(f"there is not enough memory to read XML of {size} bytes; free some and retry")
+
+
 def _drop_namespaces(root: Element) -> None:
     for element in root.iter(etree.Element):
         if "{" in str(element.tag):
             element.tag = etree.QName(element).localname
 
 
-def shown(value: str | None) -> str:
-    """A value as it appears in messages: quoted and never long."""
-    if value is None:
-        return "nothing"
-    return repr(value if len(value) <= 60 else value[:57] + "...")
-
-
 def _label(element: Element) -> str:
-    tag = str(element.tag)[:60]
+    tag = shown_id(str(element.tag))
     if tag in _NAMED and element.get("id"):
-        return f"{tag} {str(element.get('id'))[:60]}"
+        return f"{tag} {shown_id(str(element.get('id')))}"
     if tag in _SINGLE:
         return tag
     before = element.xpath("count(preceding-sibling::*[name() = $tag])", tag=str(element.tag))

@@ -23,9 +23,9 @@ from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
-from odscen.sumo.realize.network_fit import place_fit
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
+from odscen.sumo.runner.network_fit import place_fit
 from odscen.web.edit_messages import EditRequest, apply_edit
 from odscen.web.messages import (
     CopyName,

@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import discard, new_folder
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.base.shown import printable
 from odscen.convert.lane_table.table_json import table_from_json
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.workspace.asset_catalogue import assets_in
+from odscen.workspace.map_files import read_map_file
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -325,10 +327,7 @@ class Workspace:
             If the workspace cannot be written.
         """
         name = check_name(name_from_file(source) if name is None else name)
-        try:
-            content = source.read_bytes()
-        except OSError as error:
-            raise InputError(error.strerror or str(error), file=str(source)) from error
+        content, file = read_map_file(source), printable(source.name)
         final = self.root / "maps" / name
         sha256 = hashlib.sha256(content).hexdigest()
         built = _read_entry(final) if (final / "map.json").is_file() else None
@@ -339,7 +338,7 @@ class Workspace:
             return same
         kept = same is not None and same.converter == settings.converter == "file"
         given = same.given() if same and kept else None
-        return self._built(name, content, source.name, settings, given, progress)
+        return self._built(name, content, file, settings, given, progress)
 
     def set_network(
         self, name: str, source: Path, *, progress: ProgressCallback | None = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.base.ids import LaneKey
+from odscen.base.shown import shown_id
 from odscen.convert.building.one_way import one_way_ends
 from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
 from odscen.convert.model.access import is_used
@@ -93,7 +94,7 @@ def findings(
 
 
 def _place(road: str, section: int, lane: int) -> str:
-    return f"road {road} > laneSection {section} > lane {lane}"
+    return f"road {shown_id(road)} > laneSection {section} > lane {lane}"
 
 
 def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
@@ -126,7 +127,7 @@ def _lanes(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[Repor
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
-            yield ReportEntry(ElementOutcome.LOST, f"road {key.road}", reason)
+            yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
 
 
 def _varying(table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
@@ -157,7 +158,7 @@ def _crosswalks(odr: OpenDrive, placed: Sequence[PlacedCrosswalk]) -> Iterator[R
         for item in road.objects:
             if not is_crosswalk(item):
                 continue
-            element = f"road {road.id} > object {item.id}"
+            element = f"road {shown_id(road.id)} > object {shown_id(item.id)}"
             if (road.id, item.id) in kept:
                 yield ReportEntry(
                     ElementOutcome.KEPT, element, "crosswalk, as a crossing of its place and width"
@@ -173,7 +174,7 @@ def _signals(
     crossed = _lit_crossings(net)
     for road in odr.roads.values():
         for signal in road.signals:
-            element = f"road {road.id} > signal {signal.id}"
+            element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
             kind = signal_kind(signal)
             if element in unplaced:
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
@@ -206,7 +207,7 @@ def _bare_controllers(odr: OpenDrive, net: Net) -> Iterator[ReportEntry]:
     for junction in odr.junctions.values():
         bare = [key for key in junction.controllers if not odr.controllers[key].controls]
         if bare and junction.id not in lit:
-            reason = f"no lights: controller {bare[0]} names no signal of the file"
+            reason = f"no lights: controller {shown_id(bare[0])} names no signal of the file"
             yield ReportEntry(ElementOutcome.LOST, f"junction {junction.id}", reason)
 
 

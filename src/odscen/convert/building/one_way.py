@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.base.shown import shown_id
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
@@ -41,7 +42,7 @@ def one_way_ends(
                     f"two-way road that is one-way at junction {link.element_id}: traffic can "
                     f"{'only leave it for' if goes else 'only enter it from'} the junction"
                 )
-                yield ReportEntry(ElementOutcome.LOST, f"road {road.id} > {name}", reason)
+                yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(road.id)} > {name}", reason)
 
 
 def _outermost(edges: Sequence[EdgePlan], numbers: Sequence[int], *, at_end: bool) -> int:

@@ -49,8 +49,8 @@ def place_crosswalks(
     found = crosswalks(odr, table)
     if not found:
         return (), {}
-    usable = [bool(allowed(kind)) for kind in table.lane_type]
-    rows = np.flatnonzero(np.array(usable) & (table.lane_s1 - table.lane_s0 > 1e-3))
+    usable = np.array([bool(allowed(kind)) for kind in table.lane_type], dtype=np.bool_)
+    rows = np.flatnonzero(usable & (table.lane_s1 - table.lane_s0 > 1e-3))
     extent = (table.lane_s1 - table.lane_s0)[rows]
     _, owner, share = spread(extent, DENSE)
     s = table.lane_s0[rows][owner] + share * extent[owner]

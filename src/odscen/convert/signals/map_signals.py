@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.base.shown import shown_id
 from odscen.convert.model.right_of_way import Sign, wrapped
 from odscen.convert.signals.signal_facing import Acting, settle_signals, signal_homes
 from odscen.opendrive.objects import signal_kind
@@ -57,7 +58,7 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
     known: dict[str, tuple[str, str]] = {}
     for road in odr.roads.values():
         for signal in road.signals:
-            element = f"road {road.id} > signal {signal.id}"
+            element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
             known.setdefault(signal.id, (signal_kind(signal), element))
     for road in odr.roads.values():
         signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
@@ -66,7 +67,7 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
             if number < len(road.signals):
                 kind, element = (
                     signal_kind(road.signals[number]),
-                    f"road {road.id} > signal {one.id}",
+                    f"road {shown_id(road.id)} > signal {shown_id(one.id)}",
                 )
             if kind == "traffic_light" or kind in SIGN_KINDS:
                 yield Acting(one.id, element, kind, road.id, one.s, one.orientation, one.validities)

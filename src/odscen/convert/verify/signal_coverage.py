@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from odscen.base.ids import RoadId
+from odscen.base.shown import shown_id
 from odscen.convert.verify.fidelity_result import NEAR, SignalCoverage
 from odscen.convert.verify.polyline_finder import Polylines
 from odscen.opendrive.objects import signal_kind
@@ -72,9 +73,10 @@ class _StatedLights:
         names: dict[str, str] = {}
         roads: dict[str, set[str]] = defaultdict(set)
         for road in odr.roads.values():
+            place = f"road {shown_id(road.id)}"
             for signal in road.signals:
                 if signal_kind(signal) == "traffic_light":
-                    name = names.setdefault(signal.id, f"road {road.id} > signal {signal.id}")
+                    name = names.setdefault(signal.id, f"{place} > signal {shown_id(signal.id)}")
                     roads[name].add(road.id)
         for road in odr.roads.values():
             for reference in road.signal_references:

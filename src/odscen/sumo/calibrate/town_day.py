@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from odscen.base.errors import InputError
+from odscen.lanegraph.segments import segment_name
 from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.scenario.demand.day_profiles import DAY, Curve, known_profiles
@@ -187,7 +188,9 @@ def approach_capacities(sumo_map: SumoMap) -> dict[str, float]:
     ids, kinds = graph.segments.ids, graph.segments.kinds
     junctions = {str(name) for name, kind in zip(ids, kinds, strict=True) if kind == "junction"}
     lights = scenario_lights(sumo_map)
-    stages = {f"j{name}": len(light.green) for light in lights for name in light.names}
+    stages = {
+        segment_name("junction", name): len(light.green) for light in lights for name in light.names
+    }
     before: dict[str, list[str]] = {name: [] for name in junctions}
     for one, others in transitions(graph).items():
         for other in others & junctions:

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import pytest
+
+from odscen.base.shown import printable, shown, shown_id
+
+
+@pytest.mark.parametrize("plain", ["1", "-1", "road_7", "a.b/c:d", "x" * 60])
+def test_plain_ids_are_shown_as_they_are(plain: str) -> None:
+    assert shown_id(plain) == plain
+
+
+@pytest.mark.parametrize(
+    ("odd", "expected"),
+    [
+        ("a > b", "'a > b'"),
+        ("it's", '"it\'s"'),
+        ("x: y", "'x:\\x20y'"),
+        ("\u202eabc", "'\\u202eabc'"),
+        ("a\nb", "'a\\nb'"),
+        ("", "''"),
+        ("y" * 80, repr("y" * 57 + "...")),
+    ],
+)
+def test_other_ids_are_quoted_and_what_cannot_be_seen_is_escaped(odd: str, expected: str) -> None:
+    assert shown_id(odd) == expected
+
+
+def test_a_value_that_is_not_there_is_nothing() -> None:
+    assert shown(None) == "nothing"
+
+
+def test_names_of_files_stay_readable_and_can_always_be_printed() -> None:
+    assert printable("Straße 7.xodr") == "Straße 7.xodr"
+    undecodable = b"bad\xff.xodr".decode("utf-8", "surrogateescape")
+    assert printable(undecodable) == "bad\\udcff.xodr"
+    assert printable("a\u202eb").encode() == b"a\\u202eb"
