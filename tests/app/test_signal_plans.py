@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from typing import TYPE_CHECKING
 
 import pytest
 
 from odscen.app.export import export
+from odscen.app.networks import bring_in
 from odscen.app.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.app.signal_plans import export_signals, import_signals, lights_of
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
+from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.document.scenario_document import MapReference
+from odscen.workspace.netconvert import NetconvertLimits, run_netconvert
 from odscen.workspace.store import Workspace
 from tests.signal_case import MAP, one_plan, program, scenario
 from tests.sumo.conftest import BIN
@@ -50,6 +54,14 @@ def taken(workspace: Workspace, one: Scenario, folder: Path) -> Scenario:
     back, notes = import_signals(workspace, plain(one), file)
     assert notes == ()
     return back
+
+
+@pytest.fixture(scope="module")
+def by_netconvert(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """The same map with a network that netconvert has written."""
+    store = Workspace.open(tmp_path_factory.mktemp("netconvert"))
+    store.add_map(MAP, settings=ConversionSettings(converter="netconvert"))
+    return store
 
 
 @pytest.mark.parametrize("control", ["fixed", "actuated"])
@@ -207,3 +219,78 @@ def test_a_scenario_with_a_program_is_read_as_it_was_written(
     file = write_scenario(one, tmp_path / "one.scenario.json")
     assert read_scenario(file) == one
     assert json.loads(file.read_text())["signals"]["junctions"][0]["junction"] == "10001"
+
+
+@pytest.mark.parametrize("control", ["fixed", "actuated"])
+def test_the_program_of_the_guide_runs_on_a_network_by_netconvert_too(
+    by_netconvert: Workspace, tmp_path: Path, control: str
+) -> None:
+    one = placed(by_netconvert, scenario(program(), control=control, clock=EVENING))
+    done = run(by_netconvert, one, name="guide", out=tmp_path / "runs")
+    counts = done.summary["actors"]
+    assert done.status == "completed"
+    assert counts["inserted"] == counts["planned"] > 200
+    assert counts["arrived"] > 0.8 * counts["planned"]
+    assert (counts["teleported"], counts["collided"]) == (0, 0)
+    log = (done.folder / "sumo.log").read_text()
+    assert "tlLogic" not in log
+    assert "detector" not in log
+    back = taken(by_netconvert, one, tmp_path)
+    (timing,), (own,) = back.signals.junctions, one.signals.junctions
+    assert [set(group.movements) for group in timing.groups] == [
+        set(group.movements) for group in own.groups
+    ]
+
+
+def test_lights_by_netconvert_show_movements_by_segments(by_netconvert: Workspace) -> None:
+    """Lanes for bicycles, which our own network does not lead through the junction, included."""
+    (light,) = lights_of(by_netconvert, placed(by_netconvert, scenario(None)))
+    assert sorted(name for group in light.groups for name in group.movements) == [
+        "r1", "r2", "r3", "r4", "walk r1", "walk r2", "walk r3", "walk r4",
+    ]  # fmt: skip
+
+
+def test_conflicting_greens_are_refused_on_a_network_by_netconvert_with_both_movements(
+    by_netconvert: Workspace, tmp_path: Path
+) -> None:
+    first, *others = program()["stages"]
+    first = {**first, "permissive": [*first["permissive"], "K2"]}
+    design = one_plan(stages=[first, *others])
+    with pytest.raises(ScenarioError) as raised:
+        run(by_netconvert, placed(by_netconvert, scenario(design)), out=tmp_path)
+    message = str(raised.value)
+    assert "r1>r3 (group 'K1') and r2>r" in message or "r2>r4 (group 'K2') and r1>r" in message
+    assert "which meet; they cannot have green together" in message
+
+
+def test_lights_of_a_town_by_netconvert_have_movements_and_crossings(tmp_path: Path) -> None:
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(
+        MAP.with_name("town_5x5.xodr"), settings=ConversionSettings(converter="netconvert")
+    )
+    reference = MapReference(name="town_5x5", sha256=entry.info["sha256"])
+    lights = lights_of(store, scenario(None).model_copy(update={"map": reference, "roi": ()}))
+    assert len(lights) == 6
+    for light in lights:
+        names = {name for group in light.groups for name in group.movements}
+        assert any(name.startswith("walk r") for name in names)
+        assert all(name.removeprefix("walk ").startswith("r") for name in names)
+
+
+def test_the_program_of_the_guide_fits_a_network_that_netconvert_has_read_and_written(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    store = Workspace.open(tmp_path / "workspace")
+    net = store.add_map(MAP).path("net").read_bytes()
+    file = tmp_path / "changed.net.xml"
+    options = ["--sumo-net-file=ours.net.xml", "--precision=4"]
+    limits = NetconvertLimits(20.0, 1 << 30)
+    file.write_bytes(run_netconvert(options, files={"ours.net.xml": net}, limits=limits).net_xml)
+    bring_in(store, "signal_crossing", file)
+    one = placed(store, scenario(program(), clock=EVENING))
+    back, ours = (_phases(export_signals(where, one)) for where in (store, workspace))
+    assert back == ours != []
+
+
+def _phases(text: str) -> list[str]:
+    return re.findall(r"<phase [^>]*>|<param key=.odscen.group[^>]*>", text)

@@ -92,7 +92,7 @@ def taken_detectors(
     for (own, approach, before, length, stages, gap), names in together.items():
         covered = {n for name in names for n in loops[name].movements}
         everything = {
-            n for n, m in enumerate(light.movements) if m.approach == approach and not m.walk
+            n for n, m in enumerate(light.movements) if m.approach == approach and m.drive
         }
         places = (
             [approach]

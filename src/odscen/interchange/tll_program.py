@@ -130,6 +130,8 @@ class _Taking:
             return named
         columns: dict[tuple[object, ...], list[int]] = {}
         for n, one in enumerate(self._light.movements):
+            if not one.turn:
+                continue
             letters = tuple(phase.state[n].lower() for phase in self._phases())
             key = (one.walk, one.approach, *letters)
             columns.setdefault(key, []).append(n)
@@ -150,7 +152,8 @@ class _Taking:
             if key.startswith(GROUP_PARAM)
         }
         everything = sorted(n for links in found.values() for n in links)
-        return found if everything == list(range(len(self._light.movements))) else {}
+        there = [n for n, one in enumerate(self._light.movements) if one.turn]
+        return found if everything == there else {}
 
     def _designed_groups(self) -> list[dict[str, Any]]:
         result = []
@@ -297,6 +300,7 @@ class _Taking:
         ours: list[tuple[float, str]],
         theirs: list[tuple[float, str]],
     ) -> None:
+        ours, theirs = ([(s, self._used(state)) for s, state in one] for one in (ours, theirs))
         plain = [[(s, state.lower()) for s, state in one] for one in (ours, theirs)]
         if plain[0] != plain[1]:
             said, made = (
@@ -316,6 +320,13 @@ class _Taking:
                         "it gives way to others" if letter == "g" else "it has nothing to yield to"
                     )
                     self._notes.append(f"{program.place}: {name} shows {letter} for {was}: {why}")
+
+    def _used(self, state: str) -> str:
+        """A state whose letters for no connection are red: nobody sees them."""
+        movements = self._light.movements
+        return "".join(
+            letter if one.turn else "r" for letter, one in zip(state, movements, strict=True)
+        )
 
 
 def _differing(

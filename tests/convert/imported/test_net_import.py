@@ -44,7 +44,10 @@ def test_permissions_follow_allow_and_disallow(lane: str, vclass: str, allowed: 
 
 
 def test_connections_name_lanes_by_their_own_ids() -> None:
-    assert sorted(net().links) == [(":j_0_0", "b_0", "", ""), ("a_1", "b_0", ":j_0_0", "t")]
+    assert sorted(net().links) == [
+        (":j_0_0", "b_0", "", "", ()),
+        ("a_1", "b_0", ":j_0_0", "t", (0,)),
+    ]
 
 
 def test_edges_know_their_function_and_their_ends() -> None:

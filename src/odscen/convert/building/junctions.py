@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 
 from odscen.base.ids import SumoEdgeId
-from odscen.convert.building.light_links import direction, light_links, nearer_edge
 from odscen.convert.building.waiting_places import inner_junctions, waiting_places
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
 from odscen.convert.model.major_road import major_edges, stands_out
@@ -31,6 +30,7 @@ from odscen.convert.model.right_of_way import (
     requests,
     sight_at_yield,
 )
+from odscen.convert.signals.light_links import direction, light_links, nearer_edge
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.ids import Roadside
+from odscen.convert.imported.imported_lights import imported_letters
 from odscen.convert.imported.inner_chains import (
     InnerChain,
     InnerLane,
@@ -161,7 +162,7 @@ class _TableBuilder:
                 for edge in net.edges.values()
             },
             links=tuple(
-                SumoLink(*link)
+                SumoLink(*link[:4])
                 for link in net.links
                 if _WALKERS not in (lanes[link.source].allowed, lanes[link.target].allowed)
             ),
@@ -287,6 +288,7 @@ class _TableBuilder:
             junction: max(sorted(lights), key=lambda light: lights[light])
             for junction, lights in counts.items()
         }
+        letters = imported_letters(self._net)
         return tuple(
             SumoLight(
                 light.id,
@@ -294,6 +296,7 @@ class _TableBuilder:
                 light.phases,
                 light.offset,
                 light.signals,
+                *letters[light.id],
             )
             for light in self._net.lights
         )

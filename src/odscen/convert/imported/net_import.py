@@ -15,10 +15,10 @@ from lxml import etree
 
 from odscen.base.errors import InputError
 from odscen.base.ids import SumoEdgeId, SumoLaneId
-from odscen.convert.model.net import CROSSING, NORMAL, STAGE, WALKING_AREA, Phase
+from odscen.convert.model.net import CROSSING, NORMAL, STAGE, WALKING_AREA, Phase, Request
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Container, Sequence
 
     from odscen.base.arrays import FloatArray
 
@@ -56,22 +56,43 @@ class ImportedLane:
 
 @dataclass(frozen=True, slots=True)
 class ImportedEdge:
-    """One ``<edge>``; ``start`` and ``end`` are junctions, empty within a junction."""
+    """One ``<edge>``; ``start`` and ``end`` are junctions, empty within a junction.
+
+    ``crossed`` are the edges that a crossing leads over.
+    """
 
     id: SumoEdgeId
     function: str
     start: str
     end: str
     lanes: tuple[SumoLaneId, ...]
+    crossed: tuple[SumoEdgeId, ...] = ()
 
 
 class ImportedLink(NamedTuple):
-    """One ``<connection>``; ``via`` is the first internal lane, ``light`` a light, or empty."""
+    """One ``<connection>``.
+
+    ``via`` is the first internal lane, ``light`` a light, or empty; ``letters`` are the places in
+    the light's states: one, two of a crossing that shows each direction its own.
+    """
 
     source: SumoLaneId
     target: SumoLaneId
     via: SumoLaneId
     light: str
+    letters: tuple[int, ...] = ()
+
+
+class ImportedRights(NamedTuple):
+    """Right of way in a junction.
+
+    ``incoming`` are its lanes in the order in which it counts links, ``requests`` those of its
+    links; none where nobody gives way.
+    """
+
+    junction: str
+    incoming: tuple[SumoLaneId, ...]
+    requests: tuple[Request, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +109,8 @@ class ImportedLight:
 class ImportedNet:
     """A SUMO network; ``offset`` is SUMO position minus OpenDRIVE position, metres.
 
-    ``boundary`` is x_min, y_min, x_max, y_max in SUMO's frame, metres.
+    ``boundary`` is x_min, y_min, x_max, y_max in SUMO's frame, metres; ``lit`` has the right of way
+    of junctions with lights.
     """
 
     offset: tuple[float, float]
@@ -99,6 +121,7 @@ class ImportedNet:
     links: tuple[ImportedLink, ...]
     junctions: int
     lights: tuple[ImportedLight, ...]
+    lit: tuple[ImportedRights, ...] = ()
 
     def function(self, lane: SumoLaneId) -> str:
         """Function of the edge of a lane."""
@@ -176,7 +199,7 @@ def _with_sumolib(root: etree._Element) -> Any:
     from sumolib.net import NetReader
 
     reader = NetReader(
-        withPrograms=True, withInternal=True, withPedestrianConnections=True, withFoes=False
+        withPrograms=True, withInternal=True, withPedestrianConnections=True, withFoes=True
     )
     for event, element in etree.iterwalk(root, events=("start", "end")):
         if event == "start":
@@ -201,19 +224,22 @@ def _imported(net: Any, *, lefthand: bool) -> ImportedNet:
         if function == NORMAL:
             ends = edge.getFromNode().getID(), edge.getToNode().getID()
         name = SumoEdgeId(edge.getID())
-        edges[name] = ImportedEdge(name, function, *ends, tuple(lane.id for lane in own))
+        crossed = tuple(SumoEdgeId(other.getID()) for other in edge.getCrossingEdges())
+        edges[name] = ImportedEdge(name, function, *ends, tuple(lane.id for lane in own), crossed)
     if not any(edge.function == NORMAL for edge in edges.values()):
         msg = "it has no edges"
         raise ValueError(msg)
+    links = _links(net, lanes)
     return ImportedNet(
         offset=(offset[0], offset[1]),
         boundary=(x0, y0, x1, y1),
         lefthand=lefthand,
         edges=edges,
         lanes=lanes,
-        links=_links(net, lanes),
+        links=links,
         junctions=len(net.getNodes()),
         lights=tuple(_light(light) for light in net.getTrafficLights() if light.getPrograms()),
+        lit=_lit(net, {link.source for link in links if link.light}),
     )
 
 
@@ -268,8 +294,31 @@ def _links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLin
                     raise ValueError(msg)
                 source, target = link.getFromLane().getID(), link.getToLane().getID()
                 light = link.getTLSID() or ""
-                found.append(ImportedLink(SumoLaneId(source), SumoLaneId(target), via, light))
+                places = link.getTLLinkIndex(), link.getTLLinkIndex2()
+                letters = tuple(place for place in places if place >= 0)
+                ends = SumoLaneId(source), SumoLaneId(target)
+                found.append(ImportedLink(*ends, via, light, letters))
     return tuple(found)
+
+
+def _lit(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, ...]:
+    """Right of way of the junctions that lanes with lights lead to."""
+    found = []
+    for node in net.getNodes():
+        incoming = tuple(SumoLaneId(lane) for lane in node._incLanes or ())
+        if any(lane in controlled for lane in incoming):
+            rows = sorted(node._prohibits)
+            if rows != list(range(len(rows))):
+                msg = f"junction {node.getID()} has requests {rows}"
+                raise ValueError(msg)
+            requests = (Request(_bits(node._prohibits[n]), _bits(node._foes[n])) for n in rows)
+            found.append(ImportedRights(str(node.getID()), incoming, tuple(requests)))
+    return tuple(found)
+
+
+def _bits(text: str) -> frozenset[int]:
+    """Places of the ones in a row of right of way, counted from its end."""
+    return frozenset(n for n, bit in enumerate(reversed(text)) if bit == "1")
 
 
 def _light(light: Any) -> ImportedLight:

@@ -38,6 +38,9 @@ VERSION = "1.20"
 CROSSED = "c"
 """The turn of a link that is a crossing."""
 
+UNUSED = ""
+"""The turn of a link that is none: a letter of states that no connection of the network has."""
+
 STAGE = "stage "
 """How the names of phases begin that give green; a number follows, from 1."""
 
@@ -171,7 +174,8 @@ class LightLink(NamedTuple):
     source, target
         Lanes of a movement; of a crossing the walking areas at its ends.
     turn
-        SUMO's letter (``s``, ``l``, ``r``, ``t``), :data:`CROSSED` for a crossing.
+        SUMO's letter (``s``, ``l``, ``r``, ``t``), :data:`CROSSED` for a crossing, :data:`UNUSED`
+        where there is no connection; the lanes are empty then.
     speed
         m/s of the approach; 0 for a crossing.
     crossed

@@ -114,7 +114,7 @@ def _movement_problems(timing: JunctionTiming, light: Light, where: str) -> Iter
                         "a movement has one light"
                     )
                     yield error("movement_twice", place, message)
-    missing = [one for n, one in enumerate(light.movements) if n not in owner]
+    missing = [one for n, one in enumerate(light.movements) if one.turn and n not in owner]
     if missing:
         listed = ", ".join(dict.fromkeys(one.exact_name for one in missing))
         message = f"no group has {listed}; they would never have green"
@@ -233,7 +233,7 @@ def _detector_problems(
         place = f"{where}.detectors[{index}]"
         yield from _unknown("stage", detector.stages, stages, f"{place}.stages")
         if light.movements and not detector_movements(detector.at, light.movements):
-            ends = dict.fromkeys(one.approach for one in light.movements if not one.walk)
+            ends = dict.fromkeys(one.approach for one in light.movements if one.drive)
             message = (
                 f"no approach or lane before this light is called {detector.at!r}; approaches are "
                 f"{', '.join(ends)}"

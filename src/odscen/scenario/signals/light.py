@@ -18,7 +18,8 @@ class SignalMovement(NamedTuple):
     approach, exit
         Segments before and behind the junction; of a crossing the leg that it leads over, twice.
     turn
-        ``left``, ``straight``, ``right``, ``turnaround``, or ``walk`` for a crossing.
+        ``left``, ``straight``, ``right``, ``turnaround``, or ``walk`` for a crossing;
+        empty for a letter that the network has no connection for.
     lanes
         OpenDRIVE lanes before and behind, ``12.0.-1``; empty for a crossing.
     yellow
@@ -38,6 +39,11 @@ class SignalMovement(NamedTuple):
     def walk(self) -> bool:
         """Whether it is a crossing."""
         return self.turn == "walk"
+
+    @property
+    def drive(self) -> bool:
+        """Whether it is for vehicles."""
+        return bool(self.turn) and not self.walk
 
     @property
     def name(self) -> str:

@@ -38,7 +38,7 @@ def find_movements(name: str, movements: Sequence[SignalMovement]) -> tuple[int,
     return tuple(
         n
         for n, one in enumerate(movements)
-        if not one.walk
+        if one.drive
         and source in (one.approach, one.lanes[0])
         and target in (None, one.exit, one.lanes[1])
     )
@@ -64,7 +64,7 @@ def shortest_names(wanted: Iterable[int], movements: Sequence[SignalMovement]) -
 
 def known_names(movements: Sequence[SignalMovement]) -> tuple[str, ...]:
     """Names of all movements, by segments, for messages."""
-    return tuple(dict.fromkeys(one.name for one in movements))
+    return tuple(dict.fromkeys(one.name for one in movements if one.turn))
 
 
 def _names(one: SignalMovement) -> tuple[str, ...]:

@@ -148,7 +148,7 @@ def vehicle_loops(
             )  # fmt: skip
     if designed:
         return tuple(loops)
-    every = [n for n, one in enumerate(view.movements) if not one.walk]
+    every = [n for n, one in enumerate(view.movements) if one.drive]
     for lane, movements in _by_lane(light, every).items():
         stages = tuple(stage for stage, some in green.items() if some & set(movements))
         if not stages:

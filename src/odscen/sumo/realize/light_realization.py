@@ -305,7 +305,7 @@ class _Realizing:
         lanes = dict.fromkeys(
             link.source
             for link, one in zip(self._light.links, self._view.movements, strict=True)
-            if not one.walk
+            if one.drive
         )
         params |= dict.fromkeys(lanes, "NO_DETECTOR")
         extra = []
@@ -315,7 +315,7 @@ class _Realizing:
             else:
                 extra.append(loop.id)
         # Whether a lane counts for a stage is said by conditions, so SUMO need not judge.
-        params |= {"jam-threshold": "3600", "passing-time": "0.1"}
+        params |= {"jam-threshold": "3600", "passing-time": "0.001"}
         if extra:
             params["extra-detectors"] = " ".join(extra)
         return params
@@ -378,10 +378,11 @@ class _Realizing:
         if not self._light.links:
             return ()
         columns: dict[tuple[str, ...], list[int]] = {}
-        for n in range(len(self._light.links)):
+        for n, one in enumerate(self._view.movements):
+            if not one.turn:
+                continue
             shown = tuple(phase.state[n].lower() for phase in self._light.phases)
-            approach = self._view.movements[n].approach
-            columns.setdefault((approach, str(self._view.movements[n].walk), *shown), []).append(n)
+            columns.setdefault((one.approach, str(one.walk), *shown), []).append(n)
         names = {True: count(1), False: count(1)}
         groups = []
         for links in columns.values():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.convert.model.net import CROSSED
+from odscen.convert.model.net import CROSSED, UNUSED
 from odscen.convert.signals.signal_programs import SignalGroup
 from odscen.scenario.signals.light import Light, Meeting, SignalMovement
 from odscen.sumo.realize.sumo_lane_places import lane_segments
@@ -39,6 +39,8 @@ def _light(light: SumoLight, sumo_map: SumoMap, segments: Mapping[str, Sequence[
 def _movement(
     link: LightLink, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]
 ) -> SignalMovement:
+    if link.turn == UNUSED:
+        return SignalMovement("", "", "")
     turn = _TURNS[link.turn]
     if link.turn == CROSSED:
         lanes = sumo_map.net.edge_lanes
@@ -59,17 +61,28 @@ def _movement(
 def _segment(
     lane: str, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]], *, back: bool
 ) -> str:
-    """Segment at the stop line (or behind the junction) of a lane, or of the next one with any."""
+    """Segment at the stop line (or behind the junction) of a lane, or of the next one with any.
+
+    Lanes for bicycles have that of the lane beside them.
+    """
     links = sumo_map.net.links
     seen = {lane}
     todo = [lane]
     while todo:
         one = todo.pop(0)
-        if segments.get(one):
-            return segments[one][-1 if back else 0]
+        for beside in _beside(one, sumo_map):
+            if segments.get(beside):
+                return segments[beside][-1 if back else 0]
         for link in links:
             near, far = (link.target, link.source) if back else (link.source, link.target)
             if near == one and far not in seen:
                 seen.add(far)
                 todo.append(far)
     return lane
+
+
+def _beside(lane: str, sumo_map: SumoMap) -> list[str]:
+    """A lane and the others of its edge, the nearest first."""
+    own = sumo_map.net.lanes[lane]
+    others = sumo_map.net.edge_lanes.get(own.edge, ())
+    return [lane, *(one.id for one in sorted(others, key=lambda x: abs(x.index - own.index)))]

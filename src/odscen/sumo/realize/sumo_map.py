@@ -171,7 +171,7 @@ def _or_one(scale: float) -> float:
 
 
 def _lane_names(table: LaneTable) -> dict[str, str]:
-    links = [link for light in table.lights for link in light.links]
+    links = [link for light in table.lights for link in light.links if link.turn]
     places = [(link.target, 0.0) for link in links]
     places += [(link.source, table.lanes[link.source].length) for link in links]
     found = {lane: table.to_xodr(lane, pos) for lane, pos in places}

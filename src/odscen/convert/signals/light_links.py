@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.base.arrays import FloatArray
-    from odscen.convert.model.right_of_way import Movement
+    from odscen.base.ids import SumoLaneId
+    from odscen.convert.model.right_of_way import Movement, Walkway
     from odscen.convert.model.walk_net import PlacedCrossing
 
 POINTS = 9
@@ -42,7 +43,7 @@ def light_links(
     """
     count = len(movements)
     return tuple(
-        _moving(movements[n])
+        moving_link(movements[n])
         if n < count
         else _walking(crossings[n - count], [movements[k] for k in crossed[n - count]])
         for n in rows
@@ -66,7 +67,8 @@ def nearer_edge(movement: Movement, crossing: PlacedCrossing) -> SumoEdgeId:
     return SumoEdgeId(movement.source[0] if gaps[0] <= gaps[1] else movement.target[0])
 
 
-def _moving(movement: Movement) -> LightLink:
+def moving_link(movement: Movement) -> LightLink:
+    """Link of a movement."""
     return LightLink(
         lane_id(*movement.source),
         lane_id(*movement.target),
@@ -74,6 +76,21 @@ def _moving(movement: Movement) -> LightLink:
         movement.speed,
         path=_points(movement.shape),
     )
+
+
+def walking_link(
+    ends: tuple[SumoLaneId, SumoLaneId], walkway: Walkway, crossed: Sequence[SumoEdgeId]
+) -> LightLink:
+    """Link of a crossing.
+
+    Parameters
+    ----------
+    ends
+        Lanes of the walking areas at its ends.
+    crossed
+        Edges that it leads over.
+    """
+    return LightLink(*ends, CROSSED, crossed=tuple(crossed), path=_points(walkway.axis))
 
 
 def _points(shape: FloatArray) -> tuple[tuple[float, float], ...]:
@@ -85,5 +102,4 @@ def _points(shape: FloatArray) -> tuple[tuple[float, float], ...]:
 def _walking(crossing: PlacedCrossing, movements: Sequence[Movement]) -> LightLink:
     edges = dict.fromkeys(nearer_edge(movement, crossing) for movement in movements)
     ends = lane_id(crossing.start), lane_id(crossing.link.target)
-    path = _points(crossing.walkway.axis)
-    return LightLink(*ends, CROSSED, crossed=tuple(edges), path=path)
+    return walking_link(ends, crossing.walkway, tuple(edges))
