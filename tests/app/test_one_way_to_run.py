@@ -19,7 +19,7 @@ STEPS = {
     "run_prepared": {"app"},
     "run_many": {"app"},
     "run_worker": set[str](),
-    "realize": {"interchange"},  # the SUMO files alone, of which nothing is run
+    "realize": {"app", "interchange"},  # the SUMO files alone, of which nothing is run
 }
 
 
