@@ -62,4 +62,4 @@ def test_who_ignores_red_waits_at_no_light(tmp_path: Path) -> None:
     ignoring = travel_times(tmp_path / "ignoring", ignores_red=True)
     saved = heeding - ignoring
     assert (saved > 5.0).sum() >= 5, "nobody waits at a light that is heeded"
-    assert saved.min() > -2.0
+    assert saved.min() > -3.0, "but for a moment behind another"
