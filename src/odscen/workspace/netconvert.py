@@ -34,7 +34,7 @@ MEMORY_PER_MEGABYTE = 64 << 20
 """Bytes of data; towns of 3 MB take less than 0.2 GB of it."""
 
 _PATIENCE = 10.0
-"""Seconds by the clock for each of computing time: a busy machine is no fault of the map."""
+"""Seconds of wall time for each of CPU time: a busy machine is no fault of the map."""
 
 _HEADER = re.compile(rb"<!-- generated on .*?-->\s*", re.DOTALL)
 """netconvert's comment with date and command line; the same input must give the same bytes."""
