@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 
 from odscen.base.ids import SumoEdgeId
+from odscen.convert.building.junction_ruling import junction_kind, ruled, signposts
 from odscen.convert.building.waiting_places import inner_junctions, waiting_places
 from odscen.convert.model.lane_alignment import divided_shape, drawn_length
-from odscen.convert.model.major_road import major_edges, stands_out
 from odscen.convert.model.net import (
     INTERNAL,
     LEAST_LENGTH,
@@ -22,14 +22,7 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import (
-    Rules,
-    Sign,
-    find_conflicts,
-    in_turn,
-    requests,
-    sight_at_yield,
-)
+from odscen.convert.model.right_of_way import Sign
 from odscen.convert.signals.light_links import direction, light_links, nearer_edge
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
@@ -130,55 +123,35 @@ def build_junction(
     signalled = any(passage.lights for passage in passages)
     if signalled:
         passages = _obeying(passages)
-    movements = [
-        replace(p.movement, sign=max(p.movement.sign, Sign.YIELD))
-        if signalled and not p.lights
-        else p.movement
-        for p in passages
-    ]
-    conflicts = find_conflicts(movements, [crossing.walkway for crossing in crossings])
-    signs = {movement.source[0]: movement.sign for movement in movements}
-    all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
     cars = ["passenger" in passage.allowed for passage in passages]
-    unruled = len(set(signs.values())) <= 1 and not around.high_low
-    major: frozenset[str] = frozenset()
-    # Signs to give way on all approaches distinguish none, but say that there is a major road.
-    if signalled or (unruled and (any(signs.values()) or stands_out(movements, cars))):
-        major = major_edges(movements, cars)
-    rules = Rules(around.high_low, around.lefthand, all_stop, signalled, major)
-    rights = requests(movements, conflicts, rules)
+    walkways = [crossing.walkway for crossing in crossings]
+    ruling = ruled(
+        _signed(passages) if signalled else [passage.movement for passage in passages],
+        walkways,
+        cars,
+        high_low=around.high_low,
+        lefthand=around.lefthand,
+        signalled=signalled,
+    )
+    movements, conflicts, rights = ruling.movements, ruling.conflicts, ruling.rights
     light, rows = None, dict[int, int]()
     if signalled:
         light, rows = _light(name, passages, conflicts, rights, crossings, around)
-    zipped = {n for pair in in_turn(movements, conflicts, rules) for n in pair}
-    equal = unruled and not major and not all_stop and not zipped
-    states = [
-        "Z"
-        if n in zipped
-        else _state(m, right, len(movements), lit=n in rows, all_stop=all_stop, equal=equal)
-        for n, (m, right) in enumerate(zip(movements, rights, strict=False))
-    ]
     places = waiting_places(
         movements,
-        [crossing.walkway for crossing in crossings],
+        walkways,
         rights,
-        [car and not all_stop and not equal for car in cars],
+        [car and not ruling.rules.all_stop and not ruling.equal for car in cars],
         side=-1.0 if around.lefthand else 1.0,
         lit=signalled,
     )
-    sights = [sight_at_yield(m, r, movements) for m, r in zip(movements, rights, strict=False)]
-    inside = _Inside(name, passages, list(zip(states, sights, strict=True)), rows, places)
+    inside = _Inside(name, passages, signposts(ruling, rows), rows, places)
     walked, walk_links = _crossings(name, passages, crossings, conflicts, rows, len(passages))
     starts = [lane_id(crossing.start) for crossing in crossings]
-    kind = "traffic_light" if signalled else "allway_stop" if all_stop else ""
-    if not kind:
-        yielding = Sign.STOP in signs.values()
-        kind = "priority_stop" if yielding else "right_before_left" if equal else "priority"
-        kind = "priority" if not conflicts.pairs else "zipper" if zipped else kind
     last = [inside.beyond[n][0] if n in places else lane for n, lane in enumerate(inside.lanes)]
     junction = NetJunction(
         name,
-        kind if passages or crossings else "dead_end",
+        junction_kind(ruling) if passages or crossings else "dead_end",
         around.place,
         around.outline,
         tuple(dict.fromkeys((*_sources(passages), *around.incoming, *starts))),
@@ -186,9 +159,7 @@ def build_junction(
         tuple(replace(right, waits_inside=n in places) for n, right in enumerate(rights)),
         around.xodr,
     )
-    waiting = inner_junctions(
-        name, movements, rights, {n: lane for n, (lane, _) in inside.beyond.items()}
-    )
+    beyond = {n: lane for n, (lane, _) in inside.beyond.items()}
     return BuiltJunction(
         junction,
         (*inside.edges, *walked),
@@ -196,9 +167,17 @@ def build_junction(
         light,
         tuple(inside.lanes),
         inside.beyond,
-        waiting,
+        inner_junctions(name, movements, rights, beyond),
         conflicts,
     )
+
+
+def _signed(passages: Sequence[Passage]) -> list[Movement]:
+    """Movements where there are lights: those that none controls give way."""
+    return [
+        p.movement if p.lights else replace(p.movement, sign=max(p.movement.sign, Sign.YIELD))
+        for p in passages
+    ]
 
 
 def _sources(passages: Sequence[Passage]) -> list[SumoLaneId]:
@@ -218,22 +197,6 @@ def _obeying(passages: Sequence[Passage]) -> list[Passage]:
         lights = passage.lights or (min(same)[1] if same else ())
         result.append(replace(passage, lights=lights))
     return result
-
-
-def _state(
-    movement: Movement, right: Request, count: int, *, lit: bool, all_stop: bool, equal: bool
-) -> str:
-    """SUMO's letter for the right of way of a link; its first ``count`` links are for vehicles."""
-    if lit:
-        # Persons are waited for whatever the letter; it says whether vehicles are.
-        return "o" if any(other < count for other in right.yields_to) else "O"
-    if all_stop:
-        return "w"
-    if movement.sign is Sign.STOP:
-        return "s"
-    if not right.yields_to:
-        return "M"
-    return "=" if equal else "m"
 
 
 def _swept(passage: Passage) -> float:
