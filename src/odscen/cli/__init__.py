@@ -17,6 +17,7 @@ from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim
 from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
+from odscen.cli.difference_commands import diff_maps, diff_scenarios
 from odscen.cli.doctor_command import doctor
 from odscen.cli.map_commands import app as maps
 from odscen.cli.network_commands import compare_networks, network
@@ -38,6 +39,7 @@ app = typer.Typer(
 maps.command()(pull)
 maps.command()(network)
 maps.command("compare")(compare_networks)
+maps.command("diff")(diff_maps)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.add_typer(demand, name="demand")
@@ -50,6 +52,7 @@ app.command()(resume)
 app.command()(report)
 app.command("test")(gate)
 app.command()(compare)
+app.command("diff")(diff_scenarios)
 app.command()(cosim)
 app.command()(serve)
 app.command()(doctor)

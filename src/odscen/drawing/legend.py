@@ -54,7 +54,7 @@ def legend_entries(
 
 def place_entries(marks: Sequence[PlaceMarks]) -> list[tuple[Markup, str]]:
     """Rings and names of circled places, with how many there are of each kind."""
-    return [(_ring(kind.color), f"{kind.name} ({len(kind.xy)})") for kind in marks]
+    return [(_ring(kind.color), f"{kind.name} ({kind.total})") for kind in marks]
 
 
 def _graph_entries(graph: MapGraph) -> list[tuple[Markup, str]]:

@@ -98,7 +98,7 @@ def render_drawing(
     frame = _SheetFrame.around(view or drawing.bounds, margins=options.margins)
     if view is not None:
         drawing = drawing.clipped(frame.bounds)
-    marks = [kind for kind in marks if len(kind.xy)]
+    marks = [kind for kind in marks if kind.total]
     inside = _inside(drawing, graph, options, frame)
     if marks:
         inside += place_layer(marks, radius=_RING / frame.scale)

@@ -239,20 +239,29 @@ def _symbol(symbol: Symbol, options: LayerOptions) -> Markup:
 
 
 class PlaceMarks(NamedTuple):
-    """Places of one kind to be circled on a map; ``xy`` is ``(N, 2)``, metres, OpenDRIVE frame."""
+    """Places of one kind to be marked on a map, metres, OpenDRIVE frame.
+
+    ``xy``, shape ``(N, 2)``, are circled; ``lines`` are drawn over.
+    """
 
     name: str
     color: str
     xy: FloatArray
+    lines: Lines | None = None
+
+    @property
+    def total(self) -> int:
+        """How many places there are."""
+        return len(self.xy) + (self.lines.total if self.lines is not None else 0)
 
 
 def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
-    """Circles of ``radius`` metres around places, in the colours of their kinds.
+    """Circles of ``radius`` metres around places, and lines, in the colours of their kinds.
 
-    Rings lie on a light rim, so that they show on every surface; the middle stays clear. Places of
+    They lie on a light rim, so that they show on every surface; the middle stays clear. Places of
     one kind that lie within one ring share it.
     """
-    rings = [_circles(_spread(kind.xy, radius), radius) for kind in marks]
+    rings = [_circles(_spread(kind.xy, radius), radius) + _over(kind) for kind in marks]
     rim, line = round(radius * 48.0), round(radius * 28.0)
     parts = []
     for kind, ring in zip(marks, rings, strict=True):
@@ -260,7 +269,11 @@ def place_layer(marks: Sequence[PlaceMarks], *, radius: float) -> Markup:
         parts.append(
             element("path", d=ring, class_="m-place", stroke=kind.color, stroke_width=line)
         )
-    return element("g", *parts, class_="m-places", fill="none")
+    return element("g", *parts, class_="m-places", fill="none", stroke_linecap="round")
+
+
+def _over(kind: PlaceMarks) -> str:
+    return "" if kind.lines is None or not kind.lines.total else svg_xy(kind.lines)
 
 
 def _spread(xy: FloatArray, radius: float) -> FloatArray:
@@ -269,7 +282,7 @@ def _spread(xy: FloatArray, radius: float) -> FloatArray:
     while len(left):
         kept.append(left[0])
         left = left[np.hypot(*(left - left[0]).T) > radius]
-    return np.array(kept)
+    return np.array(kept).reshape(-1, 2)
 
 
 def _circles(xy: FloatArray, radius: float) -> str:

@@ -1,0 +1,256 @@
+"""What differs in the lanes of one road: lanes, types, widths, limits, permissions, marks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from odscen.base.ids import LaneKey
+from odscen.changes.map_change import ChangePlace, MapChange, metres, of_lane, of_road
+from odscen.changes.paired_lanes import SAME, merged
+from odscen.opendrive.road_model import DRIVABLE_TYPES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from odscen.base.arrays import FloatArray
+    from odscen.changes.map_change import ChangedThing, ChangeKind
+    from odscen.changes.paired_lanes import PairedStretch
+    from odscen.opendrive.lanes import RoadTable
+    from odscen.opendrive.road_model import Lane, Road, RoadMark
+
+_SAMPLES = np.linspace(0.0, 1.0 - 1e-9, 9)  # the end belongs to the next record
+_KMH = 3.6
+
+
+@dataclass(frozen=True, slots=True)
+class RoadPair:
+    """A road in both maps, with the tables of both maps and the lanes paired."""
+
+    before: Road
+    after: Road
+    tables: tuple[RoadTable, RoadTable]
+    stretches: tuple[PairedStretch, ...]
+
+
+class _Found(NamedTuple):
+    """A difference on a piece of a road, before pieces that say the same are joined."""
+
+    what: ChangedThing
+    lane: int | None
+    values: tuple[str | None, str | None]
+    s0: float
+    s1: float
+    added: bool = False
+    size: float = 0.0
+
+
+def lane_differences(pair: RoadPair) -> Iterator[MapChange]:
+    """Differences of the lanes of a road, from the centre line outwards, along s."""
+    found: list[_Found] = []
+    for stretch in pair.stretches:
+        found += _lanes_of(stretch)
+        for old, new in stretch.pairs:
+            if old is not None and new is not None:
+                found += _properties(old, new, stretch)
+                if old.id:
+                    found += _width(pair, stretch, (old, new))
+    found += _limits(pair)
+    for one in _joined(found):
+        yield _change(pair, one)
+
+
+def _lanes_of(stretch: PairedStretch) -> Iterator[_Found]:
+    for old, new in stretch.pairs:
+        if new is None and old is not None:
+            yield _Found("lane", old.id, (old.type, None), stretch.s0, stretch.s1)
+        elif old is None and new is not None:
+            yield _Found("lane", new.id, (None, new.type), stretch.s0, stretch.s1, added=True)
+
+
+# ------------------------------------------------------------------------- what holds from s on
+def _mark(mark: RoadMark | None) -> str:
+    if mark is None:
+        return "none"
+    change = "" if mark.lane_change == "both" else f", lane change {mark.lane_change}"
+    weight = "" if mark.weight == "standard" else f", {mark.weight}"
+    return f"{mark.type} {mark.color}{weight}{change}"
+
+
+def _holding(records: Sequence[Any], s: float) -> list[Any]:
+    """Records that hold at s: those with the last start before it."""
+    started = [one for one in records if one.s <= s + SAME]
+    return [one for one in started if one.s == started[-1].s]
+
+
+def _last(records: Sequence[Any], s: float) -> Any:
+    holding = _holding(records, s)
+    return holding[-1] if holding else None
+
+
+def _height(lane: Lane, s: float) -> str:
+    height = _last(lane.heights, s)
+    if height is None:
+        return "0 m"
+    return f"{metres(height.inner)} m inside, {metres(height.outer)} m outside"
+
+
+def _access(lane: Lane, s: float) -> str:
+    return ", ".join(sorted(f"{one.rule} {one.restriction}" for one in _holding(lane.access, s)))
+
+
+_PROPERTIES: tuple[tuple[ChangedThing, Callable[[Lane, float], str]], ...] = (
+    ("lane type", lambda lane, _: lane.type),
+    ("lane direction", lambda lane, _: lane.direction),
+    ("lane height", _height),
+    ("permission", lambda lane, s: _access(lane, s) or "as the lane's type"),
+    ("road mark", lambda lane, s: _mark(_last(lane.road_marks, s))),
+)
+
+
+def _properties(old: Lane, new: Lane, stretch: PairedStretch) -> Iterator[_Found]:
+    if old == new:
+        return
+    starts = (
+        record.s
+        for lane in (old, new)
+        for records in (lane.heights, lane.access, lane.road_marks)
+        for record in records
+    )
+    inside = [s - stretch.s0 for s in starts if s > stretch.s0]
+    pieces = merged(inside, end=stretch.s1 - stretch.s0)
+    for low, high in zip(pieces, [*pieces[1:], stretch.s1 - stretch.s0], strict=True):
+        s0, s1 = stretch.s0 + low, stretch.s0 + high
+        for what, value in _PROPERTIES:
+            values = value(old, 0.5 * (s0 + s1)), value(new, 0.5 * (s0 + s1))
+            if values[0] != values[1]:
+                yield _Found(what, old.id, values, s0, s1)
+
+
+# ------------------------------------------------------------------------- widths and limits
+def _width(pair: RoadPair, stretch: PairedStretch, lanes: tuple[Lane, Lane]) -> Iterator[_Found]:
+    """Pieces on which the widths differ, with those at the place where they differ most."""
+    if lanes[0].widths == lanes[1].widths and lanes[0].borders == lanes[1].borders == ():
+        return
+    starts = [c.s for lane in lanes for c in (*lane.widths, *lane.borders) if c.s > stretch.s0]
+    length = stretch.s1 - stretch.s0
+    pieces = merged((s - stretch.s0 for s in starts), end=length)
+    for low, high in zip(pieces, [*pieces[1:], length], strict=True):
+        at = stretch.s0 + low + (high - low) * _SAMPLES
+        old, new = (
+            _widths_at(table, LaneKey(road.id, section, lane.id), at)
+            for table, road, section, lane in zip(
+                pair.tables, (pair.before, pair.after), stretch.sections, lanes, strict=True
+            )
+        )
+        apart = np.abs(new - old)
+        worst = int(np.argmax(apart))
+        if apart[worst] > SAME:
+            values = f"{metres(float(old[worst]))} m", f"{metres(float(new[worst]))} m"
+            s0, s1 = stretch.s0 + low, stretch.s0 + high
+            size = float(apart[worst])
+            yield _Found("width", lanes[0].id, values, s0, s1, size=size)
+
+
+def _widths_at(table: RoadTable, key: LaneKey, s: FloatArray) -> FloatArray:
+    return table.lane_width(np.full(s.size, table.lane_index[key]), s)
+
+
+def _limits(pair: RoadPair) -> list[_Found]:
+    """Limits as they act, of lanes for motor vehicles: one of the road where all change alike."""
+    found: list[_Found] = []
+    for stretch in pair.stretches:
+        lanes = [
+            (old, new)
+            for old, new in stretch.pairs
+            if old is not None and new is not None and old.type in DRIVABLE_TYPES
+        ]
+        starts = [
+            record.s - stretch.s0
+            for road in (pair.before, pair.after)
+            for record in (*road.types, *_speeds(road))
+            if record.s > stretch.s0
+        ]
+        length = stretch.s1 - stretch.s0
+        pieces = merged(starts, end=length)
+        for low, high in zip(pieces, [*pieces[1:], length], strict=True):
+            found += _limits_of(pair, stretch, lanes, (stretch.s0 + low, stretch.s0 + high))
+    return found
+
+
+def _speeds(road: Road) -> Iterable[Any]:
+    return (
+        speed
+        for section in road.sections
+        for lane in section.lanes.values()
+        for speed in lane.speeds
+    )
+
+
+def _limits_of(
+    pair: RoadPair,
+    stretch: PairedStretch,
+    lanes: Sequence[tuple[Lane, Lane]],
+    between: tuple[float, float],
+) -> list[_Found]:
+    middle = np.array([0.5 * (between[0] + between[1])])
+    values = []
+    for both in lanes:
+        old, new = (
+            table.speed_limit(
+                np.array([table.lane_index[LaneKey(road.id, section, lane.id)]]), middle
+            )[0]
+            for table, road, section, lane in zip(
+                pair.tables, (pair.before, pair.after), stretch.sections, both, strict=True
+            )
+        )
+        values.append((both[0].id, (_limit(old), _limit(new))))
+    changed = [(lane, said) for lane, said in values if said[0] != said[1]]
+    if changed and len(changed) == len(values) and len({said for _, said in changed}) == 1:
+        return [_Found("limit", None, changed[0][1], *between)]
+    return [_Found("limit", lane, said, *between) for lane, said in changed]
+
+
+def _limit(value: float) -> str:
+    if math.isnan(value):
+        return "none given"
+    return "no limit" if math.isinf(value) else f"{metres(round(value * _KMH, 2))} km/h"
+
+
+# ------------------------------------------------------------------------- one line each
+def _joined(found: Iterable[_Found]) -> list[_Found]:
+    """Pieces of a lane that follow each other and say the same, as one.
+
+    Widths are one from end to end, with the values where they differ most.
+    """
+    kept: list[_Found] = []
+    open_pieces: dict[tuple[Any, ...], int] = {}
+    for one in found:
+        said = None if one.what == "width" else one.values
+        key = (one.what, one.lane, one.added, said)
+        at = open_pieces.get(key)
+        if at is not None and abs(kept[at].s1 - one.s0) <= SAME:
+            widest = max(kept[at], one, key=lambda piece: piece.size)
+            kept[at] = widest._replace(s0=kept[at].s0, s1=one.s1)
+        else:
+            open_pieces[key] = len(kept)
+            kept.append(one)
+    return kept
+
+
+def _change(pair: RoadPair, one: _Found) -> MapChange:
+    road = pair.after.id if one.added else pair.before.id
+    of = of_road(road) if one.lane is None else of_lane(road, one.lane)
+    kind: ChangeKind = "changed"
+    if one.what == "lane":
+        kind = "added" if one.added else "removed"
+    return MapChange(
+        kind,
+        one.what,
+        of if one.what == "lane" else f"{one.what} of {of}",
+        *one.values,
+        place=ChangePlace(road, one.s0, one.s1, one.lane),
+    )

@@ -1,0 +1,134 @@
+"""Two scenario documents held against each other, field by field, in words."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.shown import shown_id
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from odscen.changes.map_change import ChangeKind
+    from odscen.scenario.document.scenario_document import Scenario
+
+_LONGEST = 80
+_SINGULAR = {
+    "actors": "actor",
+    "flows": "flow",
+    "zones": "zone",
+    "profiles": "profile",
+    "matrices": "matrix",
+    "counts": "counts",
+    "background": "background demand",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioChange:
+    """A difference of two documents; ``before`` and ``after`` as JSON, ``None`` where nothing is.
+
+    ``place`` is the path of the field, with the ids of actors, flows and the like:
+    ``("actors", "van-1", "goal")``.
+    """
+
+    kind: ChangeKind
+    place: tuple[str, ...]
+    before: str | None = None
+    after: str | None = None
+
+    @property
+    def words(self) -> str:
+        """One line for people: ``actor van-1, goal: "5.0.-1.3" -> "7.0.-1.9"``."""
+        if self.before is None or self.after is None:
+            return f"{self._subject()}: {self.kind}"
+        return f"{self._subject()}: {self.before} -> {self.after}"
+
+    def _subject(self) -> str:
+        said: list[str] = []
+        parts = iter(self.place)
+        for part in parts:
+            key = next(parts, None) if part in _SINGULAR else None
+            name = part.replace("_", " ")
+            said.append(name if key is None else f"{_SINGULAR[part]} {shown_id(key)}")
+        return ", ".join(said)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {
+            "kind": self.kind,
+            "place": list(self.place),
+            "before": self.before,
+            "after": self.after,
+            "words": self.words,
+        }
+
+
+def scenario_differences(before: Scenario, after: Scenario) -> tuple[ScenarioChange, ...]:
+    """Find the differences of two scenarios, in the order of the fields of the document.
+
+    Actors, flows and whatever else has an id are paired by it, so their order is told apart from
+    their content.
+    """
+    old, new = (one.model_dump(mode="json") for one in (before, after))
+    return tuple(_fields(old, new, ()))
+
+
+def _fields(
+    old: Mapping[str, Any], new: Mapping[str, Any], place: tuple[str, ...]
+) -> Iterator[ScenarioChange]:
+    for key in dict.fromkeys([*old, *new]):
+        yield from _value(old.get(key), new.get(key), (*place, key))
+
+
+def _value(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[ScenarioChange]:
+    if old == new:
+        return
+    if isinstance(old, dict) and isinstance(new, dict):
+        yield from _fields(old, new, place)
+    elif isinstance(old, list) and isinstance(new, list):
+        if all(isinstance(one, dict) and "id" in one for one in (*old, *new)):
+            yield from _by_id(old, new, place)
+        else:
+            yield ScenarioChange("changed", place, *_lists(old, new))
+    else:
+        yield ScenarioChange("changed", place, _said(old), _said(new))
+
+
+def _by_id(
+    old: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], place: tuple[str, ...]
+) -> Iterator[ScenarioChange]:
+    was = {one["id"]: one for one in old}
+    now = {one["id"]: one for one in new}
+    for key, one in was.items():
+        if key in now:
+            yield from _fields(one, now[key], (*place, key))
+        else:
+            yield ScenarioChange("removed", (*place, key))
+    for key in now:
+        if key not in was:
+            yield ScenarioChange("added", (*place, key))
+    if [key for key in was if key in now] != [key for key in now if key in was]:
+        yield ScenarioChange("changed", (*place, "order"), "as it was", "another")
+
+
+def _lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:
+    """Short lists whole; of long ones only what is not in the other, with how many it is."""
+    said = _said(old), _said(new)
+    if max(map(len, said)) <= _LONGEST:
+        return said
+    first, second = (Counter(json.dumps(one) for one in these) for these in (old, new))
+    lost, gained = first - second, second - first
+    return _count(old, lost), _count(new, gained)
+
+
+def _count(these: Sequence[Any], own: Counter[str]) -> str:
+    return f"{len(these)} values, of them {sum(own.values())} only here"
+
+
+def _said(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=True)
+    return text if len(text) <= _LONGEST or isinstance(value, list) else text[:_LONGEST] + "..."
