@@ -25,7 +25,7 @@ from xml.etree import ElementTree as ET
 
 from bench.capacity import HOUR, _build, _tool
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.scenario.document.scenario_document import Drivers
+from odscen.scenario.document.drivers_document import Drivers
 from odscen.sumo.realize.driving import draw_factor, driver
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import NO_EFFECT

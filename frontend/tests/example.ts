@@ -35,12 +35,26 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   seed: 0,
   roi,
   environment: { preset: "ClearNoon", parameters: {}, affects_driving: true },
-  drivers: { saturation_flow: null, headway: null, gap_acceptance: 0.3, lane_change_eagerness: 1 },
+  drivers: {
+    saturation_flow: null,
+    headway: null,
+    gap_acceptance: 0.3,
+    lane_change_eagerness: 1,
+    sets: [],
+    shares: {},
+  },
   actors,
   flows,
   demand: { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] },
   signals: { control: "fixed", bus_priority: false, junctions: [] },
-  simulation: { duration: 60, step_length: 0.5 },
+  simulation: {
+    duration: 60,
+    step_length: 0.5,
+    action_step: null,
+    lateral_resolution: null,
+    teleport_after: 300,
+    pedestrians: "striping",
+  },
 });
 export const problem = (where: string, nodes: string[] = []): Problem => ({
   severity: "error",

@@ -3,12 +3,13 @@
 from hypothesis import strategies as st
 
 from odscen.base.categories import Category
+from odscen.scenario.document.distributions import Constant, Uniform
+from odscen.scenario.document.drivers_document import Drivers, DriverSet
 from odscen.scenario.document.scenario_document import (
     Actor,
     Background,
     Counts,
     Demand,
-    Drivers,
     Environment,
     Flow,
     MapReference,
@@ -66,7 +67,19 @@ timings = st.builds(
     offset=st.floats(0, 3600),
     green=st.lists(st.floats(0, 3600), max_size=3).map(tuple),
 )
+driver_sets = st.builds(
+    DriverSet,
+    id=st.from_regex(r"set-[a-z]{1,8}", fullmatch=True),
+    style=st.sampled_from(["cautious", "normal", "sporty"]),
+    parameters=st.dictionaries(
+        st.sampled_from(["tau", "minGap", "accel"]),
+        st.floats(0.5, 5).map(lambda value: Constant(value=value))
+        | st.floats(0.5, 5).map(lambda low: Uniform(low=low, high=low + 1.0)),
+    ),
+)
 manners = {
+    "sets": st.lists(driver_sets, max_size=2, unique_by=lambda one: one.id).map(tuple),
+    "shares": st.dictionaries(st.sampled_from(["cautious", "normal"]), st.floats(0.1, 9)),
     "gap_acceptance": st.floats(0, 1),
     "lane_change_eagerness": st.floats(0, 10),
 }

@@ -879,7 +879,8 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction.
+         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
+         *     driver set of the scenario.
          */
         Actor: {
             /** Id */
@@ -906,9 +907,8 @@ export interface components {
             /**
              * Style
              * @default normal
-             * @enum {string}
              */
-            style: "cautious" | "normal" | "sporty";
+            style: string;
             /**
              * Ego
              * @default false
@@ -950,11 +950,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
-            /**
-             * Style
-             * @enum {string}
-             */
-            style?: "cautious" | "normal" | "sporty";
+            /** Style */
+            style?: string;
             /** Ego */
             ego?: boolean;
             /** Crosses Anywhere */
@@ -1181,11 +1178,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
-            /**
-             * Style
-             * @enum {string}
-             */
-            style?: "cautious" | "normal" | "sporty";
+            /** Style */
+            style?: string;
             /** Ego */
             ego?: boolean;
             /** Crosses Anywhere */
@@ -1234,6 +1228,37 @@ export interface components {
             flow: string;
         };
         /**
+         * Choice
+         * @description One of ``values``, each with its weight (equal if there are none).
+         */
+        "Choice-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "choice";
+            /** Values */
+            values: number[];
+            /** Weights */
+            weights?: number[] | null;
+        };
+        /**
+         * Choice
+         * @description One of ``values``, each with its weight (equal if there are none).
+         */
+        "Choice-Output": {
+            /**
+             * Kind
+             * @default choice
+             * @constant
+             */
+            kind: "choice";
+            /** Values */
+            values: number[];
+            /** Weights */
+            weights: number[] | null;
+        };
+        /**
          * ClearTimingEdit
          * @description Give the traffic light of one junction back to the map's program.
          */
@@ -1245,6 +1270,33 @@ export interface components {
             kind: "clear_timing";
             /** Junction */
             junction: string;
+        };
+        /**
+         * Constant
+         * @description Always ``value``.
+         */
+        "Constant-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "constant";
+            /** Value */
+            value: number;
+        };
+        /**
+         * Constant
+         * @description Always ``value``.
+         */
+        "Constant-Output": {
+            /**
+             * Kind
+             * @default constant
+             * @constant
+             */
+            kind: "constant";
+            /** Value */
+            value: number;
         };
         /**
          * ConversionEntry
@@ -1542,6 +1594,62 @@ export interface components {
             buildings: components["schemas"]["PackedLines"];
         };
         /**
+         * DriverSet
+         * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
+         *
+         *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
+         *     seed; :data:`~odscen.scenario.document.driver_parameters.DRIVER_PARAMETERS` has names, ranges
+         *     and meanings. ``car_following`` is SUMO's model.
+         */
+        "DriverSet-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Style
+             * @default normal
+             * @enum {string}
+             */
+            style?: "cautious" | "normal" | "sporty";
+            /** Parameters */
+            parameters?: {
+                [key: string]: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
+            };
+            /**
+             * Car Following
+             * @default Krauss
+             * @enum {string}
+             */
+            car_following?: "Krauss" | "IDM";
+        };
+        /**
+         * DriverSet
+         * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
+         *
+         *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
+         *     seed; :data:`~odscen.scenario.document.driver_parameters.DRIVER_PARAMETERS` has names, ranges
+         *     and meanings. ``car_following`` is SUMO's model.
+         */
+        "DriverSet-Output": {
+            /** Id */
+            id: string;
+            /**
+             * Style
+             * @default normal
+             * @enum {string}
+             */
+            style: "cautious" | "normal" | "sporty";
+            /** Parameters */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /**
+             * Car Following
+             * @default Krauss
+             * @enum {string}
+             */
+            car_following: "Krauss" | "IDM";
+        };
+        /**
          * Drivers
          * @description What drivers of the style ``normal`` do; the other styles are set about it.
          *
@@ -1550,6 +1658,8 @@ export interface components {
          *     time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
          *     gaps in which nobody else has to brake, and 1 for those who take any that is safe.
          *     ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+         *     ``sets`` are further kinds of drivers, whose ids actors name as their ``style``; of flows and
+         *     demand each driver draws a style or set by ``shares``, and all are normal without.
          */
         Drivers: {
             /** Saturation Flow */
@@ -1566,6 +1676,15 @@ export interface components {
              * @default 1
              */
             lane_change_eagerness: number;
+            /**
+             * Sets
+             * @default []
+             */
+            sets: components["schemas"]["DriverSet-Output"][];
+            /** Shares */
+            shares: {
+                [key: string]: number;
+            };
         };
         /**
          * EdgeColumns
@@ -2407,6 +2526,45 @@ export interface components {
             name?: string | null;
         };
         /**
+         * Normal
+         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
+         */
+        "Normal-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "normal";
+            /** Mean */
+            mean: number;
+            /** Std */
+            std: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
+         * Normal
+         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
+         */
+        "Normal-Output": {
+            /**
+             * Kind
+             * @default normal
+             * @constant
+             */
+            kind: "normal";
+            /** Mean */
+            mean: number;
+            /** Std */
+            std: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
          * OfVersion
          * @description What is asked for holds for this version only.
          */
@@ -3012,7 +3170,9 @@ export interface components {
             /**
              * @default {
              *       "gap_acceptance": 0.3,
-             *       "lane_change_eagerness": 1
+             *       "lane_change_eagerness": 1,
+             *       "sets": [],
+             *       "shares": {}
              *     }
              */
             drivers: components["schemas"]["Drivers"];
@@ -3048,7 +3208,9 @@ export interface components {
             /**
              * @default {
              *       "duration": 600,
-             *       "step_length": 0.5
+             *       "step_length": 0.5,
+             *       "teleport_after": 300,
+             *       "pedestrians": "striping"
              *     }
              */
             simulation: components["schemas"]["Simulation"];
@@ -3222,6 +3384,12 @@ export interface components {
             gap_acceptance?: number;
             /** Lane Change Eagerness */
             lane_change_eagerness?: number;
+            /** Sets */
+            sets?: components["schemas"]["DriverSet-Input"][];
+            /** Shares */
+            shares?: {
+                [key: string]: number;
+            };
         };
         /**
          * SetEgoEdit
@@ -3364,6 +3532,17 @@ export interface components {
             duration?: number;
             /** Step Length */
             step_length?: number;
+            /** Action Step */
+            action_step?: number | null;
+            /** Lateral Resolution */
+            lateral_resolution?: number | null;
+            /** Teleport After */
+            teleport_after?: number;
+            /**
+             * Pedestrians
+             * @enum {string}
+             */
+            pedestrians?: "striping" | "nonInteracting";
         };
         /**
          * SetTimingEdit
@@ -3563,6 +3742,11 @@ export interface components {
         /**
          * Simulation
          * @description How the scenario is run unless the command says otherwise; seconds.
+         *
+         *     ``action_step`` is the time between decisions of a driver, where it is more than a step.
+         *     ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
+         *     ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
+         *     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
          */
         Simulation: {
             /**
@@ -3575,6 +3759,21 @@ export interface components {
              * @default 0.5
              */
             step_length: number;
+            /** Action Step */
+            action_step: number | null;
+            /** Lateral Resolution */
+            lateral_resolution: number | null;
+            /**
+             * Teleport After
+             * @default 300
+             */
+            teleport_after: number;
+            /**
+             * Pedestrians
+             * @default striping
+             * @enum {string}
+             */
+            pedestrians: "striping" | "nonInteracting";
         };
         /**
          * SliceInfo
@@ -3651,6 +3850,37 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * Uniform
+         * @description Any number from ``low`` to ``high``.
+         */
+        "Uniform-Input": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "uniform";
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
+         * Uniform
+         * @description Any number from ``low`` to ``high``.
+         */
+        "Uniform-Output": {
+            /**
+             * Kind
+             * @default uniform
+             * @constant
+             */
+            kind: "uniform";
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
         /**
          * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
@@ -3852,7 +4082,8 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction.
+         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
+         *     driver set of the scenario.
          */
         "Actor-File": {
             /** Id */
@@ -3888,9 +4119,8 @@ export interface components {
             /**
              * Style
              * @default normal
-             * @enum {string}
              */
-            style?: "cautious" | "normal" | "sporty";
+            style?: string;
             /**
              * Ego
              * @default false
@@ -3964,6 +4194,37 @@ export interface components {
          * @enum {string}
          */
         "Category-File": "car" | "van" | "truck" | "bus" | "motorcycle" | "bicycle" | "pedestrian";
+        /**
+         * Choice
+         * @description One of ``values``, each with its weight (equal if there are none).
+         */
+        "Choice-File": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "choice";
+            /** Values */
+            values: number[];
+            /**
+             * Weights
+             * @default null
+             */
+            weights?: number[] | null;
+        };
+        /**
+         * Constant
+         * @description Always ``value``.
+         */
+        "Constant-File": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "constant";
+            /** Value */
+            value: number;
+        };
         /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
@@ -4072,6 +4333,34 @@ export interface components {
             background?: components["schemas"]["Background-File"][];
         };
         /**
+         * DriverSet
+         * @description Drivers of one kind, by SUMO's own names of what is different from a driving style's.
+         *
+         *     ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
+         *     seed; :data:`~odscen.scenario.document.driver_parameters.DRIVER_PARAMETERS` has names, ranges
+         *     and meanings. ``car_following`` is SUMO's model.
+         */
+        "DriverSet-File": {
+            /** Id */
+            id: string;
+            /**
+             * Style
+             * @default normal
+             * @enum {string}
+             */
+            style?: "cautious" | "normal" | "sporty";
+            /** Parameters */
+            parameters?: {
+                [key: string]: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
+            };
+            /**
+             * Car Following
+             * @default Krauss
+             * @enum {string}
+             */
+            car_following?: "Krauss" | "IDM";
+        };
+        /**
          * Drivers
          * @description What drivers of the style ``normal`` do; the other styles are set about it.
          *
@@ -4080,6 +4369,8 @@ export interface components {
          *     time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
          *     gaps in which nobody else has to brake, and 1 for those who take any that is safe.
          *     ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+         *     ``sets`` are further kinds of drivers, whose ids actors name as their ``style``; of flows and
+         *     demand each driver draws a style or set by ``shares``, and all are normal without.
          */
         "Drivers-File": {
             /**
@@ -4102,6 +4393,15 @@ export interface components {
              * @default 1
              */
             lane_change_eagerness?: number;
+            /**
+             * Sets
+             * @default []
+             */
+            sets?: components["schemas"]["DriverSet-File"][];
+            /** Shares */
+            shares?: {
+                [key: string]: number;
+            };
         };
         /**
          * Environment
@@ -4305,6 +4605,25 @@ export interface components {
             ][];
         };
         /**
+         * Normal
+         * @description Normal distribution, drawn again while outside ``low`` to ``high``.
+         */
+        "Normal-File": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "normal";
+            /** Mean */
+            mean: number;
+            /** Std */
+            std: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+        };
+        /**
          * Profile
          * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
          */
@@ -4439,6 +4758,11 @@ export interface components {
         /**
          * Simulation
          * @description How the scenario is run unless the command says otherwise; seconds.
+         *
+         *     ``action_step`` is the time between decisions of a driver, where it is more than a step.
+         *     ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
+         *     ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
+         *     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
          */
         "Simulation-File": {
             /**
@@ -4451,6 +4775,42 @@ export interface components {
              * @default 0.5
              */
             step_length?: number;
+            /**
+             * Action Step
+             * @default null
+             */
+            action_step?: number | null;
+            /**
+             * Lateral Resolution
+             * @default null
+             */
+            lateral_resolution?: number | null;
+            /**
+             * Teleport After
+             * @default 300
+             */
+            teleport_after?: number;
+            /**
+             * Pedestrians
+             * @default striping
+             * @enum {string}
+             */
+            pedestrians?: "striping" | "nonInteracting";
+        };
+        /**
+         * Uniform
+         * @description Any number from ``low`` to ``high``.
+         */
+        "Uniform-File": {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "uniform";
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
         };
         /**
          * Zone
@@ -4507,7 +4867,9 @@ export interface components {
              *       "saturation_flow": null,
              *       "headway": null,
              *       "gap_acceptance": 0.3,
-             *       "lane_change_eagerness": 1
+             *       "lane_change_eagerness": 1,
+             *       "sets": [],
+             *       "shares": {}
              *     }
              */
             drivers?: components["schemas"]["Drivers-File"];
@@ -4543,7 +4905,11 @@ export interface components {
             /**
              * @default {
              *       "duration": 600,
-             *       "step_length": 0.5
+             *       "step_length": 0.5,
+             *       "action_step": null,
+             *       "lateral_resolution": null,
+             *       "teleport_after": 300,
+             *       "pedestrians": "striping"
              *     }
              */
             simulation?: components["schemas"]["Simulation-File"];

@@ -1,21 +1,20 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
 import type { Actor, Assets, Edit } from "../api/types";
-import { isKey } from "../lists";
-import { modelWord, STYLE_WORD } from "../ui/words";
+import { modelWord, styleChoices } from "../ui/words";
 import { Committed } from "./Committed";
 import { bodyOf } from "./scene";
 import { Silhouette } from "./Silhouette";
 
-const STYLES = Object.entries(STYLE_WORD).map(([value, label]) => ({ value, label }));
-
 /** What one road user is and how it moves. */
 export function ActorForm({
   actor,
+  driverSets,
   assets,
   onEdit,
 }: {
   actor: Actor;
+  driverSets: readonly string[];
   assets: Assets | null;
   onEdit: (edit: Edit) => void;
 }) {
@@ -77,9 +76,9 @@ export function ActorForm({
             label="Driving style"
             allowDeselect={false}
             value={actor.style}
-            data={STYLES}
+            data={styleChoices(driverSets)}
             onChange={(style) => {
-              if (isKey(STYLE_WORD, style)) change({ style });
+              if (style) change({ style });
             }}
           />
         </Group>
@@ -115,9 +114,11 @@ export function ActorForm({
 /** Changes that several road users can share; each is one step for undo. */
 export function ManyForm({
   actors,
+  driverSets,
   onChange,
 }: {
   actors: readonly Actor[];
+  driverSets: readonly string[];
   onChange: (fields: Partial<Actor>, what: string) => void;
 }) {
   const [first, ...others] = actors;
@@ -153,9 +154,9 @@ export function ManyForm({
         placeholder="different"
         allowDeselect={false}
         value={same("style") ?? null}
-        data={STYLES}
+        data={styleChoices(driverSets)}
         onChange={(style) => {
-          if (isKey(STYLE_WORD, style)) onChange({ style }, "Driving style");
+          if (style) onChange({ style }, "Driving style");
         }}
       />
     </Stack>

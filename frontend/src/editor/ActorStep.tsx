@@ -26,6 +26,7 @@ interface Props {
   goals: readonly Place[] | null;
   actors: number;
   profiles: Profiles;
+  driverSets: readonly string[];
   filling: boolean;
   onTool: (tool: Tool | null) => void;
   /** Uses the tool without the map. */
@@ -120,11 +121,18 @@ export function ActorStep(props: Props) {
             (isFlow(one) ? (
               <FlowForm key={one.id} flow={one} profiles={props.profiles} onEdit={onEdit} />
             ) : (
-              <ActorForm key={one.id} actor={one} assets={assets} onEdit={onEdit} />
+              <ActorForm
+                key={one.id}
+                actor={one}
+                driverSets={props.driverSets}
+                assets={assets}
+                onEdit={onEdit}
+              />
             ))}
           {!one && actors.length > 0 && (
             <ManyForm
               actors={actors}
+              driverSets={props.driverSets}
               onChange={(fields, what) =>
                 onEdit(
                   actors.map((each) => ({ kind: "change_actor", actor: each.id, ...fields })),

@@ -126,6 +126,7 @@ export function EditorSteps({
                   goals={now.goals}
                   actors={document.actors.length}
                   profiles={profiles}
+                  driverSets={document.drivers.sets.map(({ id }) => id)}
                   filling={filling}
                   onTool={now.arm}
                   onPlaceSomewhere={now.placeSomewhere}

@@ -4,7 +4,7 @@ import { type KeyboardEvent, memo, useEffect, useMemo, useRef, useState } from "
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
 import type { Graph } from "../map/graph";
 import { CategoryGlyph, IconFlow, IconTrash } from "../ui/icons";
-import { CATEGORY_WORD, count, flowWord, kmh, modelWord, STYLE_WORD } from "../ui/words";
+import { CATEGORY_WORD, count, flowWord, kmh, modelWord, styleWord } from "../ui/words";
 import { placeWord } from "./placeWords";
 import { isFlow } from "./placing";
 import { rowsInSight } from "./windowed";
@@ -208,7 +208,7 @@ const Row = memo(function Row({
           ? `${Math.round(one.per_hour)} per hour`
           : one.category === "pedestrian"
             ? "–"
-            : STYLE_WORD[one.style]}
+            : styleWord(one.style)}
       </td>
       <td>{!isFlow(one) && one.ego ? "yes" : ""}</td>
       <td>

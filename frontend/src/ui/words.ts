@@ -1,4 +1,5 @@
-import type { Category, MapStatistics, NetworkOrigin, Style, WeatherPreset } from "../api/types";
+import type { Category, DrivingStyle, MapStatistics, NetworkOrigin, WeatherPreset } from "../api/types";
+import { isKey } from "../lists";
 
 /** Words of the page: plain sentences with the terms of traffic engineers; see the help for those. */
 export const CATEGORY_WORD: Record<Category, string> = {
@@ -11,11 +12,18 @@ export const CATEGORY_WORD: Record<Category, string> = {
   pedestrian: "Pedestrian",
 };
 
-export const STYLE_WORD: Record<Style, string> = {
+const STYLE_WORD: Record<DrivingStyle, string> = {
   cautious: "Cautious",
   normal: "Normal",
   sporty: "Sporty",
 };
+
+/** A driving style in words, or the id of a driver set. */
+export const styleWord = (style: string): string => (isKey(STYLE_WORD, style) ? STYLE_WORD[style] : style);
+
+/** Choices of a driving style: those that there are always, and the scenario's driver sets. */
+export const styleChoices = (sets: readonly string[]): { value: string; label: string }[] =>
+  [...Object.keys(STYLE_WORD), ...sets].map((value) => ({ value, label: styleWord(value) }));
 
 /** A flow in words, by whether its road users are on foot. */
 export const flowWord = (walks: boolean): string => (walks ? "Pedestrian flow" : "Vehicle flow");

@@ -21,18 +21,18 @@ const walker = { ...actor("walker"), category: "pedestrian" as const, speed: 1.5
 
 test("speeds are entered in km/h and leave in m/s; an empty field is the speed limit", async () => {
   const onEdit = vi.fn();
-  const { user, again } = show(<ActorForm actor={car} assets={assets} onEdit={onEdit} />);
+  const { user, again } = show(<ActorForm actor={car} driverSets={[]} assets={assets} onEdit={onEdit} />);
   expect(screen.getByRole("textbox", { name: "Desired speed" })).toHaveProperty("placeholder", "speed limit");
   await fill(user, "Desired speed", "36");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "change_actor", actor: "car-1", speed: 10 });
-  again(<ActorForm actor={{ ...car, speed: 10 }} assets={assets} onEdit={onEdit} />);
+  again(<ActorForm actor={{ ...car, speed: 10 }} driverSets={[]} assets={assets} onEdit={onEdit} />);
   await fill(user, "Desired speed", "");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "change_actor", actor: "car-1", speed: null });
 });
 
 test("a number beyond its limits is brought within them, and the same number again is no change", async () => {
   const onEdit = vi.fn();
-  const { user } = show(<ActorForm actor={car} assets={assets} onEdit={onEdit} />);
+  const { user } = show(<ActorForm actor={car} driverSets={[]} assets={assets} onEdit={onEdit} />);
   await fill(user, "Offset to the left", "9");
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "change_actor", actor: "car-1", lateral_offset: 3 });
   await fill(user, "Departs after", "0");
@@ -41,28 +41,30 @@ test("a number beyond its limits is brought within them, and the same number aga
 
 test("one vehicle is made the ego and released again", async () => {
   const onEdit = vi.fn();
-  const { user, again } = show(<ActorForm actor={car} assets={assets} onEdit={onEdit} />);
+  const { user, again } = show(<ActorForm actor={car} driverSets={[]} assets={assets} onEdit={onEdit} />);
   await user.click(screen.getByRole("checkbox", { name: /ego/i }));
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_ego", actor: "car-1" });
-  again(<ActorForm actor={{ ...car, ego: true }} assets={assets} onEdit={onEdit} />);
+  again(<ActorForm actor={{ ...car, ego: true }} driverSets={[]} assets={assets} onEdit={onEdit} />);
   await user.click(screen.getByRole("checkbox", { name: /ego/i }));
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_ego", actor: null });
 });
 
 test("model and driving style are chosen from lists", async () => {
   const onEdit = vi.fn();
-  const { user } = show(<ActorForm actor={car} assets={assets} onEdit={onEdit} />);
+  const { user } = show(<ActorForm actor={car} driverSets={["learners"]} assets={assets} onEdit={onEdit} />);
   await choose(user, "Model", "Tesla Model3");
   await choose(user, "Driving style", "Sporty");
+  await choose(user, "Driving style", "learners");
   expect(onEdit.mock.calls.map(([edit]) => edit)).toEqual([
     { kind: "change_actor", actor: "car-1", model: "vehicle.tesla.model3" },
     { kind: "change_actor", actor: "car-1", style: "sporty" },
+    { kind: "change_actor", actor: "car-1", style: "learners" },
   ]);
 });
 
 test("a pedestrian has neither driving style nor ego, but may ignore red lights", async () => {
   const onEdit = vi.fn();
-  const { user } = show(<ActorForm actor={walker} assets={assets} onEdit={onEdit} />);
+  const { user } = show(<ActorForm actor={walker} driverSets={[]} assets={assets} onEdit={onEdit} />);
   expect(screen.queryByRole("textbox", { name: "Driving style" })).toBeNull();
   expect(screen.queryByRole("checkbox", { name: /ego/i })).toBeNull();
   expect(screen.getByRole("textbox", { name: "Walking speed" })).toHaveProperty("value", "5.4 km/h");
@@ -74,6 +76,7 @@ test("several road users show what they share and what differs, and change toget
   const onChange = vi.fn();
   const { user } = show(
     <ManyForm
+      driverSets={[]}
       actors={[
         { ...car, speed: 10 },
         { ...actor("b"), speed: 5 },

@@ -220,6 +220,7 @@ function placing(
       goals={null}
       actors={1}
       profiles={{}}
+      driverSets={[]}
       filling={false}
       {...calls}
     />
@@ -344,7 +345,8 @@ test("another random seed is a change; the same one is none", async () => {
 });
 
 test("a long run is offered as fast as possible, and says that it can be resumed", () => {
-  toRun({ ...scenario([actor("a")]), simulation: { duration: 7200, step_length: 1 } });
+  const whole = scenario([actor("a")]);
+  toRun({ ...whole, simulation: { ...whole.simulation, duration: 7200, step_length: 1 } });
   expect(screen.getByRole("radio", { name: "As fast as possible" })).toHaveProperty("checked", true);
   expect(screen.getByText(/can be resumed from the last full hour/)).toBeTruthy();
 });

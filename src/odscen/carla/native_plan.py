@@ -9,7 +9,7 @@ between are commanded one by one.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,14 +19,15 @@ from odscen.base.frames import XodrPose
 from odscen.lanegraph.graphs import Relation
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.departures import road_users
-from odscen.sumo.realize.driving import HEADWAY, KINDS, STYLES, TWO_WHEELER_MIN_GAP
+from odscen.sumo.realize.driving import HEADWAY, KINDS, STYLES, TWO_WHEELER_MIN_GAP, kind_of
 from odscen.sumo.realize.realization import UNKNOWN_LIMIT
 
 if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
     from odscen.results.records.run_records import Plan, PlannedActor
-    from odscen.scenario.document.scenario_document import DrivingStyle, Scenario
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.driving import DriverKind
     from odscen.sumo.realize.road_user import RoadUser
 
 
@@ -102,7 +103,9 @@ def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[Nati
         nodes = router.path(user.spawn, user.goal)
         if len(nodes) > 1:
             make = _walker if user.person else _driver
-            actors.append(make(row, user, planned, graph, nodes))
+            kind = kind_of(user, scenario.drivers, scenario.seed)
+            one = make(row, user, planned, graph, nodes)
+            actors.append(replace(one, gap=_gap(kind, user.category)))
     return tuple(actors)
 
 
@@ -159,7 +162,6 @@ def _actor(
         path=np.empty((0, 3)) if path is None else path,
         changes=changes,
         offset=user.design.lateral_offset,
-        gap=_gap(user.design.style, user.category),
     )
 
 
@@ -171,11 +173,12 @@ def _speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatAr
     return wanted
 
 
-def _gap(style: DrivingStyle, category: Category) -> float:
-    """Metres for ``distance_to_leading_vehicle``: the style's gap and some of its headway."""
-    manner = STYLES[style]
+def _gap(kind: DriverKind, category: Category) -> float:
+    """Metres for ``distance_to_leading_vehicle``: the driver's gap and some of its headway."""
+    style = STYLES[kind.style]
     share = TWO_WHEELER_MIN_GAP if category in (Category.MOTORCYCLE, Category.BICYCLE) else 1.0
-    return round(manner.min_gap * share * manner.headway * HEADWAY, 2)
+    gap = kind.drawn.get("minGap", style.min_gap * share)
+    return round(gap * kind.drawn.get("tau", style.headway * HEADWAY), 2)
 
 
 def _points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:

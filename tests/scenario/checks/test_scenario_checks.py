@@ -178,6 +178,14 @@ def test_a_headway_shorter_than_a_step_is_an_error_with_both_numbers() -> None:
     assert "headway_below_step" not in codes(actor(), drivers={"headway": 0.6})
 
 
+def test_a_style_is_one_of_the_three_or_a_driver_set_of_the_scenario() -> None:
+    (problem,) = problems(actor(style="learners"))
+    assert (problem.code, problem.where) == ("unknown_style", "actors[0].style")
+    assert "there are cautious, normal, sporty" in problem.message
+    sets = {"sets": [{"id": "learners"}]}
+    assert "unknown_style" not in codes(actor(style="learners"), drivers=sets)
+
+
 def test_all_problems_come_at_once() -> None:
     found = problems(
         actor("9.9.9.9", speed=90, ego=True), actor("1.0.1.49", id="b", ego=True), roi=(*WHOLE, "x")

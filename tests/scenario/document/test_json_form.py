@@ -7,8 +7,9 @@ from hypothesis import given
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
+from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.json_form import dumps, loads, schema
-from odscen.scenario.document.scenario_document import Actor, Drivers, MapReference, Scenario
+from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.forms.any_form import read_any
 from tests.scenario.strategies import scenarios

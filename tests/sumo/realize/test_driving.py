@@ -5,6 +5,7 @@ import statistics
 import subprocess
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 from hypothesis import given
@@ -12,8 +13,19 @@ from hypothesis import strategies as st
 
 from bench.saturation import HCM_SATURATION, saturation_flow, straight_road
 from odscen.base.categories import DEFAULT_BODY, Category
-from odscen.scenario.document.scenario_document import Actor, Drivers
-from odscen.sumo.realize.driving import KINDS, STYLES, Driver, draw_factor, driver, number
+from odscen.base.errors import ScenarioError
+from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
+from odscen.scenario.document.drivers_document import Drivers, DriverSet
+from odscen.scenario.document.scenario_document import Actor
+from odscen.sumo.realize.driving import (
+    KINDS,
+    STYLES,
+    Driver,
+    draw_factor,
+    driver,
+    kind_of,
+    number,
+)
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import (
     BRAKING,
@@ -29,7 +41,8 @@ def made(category: Category = Category.CAR, **changes: Any) -> Driver:
     fields = {name: changes.pop(name) for name in Actor.model_fields if name in changes}
     design = Actor(id="one", category=category, spawn="1.0.-1.0", **fields)
     user = RoadUser("one", category, 0, 1, depart=0.0, speed=design.speed, design=design)
-    values: dict[str, Any] = {"factor": 1.0, "limit": 13.89, "weather": NO_EFFECT}
+    kind = kind_of(user, changes.get("drivers", Drivers()), 3)
+    values: dict[str, Any] = {"factor": 1.0, "limit": 13.89, "weather": NO_EFFECT, "kind": kind}
     return driver(user, DEFAULT_BODY[category], **{**values, **changes})
 
 
@@ -52,6 +65,78 @@ def test_what_a_scenario_says_of_its_drivers_is_set_for_all_styles() -> None:
     cautious = dict(made(drivers=drivers, style="cautious").attributes)
     assert (cautious["tau"], cautious["impatience"]) == ("3", "0.1")
     assert "impatience" not in dict(made(style="cautious").attributes)
+
+
+LEARNERS = DriverSet(
+    id="learners",
+    style="cautious",
+    parameters={
+        "tau": 2.2,
+        "minGap": 3,
+        "lcStrategic": 2.5,
+        "startupDelay": {"kind": "normal", "mean": 1.0, "std": 0.4, "low": 0.5, "high": 2.0},
+    },
+)
+
+
+def test_a_driver_set_is_its_style_but_for_its_own_parameters() -> None:
+    drivers = Drivers(sets=(LEARNERS,))
+    one = dict(made(drivers=drivers, style="learners").attributes)
+    assert (one["tau"], one["minGap"], one["lcStrategic"]) == ("2.2", "3", "2.5")
+    assert one["accel"] == dict(made(style="cautious").attributes)["accel"] == "2.08"
+    assert 0.5 <= float(one["startupDelay"]) <= 2.0
+    assert "carFollowModel" not in one
+    other = LEARNERS.model_copy(update={"car_following": "IDM"})
+    idm = dict(made(drivers=Drivers(sets=(other,)), style="learners").attributes)
+    assert idm["carFollowModel"] == "IDM"
+
+
+def test_each_driver_of_a_set_draws_its_own_values_whatever_else_there_is() -> None:
+    drivers = Drivers(sets=(LEARNERS,))
+
+    def delay(name: str, seed: int) -> float:
+        design = Actor(id=name, category="car", spawn="1.0.-1.0", style="learners")
+        user = RoadUser(name, Category.CAR, 0, 1, depart=0.0, design=design)
+        return kind_of(user, drivers, seed).drawn["startupDelay"]
+
+    assert delay("a", 3) == delay("a", 3)
+    assert len({delay(name, 3) for name in "abcdefgh"}) == 8
+    assert delay("a", 3) != delay("a", 4)
+    assert statistics.mean(delay(f"car-{k}", 1) for k in range(400)) == pytest.approx(
+        1.04, abs=0.06
+    )
+
+
+def test_members_of_flows_draw_their_style_by_share_and_actors_keep_theirs() -> None:
+    drivers = Drivers(sets=(LEARNERS,), shares={"normal": 3, "learners": 1})
+    users = [RoadUser(f"f.{k}", Category.CAR, 0, 1, depart=0.0, flow="f") for k in range(1000)]
+    learners = sum("tau" in kind_of(user, drivers, 7).drawn for user in users)
+    assert 210 <= learners <= 290
+    placed = RoadUser("one", Category.CAR, 0, 1, depart=0.0)
+    assert kind_of(placed, drivers, 7).drawn == {}
+
+
+def test_a_style_that_there_is_not_is_refused_with_its_name() -> None:
+    with pytest.raises(ScenarioError, match="'one' drives as 'learners', which is neither"):
+        made(style="learners")
+
+
+def test_sumo_knows_every_parameter_of_drivers(tmp_path: Path) -> None:
+    values = {name: (one.low + one.high) / 2 for name, one in DRIVER_PARAMETERS.items()}
+    values["impatience"] = 0.25
+    written = " ".join(f'{name}="{value}"' for name, value in values.items())
+    (tmp_path / "types.xml").write_text(f'<routes><vType id="t" {written}/></routes>')
+    straight_road(tmp_path / "net.xml")
+    (tmp_path / "trips.xml").write_text(
+        '<routes><trip id="v" type="t" depart="0" from="in" to="out"/></routes>'
+    )
+    subprocess.run(
+        [BIN / "duarouter", "-n", tmp_path / "net.xml", "-r", tmp_path / "trips.xml", "-a",
+         tmp_path / "types.xml", "-o", tmp_path / "out.xml", "--vtype-output", tmp_path / "t.xml"],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    (known,) = ET.parse(tmp_path / "t.xml").getroot().iter("vType")
+    assert set(values) <= set(known.keys())
 
 
 def test_nobody_keeps_a_shorter_headway_than_a_step() -> None:

@@ -137,6 +137,11 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
     if len(egos) > 1:
         message = f"{', '.join(map(repr, egos))} are all the ego; keep one"
         yield error("several_egos", "actors", message)
+    styles = scenario.drivers.styles
+    for index, actor in enumerate(scenario.actors):
+        if actor.style not in styles:
+            message = f"{actor.id!r} drives as {actor.style!r}; there are {', '.join(styles)}"
+            yield error("unknown_style", f"actors[{index}].style", message)
     headway, step = scenario.drivers.headway, scenario.simulation.step_length
     if headway is not None and headway < step:
         message = (

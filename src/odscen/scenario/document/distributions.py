@@ -108,6 +108,15 @@ Distribution = Annotated[
 """A number, or a table with ``kind`` constant, uniform, normal or choice."""
 
 
+def drawn_range(distribution: Constant | Uniform | Normal | Choice) -> tuple[float, float]:
+    """Least and greatest number that can be drawn."""
+    if isinstance(distribution, Constant):
+        return distribution.value, distribution.value
+    if isinstance(distribution, Choice):
+        return min(distribution.values), max(distribution.values)
+    return distribution.low, distribution.high
+
+
 def draw_place(weights: Sequence[float], rng: np.random.Generator) -> int:
     """Draw an index by weight; at least one weight must be above 0."""
     total = np.cumsum(weights)

@@ -14,6 +14,8 @@ from odscen.scenario.document.validation import validation_problems
 
 OPTIONAL = ("drivers", "demand", "signals")
 """Fields of a scenario that are left out where they have their default value."""
+ALWAYS = ("duration", "step_length")
+"""Fields of the simulation that are written always."""
 
 
 def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
@@ -56,6 +58,9 @@ def dumps(scenario: Scenario) -> str:
             data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
         elif key in OPTIONAL:
             data[key] = getattr(scenario, key).model_dump(mode="json", exclude_defaults=True)
+        elif key == "simulation":
+            said = scenario.simulation.model_dump(mode="json", exclude_defaults=True)
+            data[key] = {name: data[key][name] for name in ALWAYS} | said
     fields = [
         f"  {json.dumps(key)}: {_layout(key, data[key])}"
         for key in type(scenario).model_fields

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
 from odscen.base.categories import Category
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
+from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.signals_document import Signals
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ VERSION: Final = 1
 
 _PROSE = r"^[^\x00-\x08\x0b-\x1f\x7f\ufffe\uffff]*$"
 
-DrivingStyle = Literal["cautious", "normal", "sporty"]
 Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
@@ -55,36 +55,14 @@ class Environment(Part):
     affects_driving: bool = True
 
 
-class Drivers(Part):
-    """What drivers of the style ``normal`` do; the other styles are set about it.
-
-    ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
-    straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
-    time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
-    gaps in which nobody else has to brake, and 1 for those who take any that is safe.
-    ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
-    """
-
-    saturation_flow: Annotated[float, Field(ge=800, le=2500)] | None = None
-    headway: Annotated[float, Field(ge=0.5, le=5)] | None = None
-    gap_acceptance: Annotated[float, Field(ge=0, le=1)] = 0.3
-    lane_change_eagerness: Annotated[float, Field(ge=0, le=10)] = 1.0
-
-    @model_validator(mode="after")
-    def _one_headway(self) -> Self:
-        if self.saturation_flow is not None and self.headway is not None:
-            msg = "give one of saturation_flow and headway, not both: each decides the other"
-            raise ValueError(msg)
-        return self
-
-
 class Actor(Part):
     """One road user, placed by hand or sampled.
 
     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-    positive to the left of the driving direction.
+    positive to the left of the driving direction. ``style`` is a driving style or the id of a
+    driver set of the scenario.
     """
 
     id: Identifier
@@ -95,7 +73,7 @@ class Actor(Part):
     speed: Speed | None = None
     lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
     depart: Seconds = 0.0
-    style: DrivingStyle = "normal"
+    style: Identifier = "normal"
     ego: bool = False
     crosses_anywhere: bool = False
     ignores_red: bool = False
@@ -218,10 +196,20 @@ class Demand(Part):
 
 
 class Simulation(Part):
-    """How the scenario is run unless the command says otherwise; seconds."""
+    """How the scenario is run unless the command says otherwise; seconds.
+
+    ``action_step`` is the time between decisions of a driver, where it is more than a step.
+    ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
+    ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
+    is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
+    """
 
     duration: Annotated[float, Field(gt=0, le=1e9)] = 600.0
     step_length: Annotated[float, Field(gt=0, le=1)] = 0.5
+    action_step: Annotated[float, Field(gt=0, le=5)] | None = None
+    lateral_resolution: Annotated[float, Field(ge=0.1, le=5)] | None = None
+    teleport_after: Annotated[float, Field(ge=0, le=86_400)] = 300.0
+    pedestrians: Literal["striping", "nonInteracting"] = "striping"
 
 
 def _first_paragraph(schema: JsonDict) -> None:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
-    from odscen.scenario.document.scenario_document import Drivers, Simulation
+    from odscen.scenario.document.drivers_document import Drivers
+    from odscen.scenario.document.scenario_document import Simulation
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light
 

@@ -9,16 +9,21 @@ needs longer headways the longer the steps: at a stop line 14 % fewer vehicles p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
+from odscen.base.errors import ScenarioError
+from odscen.scenario.document.distributions import draw_key
+from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
+from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.named_random import stream
-from odscen.scenario.document.scenario_document import Drivers
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from odscen.base.categories import Body
-    from odscen.scenario.document.scenario_document import DrivingStyle
+    from odscen.scenario.document.drivers_document import DrivingStyle
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.weather_effects import WeatherEffect
 
@@ -126,6 +131,50 @@ class Driver:
     accel: float
 
 
+@dataclass(frozen=True, slots=True)
+class DriverKind:
+    """How one driver drives: a style, and what a driver set says instead, each drawn.
+
+    ``drawn`` has SUMO's parameters by name; ``car_following`` is empty for SUMO's default model.
+    """
+
+    style: DrivingStyle = "normal"
+    drawn: Mapping[str, float] = field(default_factory=dict)
+    car_following: str = ""
+
+
+NORMAL_KIND = DriverKind()
+
+
+def kind_of(user: RoadUser, drivers: Drivers, seed: int) -> DriverKind:
+    """Kind of a road user, the same whatever else is in the scenario.
+
+    Members of flows and demand draw their style by the shares of ``drivers``; of a driver set each
+    draws its own parameters.
+
+    Raises
+    ------
+    ScenarioError
+        If the actor names a style that there is not.
+    """
+    name = user.design.style
+    if user.flow is not None and drivers.shares:
+        name = draw_key(drivers.shares, stream(seed, "driving style", user.id))
+    for one in drivers.sets:
+        if one.id == name:
+            drawn = {
+                parameter: round(values.draw(stream(seed, parameter, user.id)), 4)
+                for parameter, values in one.parameters.items()
+            }
+            model = one.car_following
+            return DriverKind(one.style, drawn, "" if model == "Krauss" else model)
+    for style in STYLES:
+        if style == name:
+            return DriverKind(style)
+    msg = f"{user.id!r} drives as {name!r}, which is neither a driving style nor a driver set"
+    raise ScenarioError(msg)
+
+
 def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) -> float:
     """Speed factor of one actor, the same whatever else is in the scenario."""
     z = float(stream(seed, "speed factor", actor).normal())
@@ -146,13 +195,14 @@ def driver(
     electric: bool = False,
     drivers: Drivers = NORMAL_DRIVERS,
     step_length: float = 0.0,
+    kind: DriverKind = NORMAL_KIND,
 ) -> Driver:
     """Attributes of a road user that drives, or walks, like this.
 
     Parameters
     ----------
     user
-        Says category, style and the desired speed (m/s). A vehicle never goes faster. Where it is
+        Says category and the desired speed (m/s). A vehicle never goes faster. Where it is
         above ``limit * factor``, the factor is raised so that the desired speed is reached at the
         spawn, and other limits are exceeded in the same proportion.
     factor
@@ -165,39 +215,62 @@ def driver(
         What the scenario says of all drivers.
     step_length
         Seconds; nobody keeps a shorter headway, in which SUMO could not keep them from colliding.
+    kind
+        Style and drawn parameters, see :func:`kind_of`; a drawn speed factor is in ``factor``.
     """
     category, speed = user.category, user.speed
     if category is Category.PEDESTRIAN:
         speed = KINDS[category].max_speed * factor if speed is None else speed
         return _walker(user, body, speed=speed)
-    kind, style = KINDS[category], STYLES[user.design.style]
-    max_speed = kind.max_speed
+    traits = KINDS[category]
+    max_speed = traits.max_speed
     if speed is not None:
         max_speed = speed
         if limit:
             factor = max(factor, speed / limit)
     max_speed = min(max_speed * weather.speed, weather.sight_speed)
     factor *= weather.speed
-    accel = kind.accel * style.accel * weather.grip
-    headway = max(normal_headway(drivers) * style.headway, step_length)
-    two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
-    min_gap = style.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0)
+    values = _values(category, kind, drivers)
+    accel = values.pop("accel") * weather.grip
     attributes = (
-        ("vClass", kind.vclass),
-        ("guiShape", kind.shape),
+        ("vClass", traits.vclass),
+        ("guiShape", traits.shape),
         *_body(body),
+        *((("carFollowModel", kind.car_following),) if kind.car_following else ()),
         ("maxSpeed", number(max_speed)),
         ("speedDev", "0"),
         ("accel", number(accel)),
-        ("decel", number(kind.decel * weather.grip)),
-        ("emergencyDecel", number(kind.emergency_decel * weather.grip)),
-        ("tau", number(headway * weather.headway)),
-        ("sigma", "0"),
-        ("minGap", number(min_gap)),
-        *_manners(style, drivers),
-        ("emissionClass", ELECTRIC.get(category, kind.emissions) if electric else kind.emissions),
+        ("decel", number(values.pop("decel") * weather.grip)),
+        ("emergencyDecel", number(values.pop("emergencyDecel") * weather.grip)),
+        ("tau", number(max(values.pop("tau"), step_length) * weather.headway)),
+        ("sigma", number(values.pop("sigma"))),
+        ("minGap", number(values.pop("minGap"))),
+        *((name, number(values[name])) for name in DRIVER_PARAMETERS if name in values),
+        (
+            "emissionClass",
+            ELECTRIC.get(category, traits.emissions) if electric else traits.emissions,
+        ),
     )
     return Driver(attributes, max_speed, round(factor, 4), accel)
+
+
+def _values(category: Category, kind: DriverKind, drivers: Drivers) -> dict[str, float]:
+    """SUMO's parameters of a driver before weather; what is SUMO's default is left out."""
+    traits, style = KINDS[category], STYLES[kind.style]
+    two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
+    values = {
+        "accel": traits.accel * style.accel,
+        "decel": traits.decel,
+        "emergencyDecel": traits.emergency_decel,
+        "tau": normal_headway(drivers) * style.headway,
+        "sigma": 0.0,
+        "minGap": style.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0),
+        **_gaps_and_changes(style, drivers),
+        **kind.drawn,
+    }
+    values.pop("speedFactor", None)  # written at each vehicle
+    values["emergencyDecel"] = max(values["emergencyDecel"], values["decel"])
+    return values
 
 
 def normal_headway(drivers: Drivers) -> float:
@@ -210,12 +283,11 @@ def normal_headway(drivers: Drivers) -> float:
     return HEADWAY if drivers.headway is None else drivers.headway
 
 
-def _manners(style: Style, drivers: Drivers) -> tuple[tuple[str, str], ...]:
-    """Gap acceptance and changes of lane; what is SUMO's default is left out."""
+def _gaps_and_changes(style: Style, drivers: Drivers) -> dict[str, float]:
     accepts = min(1.0, max(0.0, drivers.gap_acceptance + style.gap_acceptance))
+    found = {"impatience": accepts} if accepts else {}
     eagerness = drivers.lane_change_eagerness
-    found = [("impatience", number(accepts))] if accepts else []
-    return (*found, *([("lcSpeedGain", number(eagerness))] if eagerness != 1.0 else []))
+    return found | ({"lcSpeedGain": eagerness} if eagerness != 1.0 else {})
 
 
 def _walker(user: RoadUser, body: Body, *, speed: float) -> Driver:

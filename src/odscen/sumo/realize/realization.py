@@ -31,7 +31,7 @@ from odscen.sumo.folder.layout import (
     SIGNALS_FILE,
 )
 from odscen.sumo.realize.departures import demand_users, road_users
-from odscen.sumo.realize.driving import KINDS, draw_factor, driver
+from odscen.sumo.realize.driving import KINDS, draw_factor, driver, kind_of
 from odscen.sumo.realize.light_realization import realized_lights
 from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
     from odscen.results.records.light_programs import LightProgram
-    from odscen.scenario.document.scenario_document import Environment, Scenario
+    from odscen.scenario.document.scenario_document import Environment, Scenario, Simulation
     from odscen.sumo.realize.driving import Driver
     from odscen.sumo.realize.light_realization import RealizedLight
     from odscen.sumo.realize.road_user import RoadUser
@@ -146,7 +146,7 @@ def realize(
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
     lights = realized_lights(scenario, sumo_map, until=until)
     signals = signals_xml(lights, buses=demand.types_of(Category.BUS))
-    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, signals, lights)}
+    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, own, signals, lights)}
     return Realization(
         files,
         plan,
@@ -157,7 +157,11 @@ def realize(
 
 
 def _run_files(
-    plan: Plan, settings: RunSettings, signals: str | None, lights: Sequence[RealizedLight]
+    plan: Plan,
+    settings: RunSettings,
+    own: Simulation,
+    signals: str | None,
+    lights: Sequence[RealizedLight],
 ) -> dict[str, str]:
     """What SUMO reads beside network and routes; ``signals`` are programs that differ."""
     recording = settings.recorded
@@ -170,6 +174,10 @@ def _run_files(
         recording=recording,
         measures=True,
         meso=settings.meso,
+        time_to_teleport=own.teleport_after,
+        action_step=own.action_step,
+        lateral_resolution=own.lateral_resolution,
+        pedestrians=own.pedestrians,
     )
     interval = interval_of(plan.until, plan.slice_length)
     files = {
@@ -307,17 +315,23 @@ class _Writer:
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
+        seed, drivers = self._scenario.seed, self._scenario.drivers
+        kind = kind_of(user, drivers, seed)
+        factor = kind.drawn.get("speedFactor")
+        if factor is None:
+            factor = draw_factor(seed, user.id, kind.style, user.category)
         return driver(
             user,
             body,
-            factor=draw_factor(self._scenario.seed, user.id, user.design.style, user.category),
+            factor=factor,
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
             electric=user.design.model is not None
             and self._assets is not None
             and self._assets.electric(user.design.model),
-            drivers=self._scenario.drivers,
+            drivers=drivers,
             step_length=self._step_length,
+            kind=kind,
         )
 
     def _body(self, user: RoadUser) -> Body:

@@ -54,7 +54,9 @@ class SumocfgSettings:
     seed
         Of SUMO's own random numbers (dawdling of drivers; speed factors are drawn by us).
     time_to_teleport
-        Seconds that a vehicle may stand at the head of its lane before SUMO moves it on.
+        Seconds that a vehicle may stand at the head of its lane before SUMO moves it on; 0: never.
+    action_step, lateral_resolution, pedestrians
+        As in :class:`~odscen.scenario.document.scenario_document.Simulation`.
     elevation
         Whether the network has heights, so that z is recorded.
     signals
@@ -71,6 +73,9 @@ class SumocfgSettings:
     step_length: float
     seed: int
     time_to_teleport: float = 300.0
+    action_step: float | None = None
+    lateral_resolution: float | None = None
+    pedestrians: str = "striping"
     elevation: bool = False
     signals: bool = False
     recording: Recording = field(default_factory=Recording)
@@ -103,9 +108,11 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "collision.mingap-factor": "0",
             "collision.check-junctions": "true",
             "intermodal-collision.action": "warn",
-            "pedestrian.model": "striping",
+            "pedestrian.model": settings.pedestrians,
             "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
-            "time-to-teleport": f"{settings.time_to_teleport:g}",
+            "time-to-teleport": f"{settings.time_to_teleport or -1.0:g}",
+            **_optional("default.action-step-length", settings.action_step),
+            **_optional("lateral-resolution", settings.lateral_resolution),
         },
         "random_number": {"seed": str(settings.seed)},
         "report": {
@@ -125,6 +132,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         }
         # The striping model needs lanes with places on them, which meso does not keep.
         sections["processing"]["pedestrian.model"] = "nonInteracting"
+        sections["processing"].pop("lateral-resolution", None)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
     for section, options in sections.items():
         lines.append(f"    <{section}>")
@@ -133,6 +141,10 @@ def sumo_config(settings: SumocfgSettings) -> str:
         )
         lines.append(f"    </{section}>")
     return "\n".join([*lines, "</sumoConfiguration>"]) + "\n"
+
+
+def _optional(option: str, value: float | None) -> dict[str, str]:
+    return {} if value is None else {option: f"{value:g}"}
 
 
 def _outputs(settings: SumocfgSettings) -> dict[str, str]:

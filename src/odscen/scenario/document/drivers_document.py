@@ -1,0 +1,108 @@
+"""Drivers in the scenario document: what all of them do, and kinds of drivers of one's own."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import Field, WithJsonSchema, field_serializer, model_validator
+
+from odscen.scenario.document.distributions import Constant, Distribution, drawn_range
+from odscen.scenario.document.document_parts import Identifier, Label, Part
+from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
+
+DrivingStyle = Literal["cautious", "normal", "sporty"]
+DRIVING_STYLES: tuple[DrivingStyle, ...] = get_args(DrivingStyle)
+
+_ANY_NAME = WithJsonSchema({"type": "object"}, mode="serialization")
+"""Whoever reads a document need not know which names can be written."""
+
+
+class DriverSet(Part):
+    """Drivers of one kind, by SUMO's own names of what is different from a driving style's.
+
+    ``parameters`` are numbers or distributions, of which each driver draws one by the scenario's
+    seed; :data:`~odscen.scenario.document.driver_parameters.DRIVER_PARAMETERS` has names, ranges
+    and meanings. ``car_following`` is SUMO's model.
+    """
+
+    id: Identifier
+    style: DrivingStyle = "normal"
+    parameters: Annotated[dict[Label, Distribution], _ANY_NAME] = Field(default_factory=dict)
+    car_following: Literal["Krauss", "IDM"] = "Krauss"
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.id in DRIVING_STYLES:
+            msg = f"{self.id!r} is a driving style; give the set another id"
+            raise ValueError(msg)
+        for name, value in self.parameters.items():
+            _check_parameter(name, *drawn_range(value))
+        return self
+
+    @field_serializer("parameters")
+    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, Any]:
+        """Write a constant as the number that it is."""
+        return {
+            name: one.value if isinstance(one, Constant) else one.model_dump(mode="json")
+            for name, one in parameters.items()
+        }
+
+
+def _check_parameter(name: str, low: float, high: float) -> None:
+    known = DRIVER_PARAMETERS.get(name)
+    if known is None:
+        near = get_close_matches(name, DRIVER_PARAMETERS, n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        msg = f"drivers have no parameter {name!r}{hint}"
+        raise ValueError(msg)
+    if not known.low <= low <= high <= known.high:
+        unit = f" {known.unit}" if known.unit else ""
+        said = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        msg = f"{name} must be {known.low:g} to {known.high:g}{unit}, not {said}"
+        raise ValueError(msg)
+
+
+class Drivers(Part):
+    """What drivers of the style ``normal`` do; the other styles are set about it.
+
+    ``saturation_flow`` (vehicles per hour and lane that pass a stop line from a queue, cars on a
+    straight approach with a limit of 50 km/h) is another way to give the ``headway``, the desired
+    time from the rear of the vehicle in front, s. ``gap_acceptance`` is 0 for those who only take
+    gaps in which nobody else has to brake, and 1 for those who take any that is safe.
+    ``lane_change_eagerness`` multiplies the eagerness to change lanes in order to drive faster.
+    ``sets`` are further kinds of drivers, whose ids actors name as their ``style``; of flows and
+    demand each driver draws a style or set by ``shares``, and all are normal without.
+    """
+
+    saturation_flow: Annotated[float, Field(ge=800, le=2500)] | None = None
+    headway: Annotated[float, Field(ge=0.5, le=5)] | None = None
+    gap_acceptance: Annotated[float, Field(ge=0, le=1)] = 0.3
+    lane_change_eagerness: Annotated[float, Field(ge=0, le=10)] = 1.0
+    sets: tuple[DriverSet, ...] = ()
+    shares: dict[Identifier, Annotated[float, Field(gt=0)]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_headway(self) -> Self:
+        if self.saturation_flow is not None and self.headway is not None:
+            msg = "give one of saturation_flow and headway, not both: each decides the other"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _known_styles(self) -> Self:
+        ids = [one.id for one in self.sets]
+        twice = sorted({one for one in ids if ids.count(one) > 1})
+        if twice:
+            msg = f"several driver sets have the id {twice[0]!r}"
+            raise ValueError(msg)
+        for style in self.shares:
+            if style not in self.styles:
+                msg = f"shares name {style!r}, which is neither a driving style nor a driver set"
+                raise ValueError(msg)
+        return self
+
+    @property
+    def styles(self) -> tuple[str, ...]:
+        """Driving styles and ids of driver sets."""
+        return (*DRIVING_STYLES, *(one.id for one in self.sets))
