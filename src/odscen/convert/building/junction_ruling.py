@@ -11,7 +11,7 @@ from odscen.convert.model.right_of_way import (
     find_conflicts,
     in_turn,
     requests,
-    sight_at_yield,
+    sight_before,
 )
 
 if TYPE_CHECKING:
@@ -70,10 +70,13 @@ def ruled(
 
 def signposts(ruling: Ruling, rows: Mapping[int, int]) -> list[tuple[str, float | None]]:
     """For each movement SUMO's letter, and from where its drivers see whom to let go."""
-    posts = []
+    posts: list[tuple[str, float | None]] = []
     for n, (movement, right) in enumerate(zip(ruling.movements, ruling.rights, strict=False)):
-        letter = "Z" if n in ruling.zipped else _state(ruling, movement, right, lit=n in rows)
-        posts.append((letter, sight_at_yield(movement, right, ruling.movements)))
+        if n in ruling.zipped:
+            posts.append(("Z", None))
+            continue
+        sight = sight_before(movement, right, ruling.movements)
+        posts.append((_state(ruling, movement, right, lit=n in rows), sight))
     return posts
 
 

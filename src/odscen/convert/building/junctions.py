@@ -22,7 +22,7 @@ from odscen.convert.model.net import (
     TrafficLight,
 )
 from odscen.convert.model.net_ids import internal_edge_id, lane_id
-from odscen.convert.model.right_of_way import Sign
+from odscen.convert.model.right_of_way import SIGHT_WITHOUT_SIGN, Sign
 from odscen.convert.signals.light_links import direction, light_links, nearer_edge
 from odscen.convert.signals.shared_green import LightLinks, light_stages, link_conflicts
 from odscen.convert.signals.signal_programs import program
@@ -257,8 +257,11 @@ class _Inside:
         self.links.append(NetLink(*ends, first.id, turn, state, *light, sight))
         for (inner, lane), (_, after) in zip(parts, (*parts[1:], ("", None)), strict=True):
             self.edges.append(NetEdge(inner, INTERNAL, (lane,)))
-            onwards, way = (after.id, "m") if after else (None, "M")
-            self.links.append(NetLink(inner, target, 0, target_lane, onwards, turn, way))
+            link = NetLink(inner, target, 0, target_lane, direction=turn)
+            if after:
+                seen = None if movement.sign else SIGHT_WITHOUT_SIGN
+                link = replace(link, via=after.id, state="m", visibility=seen)
+            self.links.append(link)
 
 
 def _inner_lane(edge: SumoEdgeId, passage: Passage) -> NetLane:

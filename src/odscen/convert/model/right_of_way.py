@@ -65,6 +65,14 @@ sign and 2.6 s at a roundabout; from SUMO's 4.5 m one passes the sign at 8 m/s, 
 """
 
 
+SIGHT_WITHOUT_SIGN = 10.0
+"""Metres before a line without a sign, or a waiting place, from which one sees whom to let go.
+
+From there a car that brakes comfortably stops at the line from 9.5 m/s, so that who finds nobody
+turns without slowing down for the sight; from SUMO's 4.5 m it would be 6.4 m/s.
+"""
+
+
 class Sign(IntEnum):
     """What makes an approach wait; more has less right."""
 
@@ -330,11 +338,11 @@ def _waits_by_place(one: Movement, other: Movement, rules: Rules, side: float) -
     return (one.source, one.target) > (other.source, other.target)
 
 
-def sight_at_yield(
-    movement: Movement, right: Request, movements: Sequence[Movement]
-) -> float | None:
-    """Metres before the line from which one sees whom to let go; ``None`` where no sign says so."""
+def sight_before(movement: Movement, right: Request, movements: Sequence[Movement]) -> float | None:
+    """Metres before the line from which one sees whom to let go; ``None``: as SUMO has it."""
     roads = {movements[n].source[0] for n in right.yields_to if n < len(movements)}
-    if movement.sign is not Sign.YIELD or not roads:
+    if movement.sign is Sign.STOP or not roads:
         return None
+    if movement.sign is Sign.NONE:
+        return SIGHT_WITHOUT_SIGN
     return SIGHT_BOTH_WAYS if len(roads) > 1 else SIGHT_ONE_WAY
