@@ -2418,6 +2418,8 @@ export interface components {
             site: string;
             /** Ground */
             ground: string;
+            /** Legend */
+            legend: components["schemas"]["PictureKey"][];
         };
         /**
          * MapDetails
@@ -2777,6 +2779,16 @@ export interface components {
             name: string;
             /** Stage */
             stage: string;
+        };
+        /**
+         * PictureKey
+         * @description A shape of the pictures in 24 by 14 pixels, as SVG, and what it means.
+         */
+        PictureKey: {
+            /** Picture */
+            picture: string;
+            /** Words */
+            words: string;
         };
         /**
          * ProblemInfo

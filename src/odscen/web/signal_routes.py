@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import orjson
@@ -15,6 +16,7 @@ from odscen.app.signal_views import chosen_lights, program_origin
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.records.light_programs import programs_from_json, stage_spans
 from odscen.results.report.signal_charts import plan_chart, plan_scale
+from odscen.results.report.signal_sheet import legend_picture, legend_shapes
 from odscen.results.report.stage_diagrams import JunctionPictures, detector_label, stage_words
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.sumo.folder import layout
@@ -27,6 +29,7 @@ from odscen.web.wire.signal_messages import (
     LightGroupInfo,
     LightProgramInfo,
     PhaseInfo,
+    PictureKey,
     RunSignals,
     StageInfo,
 )
@@ -44,7 +47,7 @@ if TYPE_CHECKING:
 
 router = APIRouter(prefix="/api")
 
-_WIDTH = 440.0
+_WIDTH = 384.0
 """Pixels of a time bar."""
 
 _Calls = dict[str, list[tuple[float, float]]]
@@ -82,15 +85,12 @@ def light_of_run(run: str, junction: str, shared: Shared) -> LightProgramInfo:
 
 def _finished(run: str, shared: Services) -> Path | None:
     """Folder of a run that has its lights in it; ``None`` if it is still under way here."""
-    try:
+    with suppress(NotFoundError):
         folder = shared.runs.kept.folder(run)
-    except NotFoundError:
-        shared.runs.active(run)
-        return None
-    if not (folder / layout.LIGHTS_FILE).is_file():
-        what = "traffic lights of run"
-        raise NotFoundError(what, run, [])
-    return folder
+        if (folder / layout.LIGHTS_FILE).is_file():
+            return folder
+    shared.runs.active(run)
+    return None
 
 
 def _program(
@@ -130,6 +130,10 @@ def _program(
         ],
         site=str(pictures.site() or ""),
         ground=str(pictures.ground() or ""),
+        legend=[
+            PictureKey(picture=str(legend_picture(shape)), words=words)
+            for shape, words in legend_shapes()
+        ],
     )
 
 

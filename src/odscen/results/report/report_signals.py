@@ -9,7 +9,7 @@ from odscen.results.measures.figure import ReportSection
 from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.report_figures import card_grid, figure_cards
 from odscen.results.report.signal_charts import bar_chart, plan_chart, shown_bars
-from odscen.results.report.signal_sheet import legend_shapes
+from odscen.results.report.signal_sheet import legend_picture, legend_shapes
 from odscen.results.report.signal_tables import detector_table, split_table
 from odscen.results.report.stage_diagrams import JunctionPictures, stage_diagram
 
@@ -90,14 +90,7 @@ def _chosen(lights: LightsOfRun) -> list[LightProgram]:
 
 def signal_legend() -> Markup:
     """What the shapes and colours of all pictures of signal programs mean."""
-    items = [
-        element(
-            "span",
-            element("svg", shape, width=24, height=14, class_="bars", aria_hidden="true"),
-            words,
-        )
-        for shape, words in legend_shapes()
-    ]
+    items = [element("span", legend_picture(shape), words) for shape, words in legend_shapes()]
     return element("div", *items, class_="legend signals")
 
 
@@ -107,8 +100,7 @@ def _light(light: LightProgram, lights: LightsOfRun, pictures: JunctionPictures)
     parts = [
         element("h3", f"Junction {', '.join(light.junctions)}, {_control(light)}"),
         pictures.ground(),
-        element("div", site, class_="site-box") if site is not None else None,
-        detector_table(light),
+        element("div", site, detector_table(light), class_="site-box"),
         *(_plan(light, plan, pictures, named=several) for plan in light.plans),
         _as_shown(light, lights.states),
         _groups(light, lights.use),

@@ -209,3 +209,8 @@ def legend_shapes() -> Iterator[tuple[Markup, str]]:
         yield element("rect", x=2, y=2, width=20, height=10, class_=f"span {kind}"), words
     yield element("rect", x=6, y=3, width=12, height=8, class_="loop"), "detector"
     yield element("circle", cx=12, cy=7, r=5, class_="loop call"), "waiting place with a call"
+
+
+def legend_picture(shape: Markup) -> Markup:
+    """One of :func:`legend_shapes` as a picture beside its words."""
+    return element("svg", shape, width=24, height=14, class_="bars", aria_hidden="true")

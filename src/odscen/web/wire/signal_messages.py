@@ -80,6 +80,13 @@ class DetectorInfo(Answer):
     calls: list[tuple[float, float]]
 
 
+class PictureKey(Answer):
+    """A shape of the pictures in 24 by 14 pixels, as SVG, and what it means."""
+
+    picture: str
+    words: str
+
+
 class LightProgramInfo(Answer):
     """What a light is told to show. ``site`` is the junction with its detectors, as SVG.
 
@@ -95,6 +102,7 @@ class LightProgramInfo(Answer):
     detectors: list[DetectorInfo]
     site: str
     ground: str
+    legend: list[PictureKey]
 
 
 class ShownStates(Answer):
