@@ -40,6 +40,9 @@ export interface EditorNow extends Editing {
   handle: RefObject<MapHandle | null>;
 }
 
+/** Pixels of the right of the map that the program of a light covers. */
+const PROGRAM = 430;
+
 export function useEditing(
   store: EditorStore,
   loaded: LoadedGraph,
@@ -94,7 +97,7 @@ export function useEditing(
     lights,
     showLight: (junction) => {
       const middle = lights?.middle(junction);
-      if (middle) handle.current?.centre(middle.x, middle.y);
+      if (middle) handle.current?.centre(middle.x, middle.y, PROGRAM / 2);
       setLight(junction);
     },
     changes,

@@ -35,7 +35,8 @@ export interface MapHandle {
   setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
   show(bounds: Bounds): void;
-  centre(x: number, y: number): void;
+  /** Brings a place to the middle, or so many pixels to the left of it. */
+  centre(x: number, y: number, aside?: number): void;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -158,7 +159,10 @@ export function MapCanvas({
       setHeads: (heads) => renderer.current?.setHeads(heads),
       setMarks: (marks) => renderer.current?.setMarks(marks),
       show: (bounds) => apply(fit(bounds, size.current, 0.15)),
-      centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
+      centre: (x, y, aside = 0) => {
+        const scale = Math.max(view.current.scale, 8);
+        apply({ x: x + aside / scale, y, scale });
+      },
       pickMiddle: () =>
         onPick?.({
           x: view.current.x,

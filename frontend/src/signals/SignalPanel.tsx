@@ -102,6 +102,8 @@ function Program({ light, now }: { light: LightProgram; now: SignalNow | null })
       )}
       {now && <Now plan={plan} cursor={cursor} now={now} />}
       <Drawn className="signal-ground" svg={light.ground} />
+      <h3>Signal timing plan</h3>
+      <TimeBar plan={plan} cursor={cursor} />
       <h3>Stages</h3>
       <ol className="signal-stages">
         {plan.stages.map((stage, row) => (
@@ -116,8 +118,6 @@ function Program({ light, now }: { light: LightProgram; now: SignalNow | null })
           </li>
         ))}
       </ol>
-      <h3>Signal timing plan</h3>
-      <TimeBar plan={plan} cursor={cursor} />
       <Splits plan={plan} />
       <h3>Junction{light.detectors.length > 0 && " and detectors"}</h3>
       {light.site && <Drawn className="signal-site" svg={light.site} />}

@@ -122,7 +122,7 @@ class JunctionPictures:
             width=SITE,
             height=SITE,
             role="img",
-            class_="picture site",
+            class_="picture site-picture",
         )
 
     def _stage(self, stage: StageSpan, frame: PictureFrame) -> StagePicture:
@@ -144,7 +144,7 @@ class JunctionPictures:
             width=SIDE,
             height=SIDE,
             role="img",
-            class_="picture stage",
+            class_="picture stage-picture",
         )
         return StagePicture(stage, picture, words, names + (" on call" if stage.on_call else ""))
 
@@ -220,7 +220,7 @@ def _head(path: Sequence[tuple[float, float]], frame: PictureFrame, kind: str) -
     tip = (x1 + ux * size * 0.6, y1 + uy * size * 0.6)
     left = (x1 - ux * size * 0.6 - uy * size * 0.5, y1 - uy * size * 0.6 + ux * size * 0.5)
     right = (x1 - ux * size * 0.6 + uy * size * 0.5, y1 - uy * size * 0.6 - ux * size * 0.5)
-    return element("path", d=f"{frame.path([tip, left, right])} Z", class_=f"head {kind}")
+    return element("path", d=f"{frame.path([tip, left, right])} Z", class_=f"arrow {kind}")
 
 
 def _loop(light: LightProgram, detector: ShownDetector, frame: PictureFrame) -> Markup:
