@@ -3,7 +3,7 @@ import type { components } from "./schema";
 
 type Schemas = components["schemas"];
 
-/** What a light is told to show. */
+/** What a light is to show. */
 export type LightProgram = Schemas["LightProgramInfo"];
 export type DayPlan = Schemas["DayPlanInfo"];
 export type Detector = Schemas["DetectorInfo"];

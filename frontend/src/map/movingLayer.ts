@@ -228,12 +228,12 @@ function drawMark(context: CanvasRenderingContext2D, mark: Mark, view: View, siz
 /** Metres of a signal across its lane, and of one for pedestrians. */
 const HEAD = 2.6;
 const WALK_HEAD = 1.4;
-/** Below this many pixels per metre shapes cannot be told apart: only dots are drawn. */
+/** Below this many pixels per metre shapes cannot be distinguished: only dots are drawn. */
 const SHAPES_FROM = 1.6;
 
 /**
  * A signal at its stop line: a bar across for red, two short ones for yellow, an arrowhead for green,
- * hollow where one gives way, so that no one has to tell colours apart.
+ * hollow where one gives way, so that colour alone says nothing.
  */
 function drawHead(context: CanvasRenderingContext2D, head: Head, view: View, size: Size): void {
   const x = (head.x - view.x) * view.scale + size.width / 2;

@@ -262,7 +262,7 @@ const placeWords = (loops: readonly Detector[]): string => {
 const purpose = ([first]: readonly Detector[]): string =>
   first ? `${first.call ? "calls" : "prolongs"} stage ${first.stages.join(", ")}` : "";
 
-/** Whether somebody is on a detector, and for what share of the last minute. */
+/** Whether a road user is on a detector, and for what share of the last minute. */
 export function occupancy(loops: readonly Detector[], time: number): string {
   const from = Math.max(0, time - 60);
   const seen = loops.flatMap(({ calls }) => calls);
