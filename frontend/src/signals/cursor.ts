@@ -75,7 +75,7 @@ export class ShownSignal {
     const i = low - 1;
     if (i < 0) return null;
     const state = nth(states, nth(shown, i));
-    // A plan that takes over in the midst of a state goes on with it.
+    // A plan that takes over in the midst of a state continues it.
     let first = i;
     while (first > 0 && shown[first - 1] === shown[i]) first--;
     return {
