@@ -18,17 +18,19 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, generate, write_scenario
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import transitions
-from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.scenario_document import MapReference, Scenario
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 from tests.browser.pages import OdscenPage, settle
+from tests.signal_case import program
+from tests.signal_case import scenario as lit_scenario
 from tools import page as tool
 
 IMAGES = tool.ROOT / "docs/images"
 MAP = "town_5x5"
 SMALL = "signal_crossing"
-COUNTED, LONG = "morning", "night"
+COUNTED, LONG, LIT = "morning", "night", "signals"
 SIZE = {"width": 1280, "height": 800}
 LARGEST = 400_000
 
@@ -64,10 +66,12 @@ def main() -> None:
         scenario = made.name.removesuffix(SUFFIX)
         _counted(workspace)
         _long(workspace)
+        _lit(workspace)
         with tool.served(Path(name)) as server, tool.launched() as browser:
             for scheme in ("light", "dark"):
                 _views(browser, server.url, scheme, scenario, folder)
                 _traffic_views(browser, server.url, scheme, folder)
+                _signal_view(browser, server.url, scheme, folder)
 
 
 def _counted(workspace: Workspace) -> None:
@@ -99,6 +103,14 @@ def _long(workspace: Workspace) -> None:
     _save(workspace, LONG, scenario)
 
 
+def _lit(workspace: Workspace) -> None:
+    """Save a scenario with the signal program of the guide."""
+    info = workspace.map(SMALL).info
+    one = lit_scenario(program(), control="actuated", clock=12 * 3600.0, until=300.0)
+    reference = MapReference(name=SMALL, sha256=info["sha256"])
+    _save(workspace, LIT, one.model_copy(update={"map": reference}))
+
+
 def _save(workspace: Workspace, name: str, scenario: Scenario) -> None:
     write_scenario(scenario, workspace.scenarios / f"{name}{SUFFIX}")
 
@@ -127,6 +139,28 @@ def _traffic_views(browser: Browser, url: str, scheme: str, folder: Path) -> Non
         user.control("Resume later").click()
         expect(user.result).to_contain_text("interrupted")
         camera.take("interrupted")
+
+
+def _signal_view(browser: Browser, url: str, scheme: str, folder: Path) -> None:
+    with browser.new_context(base_url=url, viewport=SIZE, color_scheme=scheme) as context:
+        context.add_init_script(f"localStorage.setItem({tool.TOUR_SEEN!r}, 'seen')")
+        user = OdscenPage(context.new_page())
+        user.open_editor(LIT)
+        user.step("Run").click()
+        user.choose_pace("As fast as possible")
+        user.run.click()
+        expect(user.result).to_contain_text("finished", timeout=120_000)
+        user.page.get_by_role("button", name="Watch again").click()
+        moment = user.page.get_by_label("Moment of the run")
+        expect(moment).to_be_visible()
+        moment.fill("188")
+        user.page.get_by_role("tab", name="Lights").click()
+        expect(user.page.get_by_role("heading", name="Stages")).to_be_visible()
+        user.map.area.focus()
+        for _ in range(3):
+            user.page.keyboard.press("+")
+        user.page.get_by_role("tab", name="Lights").focus()
+        Camera(user, scheme, folder).take("signals")
 
 
 def _views(browser: Browser, url: str, scheme: str, scenario: str, folder: Path) -> None:

@@ -240,6 +240,15 @@ def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -
     expect(user.result).to_contain_text("finished")
     expect(user.result.get_by_role("link", name="Full report")).to_be_visible()
     inspector.look("run-finished")
+    user.page.get_by_role("tab", name="Lights").click()
+    expect(user.page.get_by_role("heading", name="Stages")).to_be_visible()
+    inspector.look("run-lights")
+    user.page.get_by_role("button", name="Back to the editor").last.click()
+    user.wait_for_editor()
+    user.step("Run").click()
+    user.page.get_by_role("button", name="Show the signal programs").click()
+    expect(user.page.get_by_role("heading", name="Stages")).to_be_visible()
+    inspector.look("editor-light")
 
 
 @pytest.fixture(scope="module")

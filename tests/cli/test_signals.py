@@ -80,3 +80,21 @@ def test_a_corridor_without_two_lights_is_refused(workspace: Path, tmp_path: Pat
         wrong = odscen(*command, *options)
         assert wrong.code != 0
         assert message in wrong.json["error"]["message"]
+
+
+def test_programs_are_drawn_into_a_file_or_a_folder(workspace: Path, tmp_path: Path) -> None:
+    one = scenario(one_plan(offset=12))
+    file = placed(workspace, one, "signal_crossing", tmp_path / "one.scenario.json")
+    sheet, folder = tmp_path / "light.svg", tmp_path / "sheets"
+    show = ("signals", "show", file, "--workspace", workspace)
+    told = odscen(*show, "--json", "--svg", sheet).json
+    assert told["svg"] == [str(sheet)]
+    assert len(told["lights"]) == 1
+    assert "cycle 84 s, offset 12 s" in sheet.read_text(encoding="utf-8").lower()
+    assert odscen(*show, "--svg", folder, "--junction", "10001").code == 0
+    assert [path.name for path in folder.iterdir()] == ["10001.svg"]
+    assert (folder / "10001.svg").read_text(encoding="utf-8") == sheet.read_text(encoding="utf-8")
+    wrong = odscen(*show, "--json", "--svg", tmp_path / "no.svg", "--junction", "77")
+    assert wrong.code != 0
+    assert "10001" in wrong.json["error"]["message"]
+    assert not (tmp_path / "no.svg").exists()

@@ -728,6 +728,66 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scenarios/{name}/signals/{junction}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Of Scenario
+         * @description What a light is told to show in a scenario, with all plans of the day.
+         */
+        get: operations["of_scenario_api_scenarios__name__signals__junction__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run}/signals": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Of Run
+         * @description What the lights of a finished run showed, and when.
+         */
+        get: operations["of_run_api_runs__run__signals_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/runs/{run}/signals/{junction}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Light Of Run
+         * @description What a light is told to show in a run; of a finished one with the calls of its detectors.
+         */
+        get: operations["light_of_run_api_runs__run__signals__junction__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/runs/{run}/files": {
         parameters: {
             query?: never;
@@ -1506,6 +1566,34 @@ export interface components {
             };
         };
         /**
+         * DayPlanInfo
+         * @description A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
+         *
+         *     ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
+         *     the width.
+         */
+        DayPlanInfo: {
+            /** Id */
+            id: string;
+            /** Cycle */
+            cycle: number;
+            /** Offset */
+            offset: number;
+            /** Times */
+            times: number[];
+            /** Stages */
+            stages: components["schemas"]["StageInfo"][];
+            /** Phases */
+            phases: components["schemas"]["PhaseInfo"][];
+            /** Bars */
+            bars: string;
+            /** Plot */
+            plot: [
+                number,
+                number
+            ];
+        };
+        /**
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
          */
@@ -1540,6 +1628,32 @@ export interface components {
              * @default []
              */
             background: components["schemas"]["Background"][];
+        };
+        /**
+         * DetectorInfo
+         * @description A detector and what it is for; metres before the stop line, and seconds of its gap.
+         *
+         *     ``label`` names it in the pictures. ``calls`` are begin and end of the times in which it saw a
+         *     road user, seconds of a run; none without a run.
+         */
+        DetectorInfo: {
+            /** Id */
+            id: string;
+            /** Label */
+            label: string;
+            /** Stages */
+            stages: string[];
+            /** Call */
+            call: boolean;
+            /** Ahead */
+            ahead: number;
+            /** Gap */
+            gap: number;
+            /** Calls */
+            calls: [
+                number,
+                number
+            ][];
         };
         /**
          * DrawingColumns
@@ -2234,11 +2348,27 @@ export interface components {
             bus_priority: boolean | null;
         };
         /**
+         * LightGroupInfo
+         * @description A signal group: the letters of the light's states that are its own, and their movements.
+         */
+        LightGroupInfo: {
+            /** Id */
+            id: string;
+            /** Movements */
+            movements: string[];
+            /** Links */
+            links: number[];
+            /** Walk */
+            walk: boolean;
+        };
+        /**
          * LightInfo
          * @description A traffic light: its SUMO id, by which live states are reported, and what scenarios call it.
          *
-         *     ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
-         *     of its state, the OpenDRIVE signals that show it.
+         *     ``green`` are the seconds of each stage in the map's program. For each letter of its state,
+         *     ``signals`` has the OpenDRIVE signals that show it, and ``paths`` some points of the movement
+         *     that it is for, the first one at the stop line; none if the network has no such movement.
+         *     ``walks`` says which letters are for crossings.
          */
         LightInfo: {
             /** Id */
@@ -2249,6 +2379,47 @@ export interface components {
             green: number[];
             /** Signals */
             signals: string[][];
+            /** Paths */
+            paths: [
+                number,
+                number
+            ][][];
+            /** Walks */
+            walks: boolean[];
+        };
+        /**
+         * LightProgramInfo
+         * @description What a light is told to show. ``site`` is the junction with its detectors, as SVG.
+         *
+         *     ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
+         */
+        LightProgramInfo: {
+            /** Id */
+            id: string;
+            /** Junctions */
+            junctions: string[];
+            /**
+             * Control
+             * @enum {string}
+             */
+            control: "fixed" | "actuated";
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "scenario" | "retimed" | "odscen" | "netconvert" | "file";
+            /** Groups */
+            groups: components["schemas"]["LightGroupInfo"][];
+            /** Plans */
+            plans: components["schemas"]["DayPlanInfo"][];
+            /** Detectors */
+            detectors: components["schemas"]["DetectorInfo"][];
+            /** Site */
+            site: string;
+            /** Ground */
+            ground: string;
+            /** Legend */
+            legend: components["schemas"]["PictureKey"][];
         };
         /**
          * MapDetails
@@ -2594,6 +2765,30 @@ export interface components {
                 number,
                 number
             ][];
+        };
+        /**
+         * PhaseInfo
+         * @description A state for so many seconds of the cycle; ``stage`` is empty if it is none's green.
+         */
+        PhaseInfo: {
+            /** Seconds */
+            seconds: number;
+            /** State */
+            state: string;
+            /** Name */
+            name: string;
+            /** Stage */
+            stage: string;
+        };
+        /**
+         * PictureKey
+         * @description A shape of the pictures in 24 by 14 pixels, as SVG, and what it means.
+         */
+        PictureKey: {
+            /** Picture */
+            picture: string;
+            /** Words */
+            words: string;
         };
         /**
          * ProblemInfo
@@ -3012,6 +3207,14 @@ export interface components {
             edges: number[];
             /** Share */
             share: number[];
+        };
+        /**
+         * RunSignals
+         * @description What the lights of a finished run showed; none if the map has none.
+         */
+        RunSignals: {
+            /** Lights */
+            lights: components["schemas"]["ShownStates"][];
         };
         /**
          * RunSlices
@@ -3599,6 +3802,22 @@ export interface components {
             segments: string[];
         };
         /**
+         * ShownStates
+         * @description What a light showed: from ``times[i]`` on ``states[shown[i]]`` of ``plans[i]``; seconds.
+         */
+        ShownStates: {
+            /** Light */
+            light: string;
+            /** Times */
+            times: number[];
+            /** Shown */
+            shown: number[];
+            /** Plans */
+            plans: string[];
+            /** States */
+            states: string[];
+        };
+        /**
          * ShrinkRoiEdit
          * @description Take a segment out of the region of interest (R29).
          */
@@ -3800,6 +4019,38 @@ export interface components {
             time: number;
             /** Done */
             done: components["schemas"]["SliceInfo"][];
+        };
+        /**
+         * StageInfo
+         * @description A stage in the cycle of a plan; seconds.
+         *
+         *     ``split`` lasts from ``begin`` until the next stage begins; ``least`` and ``most`` are those of
+         *     a green that may vary, else 0. ``groups`` have green, and a movement of those in ``permissive``
+         *     gives way. ``picture`` is SVG.
+         */
+        StageInfo: {
+            /** Id */
+            id: string;
+            /** Begin */
+            begin: number;
+            /** End */
+            end: number;
+            /** Split */
+            split: number;
+            /** Least */
+            least: number;
+            /** Most */
+            most: number;
+            /** On Call */
+            on_call: boolean;
+            /** Groups */
+            groups: string[];
+            /** Permissive */
+            permissive: string[];
+            /** Words */
+            words: string;
+            /** Picture */
+            picture: string;
         };
         /**
          * StopLineInfo
@@ -8405,6 +8656,270 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    of_scenario_api_scenarios__name__signals__junction__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                junction: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LightProgramInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    of_run_api_runs__run__signals_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunSignals"];
+                };
+            };
+            /** @description What the client has is right. */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    light_of_run_api_runs__run__signals__junction__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                run: string;
+                junction: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LightProgramInfo"];
+                };
             };
             /** @description The request cannot be read. */
             400: {

@@ -1,8 +1,10 @@
-import { useState } from "react";
+import { useCallback, useState } from "react";
 
-import { type Assets, CATEGORIES } from "../api/types";
+import { type Assets, CATEGORIES, type MapDetails } from "../api/types";
+import { signals } from "../api/signals";
 import type { PackedDrawing } from "../map/drawing";
 import type { LoadedGraph } from "../map/loaded";
+import { SignalPanel } from "../signals/SignalPanel";
 import { EditorSteps } from "./EditorSteps";
 import { copyTool } from "./handlers/copy";
 import { flowTool } from "./handlers/flow";
@@ -25,14 +27,22 @@ export function Editor({
   drawing,
   loaded,
   assets,
+  map,
 }: {
   store: EditorStore;
   drawing: PackedDrawing;
   loaded: LoadedGraph;
   assets: Assets | null;
+  map: MapDetails | null;
 }) {
-  const now = useEditing(store, loaded, assets);
+  const now = useEditing(store, loaded, assets, map);
   const { undo, redo } = store();
+  const { scenario } = now;
+  // Anew with each version of the scenario: any edit may have changed the program.
+  const loadProgram = useCallback(
+    (junction: string) => signals.ofScenario(scenario.name, junction),
+    [scenario],
+  );
   const [help, setHelp] = useState(false);
   const [tour, setTour] = useState(firstVisit);
   const closeTour = (): void => {
@@ -74,6 +84,15 @@ export function Editor({
         <Problems problems={now.problems} onShow={now.showProblem} />
       </div>
       <Stage now={now} drawing={drawing}>
+        {now.light && now.lights && (
+          <SignalPanel
+            junctions={now.lights.junctions}
+            junction={now.light}
+            onJunction={now.showLight}
+            load={loadProgram}
+            onClose={now.closeLight}
+          />
+        )}
         {tour && <Tour onClose={closeTour} />}
       </Stage>
       <RefusalAlert store={store} />

@@ -181,6 +181,10 @@ export function EditorSteps({
               empty={ones.length === 0 && !bringsTraffic(demand)}
               onEdit={changes.change}
               onRun={run.start}
+              onLights={() => {
+                const [first] = now.lights?.junctions ?? [];
+                if (first) now.showLight(first);
+              }}
             />
           ),
         },

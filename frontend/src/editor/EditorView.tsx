@@ -2,6 +2,7 @@ import { Alert, Button, Loader, Text, Title } from "@mantine/core";
 import { useEffect, useState } from "react";
 
 import { api } from "../api/client";
+import type { MapDetails } from "../api/types";
 import type { PackedDrawing } from "../map/drawing";
 import { type LoadedGraph, loadDrawing, loadGraph } from "../map/loaded";
 import { go } from "../ui/address";
@@ -14,6 +15,7 @@ import { createEditorStore } from "./store";
 export function EditorView({ scenario: name }: { scenario: string }) {
   const [store] = useState(() => createEditorStore(name));
   const map = store((state) => state.scenario?.document.map.name);
+  const [details, setDetails] = useState<MapDetails | null>(null);
   const [failure, setFailure] = useState<string | null>(null);
   const [drawing, setDrawing] = useState<PackedDrawing | null>(null);
   const [loaded, setLoaded] = useState<LoadedGraph | null>(null);
@@ -30,6 +32,7 @@ export function EditorView({ scenario: name }: { scenario: string }) {
     const fail = (error: unknown): void => setFailure(reasonOf(error));
     loadDrawing(map).then(setDrawing, fail);
     loadGraph(map).then(setLoaded, fail);
+    api.map(map).then(setDetails, fail);
   }, [map]);
 
   if (failure) {
@@ -53,5 +56,5 @@ export function EditorView({ scenario: name }: { scenario: string }) {
       </div>
     );
   }
-  return <Editor store={store} drawing={drawing} loaded={loaded} assets={assets.value} />;
+  return <Editor store={store} drawing={drawing} loaded={loaded} assets={assets.value} map={details} />;
 }

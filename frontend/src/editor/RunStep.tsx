@@ -36,6 +36,7 @@ export function RunStep({
   busy,
   onEdit,
   onRun,
+  onLights,
 }: {
   name: string;
   version: number;
@@ -46,6 +47,8 @@ export function RunStep({
   busy: boolean;
   onEdit: (edit: Edit) => void;
   onRun: (wish: RunWish) => void;
+  /** Shows the programs of the traffic lights. */
+  onLights: () => void;
 }) {
   const {
     simulation: { duration },
@@ -121,6 +124,9 @@ export function RunStep({
               ? "Every signal keeps its times."
               : "A green is extended while vehicles arrive."}
           </Text>
+          <Button size="compact-sm" variant="default" mt={6} onClick={onLights}>
+            Show the signal programs
+          </Button>
         </div>
       )}
       <div>

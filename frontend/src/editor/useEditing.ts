@@ -1,8 +1,9 @@
 import { type RefObject, useMemo, useRef, useState } from "react";
 
-import type { Assets, Problem, ScenarioDocument, ScenarioState } from "../api/types";
+import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
 import type { LoadedGraph } from "../map/loaded";
 import type { MapHandle } from "../map/MapCanvas";
+import { Heads } from "../signals/heads";
 import { tell } from "../ui/notices";
 import { useGoals, useRegion } from "./asked";
 import { changesOf } from "./changes";
@@ -19,6 +20,9 @@ export interface EditorNow extends Editing {
   scenario: ScenarioState;
   document: ScenarioDocument;
   problems: readonly Problem[];
+  /** The junction whose traffic light is shown. */
+  light: string | null;
+  closeLight: () => void;
   step: Step;
   tool: Tool | null;
   /** Takes a tool into the hand, or puts it back. */
@@ -36,7 +40,15 @@ export interface EditorNow extends Editing {
   handle: RefObject<MapHandle | null>;
 }
 
-export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Assets | null): EditorNow {
+/** Pixels of the right of the map that the program of a light covers. */
+const PROGRAM = 430;
+
+export function useEditing(
+  store: EditorStore,
+  loaded: LoadedGraph,
+  assets: Assets | null,
+  map: MapDetails | null,
+): EditorNow {
   const { graph, picker } = loaded;
   const { scenario, selection, name, edit, select } = store();
   if (!scenario) throw new Error("the editor is only shown with a scenario");
@@ -45,6 +57,8 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
   const [tool, setTool] = useState<Tool | null>(null);
   const [hover, setHover] = useState<Hover | null>(null);
   const handle = useRef<MapHandle | null>(null);
+  const lights = useMemo(() => map && new Heads(map.lights), [map]);
+  const [light, setLight] = useState<string | null>(null);
 
   const roiKey = document.roi.join("\n");
   const region = useRegion(name, roiKey);
@@ -80,6 +94,12 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
     selection,
     one,
     goals,
+    lights,
+    showLight: (junction) => {
+      const middle = lights?.middle(junction);
+      if (middle) handle.current?.centre(middle.x, middle.y, PROGRAM / 2);
+      setLight(junction);
+    },
     changes,
     select,
     openStep: (next) => {
@@ -96,6 +116,8 @@ export function useEditing(store: EditorStore, loaded: LoadedGraph, assets: Asse
     scenario,
     document,
     problems,
+    light,
+    closeLight: () => setLight(null),
     step,
     tool,
     arm,

@@ -12,6 +12,7 @@ import {
 } from "react";
 
 import type { Bounds } from "../api/types";
+import type { Head } from "../signals/heads";
 import type { PackedDrawing } from "./drawing";
 import type { Graph } from "./graph";
 import { Minimap } from "./Minimap";
@@ -31,10 +32,11 @@ export interface Pointed {
 
 export interface MapHandle {
   setMoving(moving: Moving | null): void;
-  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
   show(bounds: Bounds): void;
-  centre(x: number, y: number): void;
+  /** Brings a place to the middle, or so many pixels to the left of it. */
+  centre(x: number, y: number, aside?: number): void;
   /** Acts on the middle, as Enter does. */
   pickMiddle(): void;
 }
@@ -154,10 +156,13 @@ export function MapCanvas({
     handle,
     () => ({
       setMoving: (moving) => renderer.current?.setMoving(moving),
-      setLamps: (lamps) => renderer.current?.setLamps(lamps),
+      setHeads: (heads) => renderer.current?.setHeads(heads),
       setMarks: (marks) => renderer.current?.setMarks(marks),
       show: (bounds) => apply(fit(bounds, size.current, 0.15)),
-      centre: (x, y) => apply({ x, y, scale: Math.max(view.current.scale, 8) }),
+      centre: (x, y, aside = 0) => {
+        const scale = Math.max(view.current.scale, 8);
+        apply({ x: x + aside / scale, y, scale });
+      },
       pickMiddle: () =>
         onPick?.({
           x: view.current.x,

@@ -1,4 +1,5 @@
 import type { Category } from "../api/types";
+import type { Shown } from "../signals/heads";
 import type { MarkKind } from "./scene";
 
 /** Colours that requirements fix, the same in light and dark. */
@@ -93,4 +94,13 @@ export const MARK_COLOR: Record<MarkKind, string> = {
   teleported: "#5f3dc4",
   met: "#0b7285",
   unmet: "#d9480f",
+};
+
+/** What traffic lights show, the same in light and dark. */
+export const SIGNAL_COLOR: Record<Shown, string> = {
+  red: "#ff3b30",
+  yellow: "#ffc400",
+  green: "#22c55e",
+  permissive: "#22c55e",
+  off: "#8b949d",
 };

@@ -1,6 +1,7 @@
 import { CATEGORIES } from "../api/types";
 import { nth } from "../lists";
-import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette } from "./colors";
+import type { Head } from "../signals/heads";
+import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette, SIGNAL_COLOR } from "./colors";
 import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
 
@@ -16,7 +17,7 @@ const DETAIL_FROM = 6;
 
 /** Road users of a run, drawn many at once: one path per category. */
 export class MovingLayer {
-  lamps: readonly { x: number; y: number; color: string }[] = [];
+  heads: readonly Head[] = [];
   marks: readonly Mark[] = [];
 
   draw(
@@ -30,7 +31,7 @@ export class MovingLayer {
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, context.canvas.width, context.canvas.height);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.drawLamps(context, view, size);
+    for (const head of this.heads) drawHead(context, head, view, size);
     if (moving) this.drawMoving(context, view, size, palette, moving);
     for (const mark of this.marks) drawMark(context, mark, view, size);
   }
@@ -61,25 +62,6 @@ export class MovingLayer {
     }
     if (moving.ego >= 0) mark(context, moving, moving.ego, view, size, EGO);
     if (moving.followed >= 0) mark(context, moving, moving.followed, view, size, palette.ink);
-  }
-
-  private drawLamps(context: CanvasRenderingContext2D, view: View, size: Size): void {
-    const radius = Math.min(Math.max(view.scale * 1.3, 3), 11);
-    for (const { x, y, color } of this.lamps) {
-      context.beginPath();
-      context.arc(
-        (x - view.x) * view.scale + size.width / 2,
-        (view.y - y) * view.scale + size.height / 2,
-        radius,
-        0,
-        2 * Math.PI,
-      );
-      context.fillStyle = color;
-      context.fill();
-      context.lineWidth = 1.5;
-      context.strokeStyle = "#22262b";
-      context.stroke();
-    }
   }
 }
 
@@ -241,4 +223,52 @@ function drawMark(context: CanvasRenderingContext2D, mark: Mark, view: View, siz
     context.stroke();
   }
   context.restore();
+}
+
+/** Metres of a signal across its lane, and of one for pedestrians. */
+const HEAD = 2.6;
+const WALK_HEAD = 1.4;
+/** Below this many pixels per metre shapes cannot be distinguished: only dots are drawn. */
+const SHAPES_FROM = 1.6;
+
+/**
+ * A signal at its stop line: a bar across for red, two short ones for yellow, an arrowhead for green,
+ * hollow where one gives way, so that colour alone says nothing.
+ */
+function drawHead(context: CanvasRenderingContext2D, head: Head, view: View, size: Size): void {
+  const x = (head.x - view.x) * view.scale + size.width / 2;
+  const y = (view.y - head.y) * view.scale + size.height / 2;
+  if (x < -20 || y < -20 || x > size.width + 20 || y > size.height + 20) return;
+  context.save();
+  context.translate(x, y);
+  context.rotate(-head.hdg);
+  const color = SIGNAL_COLOR[head.shown];
+  const side = Math.min(Math.max(((head.walk ? WALK_HEAD : HEAD) * view.scale) / 2, 3.5), 20);
+  context.lineJoin = "round";
+  context.strokeStyle = "#1b1f24";
+  context.fillStyle = color;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  if (view.scale < SHAPES_FROM) context.arc(0, 0, 3, 0, 2 * Math.PI);
+  else shape(context, head.shown, side);
+  context.stroke();
+  if (head.shown === "permissive" && view.scale >= SHAPES_FROM) {
+    context.lineWidth = Math.max(2, side * 0.3);
+    context.strokeStyle = color;
+    context.stroke();
+  } else context.fill();
+  context.restore();
+}
+
+function shape(context: CanvasRenderingContext2D, shown: Head["shown"], side: number): void {
+  const thick = Math.max(3, side * 0.4);
+  if (shown === "green" || shown === "permissive") {
+    context.moveTo(-side * 0.5, -side);
+    context.lineTo(side * 0.9, 0);
+    context.lineTo(-side * 0.5, side);
+    context.closePath();
+  } else if (shown === "yellow") {
+    context.rect(-thick / 2, -side, thick, side * 0.75);
+    context.rect(-thick / 2, side * 0.25, thick, side * 0.75);
+  } else context.rect(-thick / 2, -side, thick, 2 * side);
 }

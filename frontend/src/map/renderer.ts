@@ -1,3 +1,4 @@
+import type { Head } from "../signals/heads";
 import { BaseLayer } from "./baseLayer";
 import { DARK, LIGHT, type Palette } from "./colors";
 import type { PackedDrawing } from "./drawing";
@@ -15,7 +16,7 @@ export interface MapRenderer {
   setView(view: View): void;
   setScene(scene: Scene): void;
   setMoving(moving: Moving | null): void;
-  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void;
+  setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
   /** Draws the whole map small, for the minimap. */
   drawOverview(canvas: HTMLCanvasElement, view: View, size: Size, pixelRatio: number, dark: boolean): void;
@@ -95,8 +96,8 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("moving");
   }
 
-  setLamps(lamps: readonly { x: number; y: number; color: string }[]): void {
-    this.moving.lamps = lamps;
+  setHeads(heads: readonly Head[]): void {
+    this.moving.heads = heads;
     this.mark("moving");
   }
 

@@ -1,5 +1,5 @@
 import { CATEGORIES, type Category } from "../api/types";
-import { CATEGORY_COLOR, EGO, MARK_COLOR } from "../map/colors";
+import { CATEGORY_COLOR, EGO, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import type { MarkKind } from "../map/scene";
 import { CategoryGlyph } from "../ui/icons";
 import { CATEGORY_WORD } from "../ui/words";
@@ -44,10 +44,8 @@ export function Legend({
       {lights && (
         <li>
           <span>
-            <Dot color="#22c55e" />
-            <Dot color="#ffc400" />
-            <Dot color="#ff3b30" />
-            Traffic light
+            <SignalShapes />
+            Traffic light: go, give way, yellow, red
           </span>
         </li>
       )}
@@ -79,17 +77,15 @@ export function Legend({
   );
 }
 
-function Dot({ color }: { color: string }) {
+/** The shapes of signals at their stop lines, as the map draws them. */
+function SignalShapes() {
+  const { green, yellow, red } = SIGNAL_COLOR;
   return (
-    <i
-      style={{
-        background: color,
-        borderRadius: "50%",
-        width: 9,
-        height: 9,
-        border: "1px solid #22262b",
-        marginRight: -4,
-      }}
-    />
+    <svg width="58" height="12" aria-hidden="true" stroke="#1b1f24" strokeWidth="1">
+      <path d="M2 1l8 5-8 5z" fill={green} />
+      <path d="M17 1.500l7 4.500-7 4.500z" fill="none" stroke={green} strokeWidth="2" />
+      <path d="M33 1h4v4h-4zM33 7h4v4h-4z" fill={yellow} />
+      <path d="M49 1h4v10h-4z" fill={red} />
+    </svg>
   );
 }

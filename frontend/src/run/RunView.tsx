@@ -1,12 +1,15 @@
 import "./run.css";
 
 import { Alert, Button, Loader, Tabs, Title } from "@mantine/core";
-import { useEffect, useMemo, useRef, useState } from "react";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
+import { signals } from "../api/signals";
 import { CameraPanel } from "../carla/CameraPanel";
-import { MapCanvas, type MapHandle } from "../map/MapCanvas";
+import { MapCanvas, type MapHandle, type Pointed } from "../map/MapCanvas";
+import { SignalPanel } from "../signals/SignalPanel";
+import { useRunLights } from "../signals/useSignals";
 import { go } from "../ui/address";
 import { CountsFit } from "./CountsFit";
 import { EarlierRuns } from "./EarlierRuns";
@@ -16,7 +19,6 @@ import type { Crowd } from "./frames";
 import { IncidentLog } from "./IncidentLog";
 import { markKind, marksAt } from "./incidents";
 import { Legend } from "./Legend";
-import { lamps } from "./lights";
 import { Live } from "./live";
 import { SafeSlices } from "./LongRun";
 import { Plots } from "./Plots";
@@ -41,7 +43,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const { info, failure, learn } = useRun(run);
   const ground = useGround(info?.map ?? null, scenario);
   const picture = usePicture(handle);
-  const { show, redraw, clear, follow, followed, now } = picture;
+  const { show, redraw, clear, follow, followed, latest, now } = picture;
   const ended = info !== null && hasEnded(info.state);
   const complete = ended && info.summary != null;
   const [crowd, setCrowd] = useState<Crowd | null>(null);
@@ -57,23 +59,27 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   const shownTab = tab ?? (ended ? "result" : "users");
 
   const { map, drawing, loaded } = ground;
-  const [lights, setLights] = useState<ReadonlyMap<string, string>>(new Map());
+  const lights = useRunLights(run, map, mode === "replay" && replayable);
+  const { learn: learnLights, drawn } = lights;
+  const [junction, setJunction] = useState<string | null>(null);
+  const shownJunction = junction ?? lights.heads?.junctions[0] ?? null;
+  // Anew at the end, when there are the calls of detectors.
+  const source = useMemo(() => ({ run, complete }), [run, complete]);
+  const loadProgram = useCallback((of: string) => signals.ofRun(source.run, of), [source]);
   useEffect(() => {
     if (mode !== "live") return;
     const live = new Live(run, {
       onFrame: show,
       onIntroduced: setCrowd,
       onIncidents: add,
-      onLights: (changed) => setLights((old) => new Map([...old, ...Object.entries(changed)])),
+      onLights: (changed) => learnLights(changed, latest()?.frame.time ?? 0),
       onState: learn,
     });
     return () => live.close();
-  }, [run, mode, show, add, learn]);
+  }, [run, mode, show, add, learn, learnLights, latest]);
   // What has come before the map is drawn with it, so that nothing is missing or flickers.
-  useEffect(() => {
-    if (map) handle.current?.setLamps(mode === "live" ? lamps(map, lights) : []);
-  }, [map, mode, lights, drawing, loaded]);
   useEffect(() => redraw(), [redraw, drawing, loaded]);
+  const { turn } = lights;
 
   // A fast run may end between two pictures: no road user stays that has arrived.
   const cleared = mode === "live" && ended && info.progress?.running === 0;
@@ -94,6 +100,17 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     [incidents, fit],
   );
   const time = mode === "replay" ? player.time : ended ? Infinity : now.time;
+  useEffect(() => {
+    handle.current?.setHeads(drawn(time));
+  }, [drawn, time, turn, drawing, loaded]);
+  const pick = (at: Pointed): void => {
+    const user = picture.near(at);
+    const light = user === null ? lights.heads?.junctionAt(at) : null;
+    if (light) {
+      setJunction(light);
+      setTab("lights");
+    } else follow(user);
+  };
   useEffect(() => {
     handle.current?.setMarks(fit ? countMarks(fit) : marksAt(incidents, time));
   }, [incidents, fit, time, drawing, loaded]);
@@ -131,7 +148,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               scene={ground.scene}
               handle={handle}
               label={mode === "replay" ? "Recording of the run" : "Live view of the run"}
-              onPick={(at) => follow(picture.near(at))}
+              onPick={pick}
             >
               {info.state === "preparing" ? (
                 <div className="map-hint" role="status">
@@ -154,7 +171,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               <Legend
                 categories={kinds}
                 ego={(known?.egos().length ?? 0) > 0}
-                lights={mode === "live" && (map?.lights.length ?? 0) > 0}
+                lights={lights.known && (map?.lights.length ?? 0) > 0}
                 lamps={mode === "live"}
                 marks={marks}
               />
@@ -176,6 +193,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               <Tabs.Tab value="incidents">
                 Incidents{incidents.length > 0 && ` (${incidents.length.toLocaleString("en")})`}
               </Tabs.Tab>
+              {shownJunction && <Tabs.Tab value="lights">Lights</Tabs.Tab>}
               <Tabs.Tab value="runs">Runs</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="result" className="run-panel">
@@ -213,6 +231,22 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                 }}
               />
             </Tabs.Panel>
+            {shownJunction && lights.heads && (
+              <Tabs.Panel value="lights" className="run-panel">
+                <SignalPanel
+                  junctions={lights.heads.junctions}
+                  junction={shownJunction}
+                  onJunction={(next) => {
+                    setJunction(next);
+                    const middle = lights.heads?.middle(next);
+                    follow(null);
+                    if (middle) handle.current?.centre(middle.x, middle.y);
+                  }}
+                  load={loadProgram}
+                  now={lights.now(shownJunction, mode === "replay" ? player.time : now.time)}
+                />
+              </Tabs.Panel>
+            )}
             <Tabs.Panel value="runs" className="run-panel">
               <EarlierRuns
                 scenario={scenario}

@@ -12,6 +12,7 @@ import { everyone, Starts } from "../../src/editor/placing";
 import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor/scene";
 import type { Pointed } from "../../src/map/MapCanvas";
 import { Picker } from "../../src/map/picking";
+import { Heads } from "../../src/signals/heads";
 import { actor, flow, graph, place, scenario } from "../example";
 
 /** Everything that a handler has asked of the editor. */
@@ -21,6 +22,7 @@ class Log {
   said: string[] = [];
   steps: Step[] = [];
   selected: (readonly string[])[] = [];
+  lights: string[] = [];
   done = 0;
 }
 
@@ -42,6 +44,8 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     selection: [],
     one: null,
     goals: null,
+    lights: null,
+    showLight: (junction) => log.lights.push(junction),
     changes: changesOf({
       ones,
       starts,
@@ -290,4 +294,36 @@ test("the same tool is known again, and only one that makes something new clears
   ];
   expect(new Set(tools.map(({ key }) => key)).size).toBe(tools.length);
   expect(tools.map(({ makes }) => makes)).toEqual([true, true, true, true, false, false]);
+});
+
+test("a click on a traffic light shows its program, unless something is placed or stands there", () => {
+  const log = new Log();
+  const { x, y } = place(FIRST);
+  const lights = new Heads([
+    {
+      id: "J1",
+      names: ["10"],
+      green: [],
+      signals: [],
+      paths: [
+        [
+          [x, y],
+          [x + 1, y],
+        ],
+      ],
+      walks: [false],
+    },
+  ]);
+  const free = editing(scenario([]), log, { lights });
+  const handler = handlerFor("traffic", null, free);
+  expect(handler.hint(handler.under(at(x, y)))).toBe(
+    "Traffic light of junction 10: click to see its program",
+  );
+  handler.pick(at(x, y));
+  expect(log.lights).toEqual(["10"]);
+  const taken = editing(scenario([car("a", FIRST)]), log, { lights });
+  handlerFor("actors", null, taken).pick(at(x, y));
+  handlerFor("actors", placeTool("car"), free).pick(at(x, y));
+  expect(log.lights).toEqual(["10"]);
+  expect(log.selected).toContainEqual(["a"]);
 });

@@ -286,6 +286,7 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
       busy={false}
       onEdit={onEdit}
       onRun={onRun}
+      onLights={vi.fn()}
       {...more}
     />,
   );
@@ -331,6 +332,7 @@ test("signals are fixed-time or actuated; a map without them asks nothing", asyn
       busy={false}
       onEdit={onEdit}
       onRun={vi.fn()}
+      onLights={vi.fn()}
     />,
   );
   expect(screen.queryByRole("radiogroup", { name: "Signal control" })).toBeNull();
@@ -366,6 +368,7 @@ test("an empty scenario, or one with errors, cannot be run and says why", () => 
       busy={false}
       onEdit={vi.fn()}
       onRun={vi.fn()}
+      onLights={vi.fn()}
     />,
   );
   expect(screen.getByRole("button", { name: "Run" })).toHaveProperty("disabled", true);

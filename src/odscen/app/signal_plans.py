@@ -24,8 +24,15 @@ if TYPE_CHECKING:
 _DAY = 86_400.0
 
 
-def lights_of(workspace: Workspace, scenario: Scenario | Path) -> tuple[LightProgram, ...]:
+def lights_of(
+    workspace: Workspace, scenario: Scenario | Path, *, whole_day: bool = False
+) -> tuple[LightProgram, ...]:
     """What each traffic light shows in a scenario.
+
+    Parameters
+    ----------
+    whole_day
+        Show all plans of the day, also those that do not begin while the scenario lasts.
 
     Raises
     ------
@@ -39,7 +46,8 @@ def lights_of(workspace: Workspace, scenario: Scenario | Path) -> tuple[LightPro
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
     refuse_errors(signal_problems(scenario.signals, loaded.lights))
-    return tuple(light.shown for light in realized_lights(scenario, loaded.sumo))
+    until = _DAY if whole_day else None
+    return tuple(light.shown for light in realized_lights(scenario, loaded.sumo, until=until))
 
 
 def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:

@@ -12,8 +12,11 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pri
 from odscen.cli.scenario_commands import ScenarioArgument
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.light_timing import TimedLight
+    from odscen.workspace.store import Workspace
 
 JunctionOption = Annotated[
     list[str] | None, typer.Option("--junction", help="Only this light; may be given again.")
@@ -33,19 +36,27 @@ app = typer.Typer(
 def show(
     scenario: ScenarioArgument,
     junction: JunctionOption = None,
+    svg: Annotated[
+        Path | None,
+        typer.Option(
+            "--svg",
+            help="Draw stages, time bars and detectors: a file for one light, else a folder.",
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show signal groups, stages and plans of the lights of a scenario."""
     from odscen.app.signal_plans import lights_of
+    from odscen.app.signal_views import chosen_lights
     from odscen.workspace.store import Workspace
 
-    lights = lights_of(Workspace.open(workspace), scenario)
-    lights = tuple(
-        one for one in lights if not junction or set(junction) & {one.id, *one.junctions}
-    )
+    space = Workspace.open(workspace)
+    lights = chosen_lights(lights_of(space, scenario), junction or ())
+    drawn = [] if svg is None else _draw(space, scenario, junction or (), svg)
     if as_json:
-        print_json({"lights": [asdict(one) for one in lights]})
+        more = {} if svg is None else {"svg": [str(path) for path in drawn]}
+        print_json({"lights": [asdict(one) for one in lights], **more})
         return
     for light in lights:
         rows = [[group.id, ", ".join(group.movements)] for group in light.groups]
@@ -57,6 +68,23 @@ def show(
                 for phase in plan.phases
             ]
             print_table(title, ["phase", "s", "green"], rows)
+    for path in drawn:
+        log(f"wrote {path}")
+
+
+def _draw(workspace: Workspace, scenario: Path, junctions: Sequence[str], out: Path) -> list[Path]:
+    """Write a sheet for each light, into ``out`` if that is a folder."""
+    from odscen.app.signal_views import signal_sheets
+    from odscen.base.text_files import write_text
+
+    sheets = signal_sheets(workspace, scenario, junctions=junctions)
+    if out.suffix.lower() == ".svg" and not out.is_dir():
+        if len(sheets) > 1:
+            msg = f"{out} is one file, but there are {len(sheets)} lights: name a folder, or one "
+            msg += "light with --junction"
+            raise typer.BadParameter(msg, param_hint="--svg")
+        return [write_text(out, *sheets.values())]
+    return [write_text(out / name, text) for name, text in sheets.items()]
 
 
 @app.command("import")

@@ -24,6 +24,7 @@ from odscen.web import (
     result_routes,
     run_routes,
     scenario_routes,
+    signal_routes,
 )
 from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
 from odscen.web.messages import Health
@@ -106,6 +107,7 @@ def create_app(
         scenario_routes,
         demand_routes,
         run_routes,
+        signal_routes,
         result_routes,
         figure_routes,
         carla_routes,

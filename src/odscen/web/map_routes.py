@@ -69,6 +69,8 @@ def show_map(name: str, shared: Shared) -> MapDetails:
             names=list(seen.names),
             green=list(seen.green),
             signals=[list(names) for names in light.signals],
+            paths=[list(link.path) for link in light.links],
+            walks=[one.walk for one in seen.movements],
         )
         for light, seen in zip(loaded.sumo.lights, loaded.lights, strict=True)
     ]

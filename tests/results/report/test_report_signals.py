@@ -13,7 +13,8 @@ from odscen.results.records.light_programs import (
     ShownPlan,
 )
 from odscen.results.report.report_signals import LightsOfRun, signal_section
-from odscen.results.report.signal_charts import program_bars, shown_bars, stage_diagram
+from odscen.results.report.signal_charts import program_bars, shown_bars
+from odscen.results.report.stage_diagrams import stage_diagram
 
 GROUPS = (
     ShownGroup(
@@ -83,6 +84,6 @@ def test_the_section_has_cards_bars_and_a_row_for_each_group() -> None:
     assert "Junction 1, actuated, program of the scenario" in text
     assert "25" in text
     assert "r2 &lt;left&gt;" in text
-    assert text.count("<tr>") == 4
+    assert text.count("<tr>") == 8  # heads and rows of three splits and of three groups
     assert "cycle 42 s, offset 5 s" in text
     assert "As shown in the run" in text

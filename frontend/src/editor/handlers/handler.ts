@@ -3,13 +3,15 @@ import type { Graph, Place } from "../../map/graph";
 import type { Pointed } from "../../map/MapCanvas";
 import type { Picker } from "../../map/picking";
 import type { SceneActor, SceneFlow } from "../../map/scene";
+import type { Heads } from "../../signals/heads";
 import type { Region } from "../asked";
 import type { Changes } from "../changes";
 import type { Starts } from "../placing";
 import type { Step } from "../scene";
 
 /** What lies under the pointer, as far as the handler in charge cares. */
-export type Hover = { is: "place"; place: Place } | { is: "segment"; row: number };
+export type Hover =
+  { is: "place"; place: Place } | { is: "segment"; row: number } | { is: "light"; junction: string };
 
 /** What the pointer does on the map now: one for each step of the editor and for each tool. */
 export interface Handler {
@@ -67,6 +69,10 @@ export interface Editing {
   /** The only one that is selected, and where it can go; null until that is known. */
   one: Actor | Flow | null;
   goals: readonly Place[] | null;
+  /** Where the map has traffic lights, once that is known. */
+  lights: Heads | null;
+  /** Shows the program of the light of a junction. */
+  showLight: (junction: string) => void;
   changes: Changes;
   select: (ids: readonly string[]) => void;
   openStep: (step: Step) => void;

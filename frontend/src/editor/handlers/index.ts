@@ -1,5 +1,6 @@
 import type { Step } from "../scene";
 import type { Editing, Handler, Tool } from "./handler";
+import { withLights } from "./lights";
 import { regionHandler } from "./region";
 import { selectHandler } from "./select";
 import { trafficHandler } from "./traffic";
@@ -10,6 +11,8 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   traffic: trafficHandler,
 };
 
-/** Who is in charge of the map. */
-export const handlerFor = (step: Step, tool: Tool | null, editing: Editing): Handler =>
-  (OF_STEP[step] ?? tool?.handler ?? selectHandler)(editing);
+/** Who is in charge of the map; lights can be asked for their programs unless places are chosen. */
+export function handlerFor(step: Step, tool: Tool | null, editing: Editing): Handler {
+  const handler = (OF_STEP[step] ?? tool?.handler ?? selectHandler)(editing);
+  return handler.aim ? handler : withLights(handler, editing);
+}

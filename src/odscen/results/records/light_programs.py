@@ -61,12 +61,20 @@ class ShownPlan:
 
 @dataclass(frozen=True, slots=True)
 class ShownDetector:
-    """A detector, and the stages that it prolongs; ``call`` if it calls them instead."""
+    """A detector, and the stages that it prolongs; ``call`` if it calls them instead.
+
+    ``place`` are points along it in driving direction, x and y in metres: its rear and front end,
+    or where people wait. ``ahead`` are metres from its front end to the stop line, ``gap`` the
+    seconds between vehicles in which a stage goes on.
+    """
 
     id: str
     name: str
     stages: tuple[str, ...]
     call: bool = False
+    place: tuple[tuple[float, float], ...] = ()
+    ahead: float = 0.0
+    gap: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +92,63 @@ class LightProgram:
     groups: tuple[ShownGroup, ...]
     plans: tuple[ShownPlan, ...]
     detectors: tuple[ShownDetector, ...] = ()
+
+
+class StageSpan(NamedTuple):
+    """A stage in the cycle of a plan; seconds.
+
+    ``begin`` and ``end`` are those of its green, and ``split`` lasts until the next stage begins.
+    ``seconds`` are planned, ``least`` and ``most`` those of a green that may vary, else 0.
+    """
+
+    id: str
+    begin: float
+    end: float
+    split: float
+    least: float
+    most: float
+    on_call: bool
+    state: str
+
+    @property
+    def seconds(self) -> float:
+        """Of green."""
+        return self.end - self.begin
+
+    def groups(self, light: LightProgram, letters: str = "Gg") -> tuple[str, ...]:
+        """Ids of the groups with a movement that shows one of these letters."""
+        return tuple(
+            group.id
+            for group in light.groups
+            if any(self.state[link] in letters for link in group.links)
+        )
+
+
+def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
+    """Stages of a plan in order, once each; their splits add up to the cycle."""
+    found: list[StageSpan] = []
+    now, last = 0.0, ""
+    for phase in plan.phases:
+        begin, now = now, now + phase.seconds
+        if not phase.stage:
+            last = ""
+            continue
+        if phase.stage == last:
+            one = found[-1]
+            held = one.seconds if phase.most > phase.least else 0.0
+            found[-1] = one._replace(end=now, least=held + phase.least, most=held + phase.most)
+            continue
+        last = phase.stage
+        found.append(
+            StageSpan(
+                phase.stage, begin, now, 0.0, phase.least, phase.most, phase.on_call, phase.state
+            )
+        )
+    begins = [one.begin for one in found[1:]] + [plan.cycle + one.begin for one in found[:1]]
+    return tuple(
+        one._replace(split=following - one.begin)
+        for one, following in zip(found, begins, strict=True)
+    )
 
 
 def programs_to_json(programs: tuple[LightProgram, ...]) -> str:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 def html_page(title: str, body: Markup) -> str:
     """Whole page with our style and script around ``body``; it forbids itself everything else."""
-    style, script = _text("assets", "report.css"), _text("assets", "report.js")
+    style = _text("assets", "report.css") + _text("assets", "signals.css")
+    script = _text("assets", "report.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _filled(
         "page", title=title, body=body, digest=digest, style=Markup(style), script=Markup(script)

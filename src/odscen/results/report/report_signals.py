@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from odscen.base.markup import Markup, element, join, number
 from odscen.results.measures.figure import ReportSection
 from odscen.results.report.page_templates import html_table, report_section
-from odscen.results.report.plots import legend
 from odscen.results.report.report_figures import card_grid, figure_cards
-from odscen.results.report.signal_charts import (
-    bar_chart,
-    program_bars,
-    shown_bars,
-    stage_diagram,
-)
+from odscen.results.report.signal_charts import bar_chart, plan_chart, shown_bars
+from odscen.results.report.signal_sheet import legend_picture, legend_shapes
+from odscen.results.report.signal_tables import detector_table, split_table
+from odscen.results.report.stage_diagrams import JunctionPictures, stage_diagram
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import polars as pl
 
+    from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.records.light_programs import LightProgram, ShownPlan
 
 SHOWN = 8
@@ -28,12 +26,6 @@ SHOWN = 8
 
 STRETCH = 300.0
 """Seconds of the run of which the signal states are drawn, at most."""
-
-_LEGEND = (
-    ("c-green", "green"),
-    ("c-permissive", "green that gives way"),
-    ("c-yellow", "yellow"),
-)
 
 
 class LightsOfRun(NamedTuple):
@@ -48,24 +40,36 @@ class LightsOfRun(NamedTuple):
     use: pl.DataFrame
 
 
-def signal_section(lights: LightsOfRun, values: Mapping[str, Any]) -> Markup | None:
-    """Cards over all lights; for each that is shown its stages, its time bars and its groups."""
+def signal_section(
+    lights: LightsOfRun, values: Mapping[str, Any], *, drawing: MapDrawing | None = None
+) -> Markup | None:
+    """Cards over all lights; for each that is shown its stages, its time bars and its groups.
+
+    Parameters
+    ----------
+    drawing
+        Of the map, for the shapes of junctions.
+    """
     if not lights.programs:
         return None
     chosen = _chosen(lights)
-    parts = [_light(light, lights) for light in chosen]
+    parts = [
+        _light(light, lights, JunctionPictures(light, drawing, ident=f"ground-{place}"))
+        for place, light in enumerate(chosen)
+    ]
     rest = len(lights.programs) - len(chosen)
     more = f"{rest} more lights are in figures/signals.csv." if rest else ""
     explained = (
-        "a stage is what has green together; movements that give way are thin and dashed. The bars "
-        "show green and yellow of each signal group in a cycle as planned, and below as shown in "
-        "the run. A cycle failure is a green that did not clear the queue it began with; many of "
-        "them call for more green. Unused green is what other groups could have had."
+        "a stage is what has green together; movements that give way are thin and dashed. Its "
+        "split is its green and what follows until the next stage begins. The bars show green and "
+        "yellow of each signal group in a cycle as planned, and below as shown in the run. A cycle "
+        "failure is a green that did not clear the queue it began with; many of them call for more "
+        "green. Unused green is what other groups could have had."
     )
     return report_section(
         "Traffic lights",
         card_grid(figure_cards(ReportSection.SIGNALS, values)),
-        legend(_LEGEND),
+        signal_legend(),
         *parts,
         element("p", more) if more else None,
         explained=explained,
@@ -84,17 +88,24 @@ def _chosen(lights: LightsOfRun) -> list[LightProgram]:
     return [light for _, light in ranked[:SHOWN]]
 
 
-def _light(light: LightProgram, lights: LightsOfRun) -> Markup:
+def signal_legend() -> Markup:
+    """What the shapes and colours of all pictures of signal programs mean."""
+    items = [element("span", legend_picture(shape), words) for shape, words in legend_shapes()]
+    return element("div", *items, class_="legend signals")
+
+
+def _light(light: LightProgram, lights: LightsOfRun, pictures: JunctionPictures) -> Markup:
     several = len(light.plans) > 1
-    plans = [_plan(light, plan, named=several) for plan in light.plans]
-    return join(
-        [
-            element("h3", f"Junction {', '.join(light.junctions)}, {_control(light)}"),
-            *plans,
-            _as_shown(light, lights.states),
-            _groups(light, lights.use),
-        ]
-    )
+    site = pictures.site()
+    parts = [
+        element("h3", f"Junction {', '.join(light.junctions)}, {_control(light)}"),
+        pictures.ground(),
+        element("div", site, detector_table(light), class_="site-box"),
+        *(_plan(light, plan, pictures, named=several) for plan in light.plans),
+        _as_shown(light, lights.states),
+        _groups(light, lights.use),
+    ]
+    return join([part for part in parts if part])
 
 
 def _control(light: LightProgram) -> str:
@@ -102,18 +113,14 @@ def _control(light: LightProgram) -> str:
     return f"{words}, {'program of the scenario' if light.own else 'program of the map'}"
 
 
-def _plan(light: LightProgram, plan: ShownPlan, *, named: bool) -> Markup:
-    rows = [(group.id, program_bars(plan, group.links)) for group in light.groups]
+def _plan(
+    light: LightProgram, plan: ShownPlan, pictures: JunctionPictures, *, named: bool
+) -> Markup:
     words = f"cycle {number(plan.cycle)} s, offset {number(plan.offset)} s"
     head = element("p", element("b", f"Plan {plan.id}: "), words) if named else None
-    chart = bar_chart(
-        rows,
-        begin=0.0,
-        end=plan.cycle,
-        axis=f"seconds of the cycle; {words}",
-        description=f"Signal timing plan of junction {light.junctions[0]}",
-    )
-    return join([part for part in (head, stage_diagram(light, plan), chart) if part])
+    chart = element("div", plan_chart(light, plan), class_="chart-box")
+    parts = (head, stage_diagram(light, plan, pictures), chart, split_table(light, plan))
+    return join([part for part in parts if part])
 
 
 def _as_shown(light: LightProgram, states: pl.DataFrame) -> Markup:
@@ -136,7 +143,8 @@ def _as_shown(light: LightProgram, states: pl.DataFrame) -> Markup:
         description=f"Signal states of junction {light.junctions[0]} in the run",
         marks=[start for start in starts if begin < start < end],
     )
-    return join([element("p", element("b", "As shown in the run")), chart])
+    head = element("p", element("b", "As shown in the run"))
+    return join([head, element("div", chart, class_="chart-box")])
 
 
 def _first_stage(light: LightProgram) -> str:

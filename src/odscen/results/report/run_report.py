@@ -116,7 +116,7 @@ def render_report(
         incident_section(incidents),
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
         corridor_section(corridor) if corridor is not None else None,
-        signal_section(lights, given) if lights is not None else None,
+        signal_section(lights, given, drawing=drawing) if lights is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
         conflict_section(conflicts) if conflicts is not None else None,

@@ -1,4 +1,4 @@
-"""Signal programs as pictures: a diagram of stages, and bars of what each group shows when."""
+"""Time bars of signal programs: what each group shows when, and the stages above."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ from odscen.base.markup import Markup, element, number
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from odscen.results.records.light_programs import LightProgram, ProgramPhase, ShownPlan
+    from odscen.results.records.light_programs import LightProgram, ShownPlan
 
-SIDE = 132.0
-"""Pixels of the picture of a stage."""
+WIDTH = 760.0
+"""Pixels of a chart in a report."""
 
-_MARGIN = 12.0
-_LABEL, _ROW, _BAR, _WIDTH, _AXIS = 92.0, 17.0, 11.0, 760.0, 22.0
+_ROW, _BAR, _AXIS, _RIGHT = 17.0, 11.0, 22.0, 10.0
+_LETTER = 7.6
+"""Pixels of a letter of a name, on average."""
+_HEAD = 26.0
+"""Pixels of the row of stages."""
 _LETTERS = {"G": "green", "g": "permissive", "y": "yellow"}
+_HALF = {"green": _BAR / 2.0, "permissive": _BAR / 4.0, "yellow": _BAR / 2.0}
+"""Half of the height of a bar, pixels."""
+_BETWEEN = {"yellow": "yellow", "all-red": "all red", "between": "between stages"}
 _TICKS = (5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _MOST_TICKS = 14
 
@@ -28,116 +34,6 @@ class TimeBar(NamedTuple):
     begin: float
     end: float
     shown: str
-
-
-def stage_diagram(light: LightProgram, plan: ShownPlan) -> Markup | None:
-    """One small picture per stage: who has green, and who of them gives way.
-
-    Returns
-    -------
-    ``None`` if the ways of the movements are not known.
-    """
-    points = [p for group in light.groups for path in group.paths for p in path]
-    if not points:
-        return None
-    frame = _Frame.around(points)
-    stages = [phase for phase in _stages(plan) if phase.stage]
-    return element("div", *(_stage(light, phase, frame) for phase in stages), class_="stages")
-
-
-def _stages(plan: ShownPlan) -> Iterator[ProgramPhase]:
-    """Stages once each; their seconds together where one is in two phases."""
-    last: ProgramPhase | None = None
-    for phase in plan.phases:
-        if not phase.stage:
-            continue
-        if last is not None and last.stage == phase.stage:
-            free = last.seconds if phase.most > phase.least else 0.0
-            last = phase._replace(
-                seconds=last.seconds + phase.seconds,
-                least=free + phase.least,
-                most=free + phase.most,
-            )
-            continue
-        if last is not None:
-            yield last
-        last = phase
-    if last is not None:
-        yield last
-
-
-class _Frame(NamedTuple):
-    """From metres to pixels of a stage's picture."""
-
-    x0: float
-    y1: float
-    scale: float
-
-    @classmethod
-    def around(cls, points: Sequence[tuple[float, float]]) -> _Frame:
-        xs, ys = [x for x, _ in points], [y for _, y in points]
-        span = max(max(xs) - min(xs), max(ys) - min(ys), 1.0)
-        scale = (SIDE - 2 * _MARGIN) / span
-        x0 = (min(xs) + max(xs)) / 2.0 - SIDE / 2.0 / scale
-        y1 = (min(ys) + max(ys)) / 2.0 + SIDE / 2.0 / scale
-        return cls(x0, y1, scale)
-
-    def path(self, points: Sequence[tuple[float, float]]) -> str:
-        return "M" + " L".join(
-            f"{number((x - self.x0) * self.scale, 1)} {number((self.y1 - y) * self.scale, 1)}"
-            for x, y in points
-        )
-
-
-def _stage(light: LightProgram, phase: ProgramPhase, frame: _Frame) -> Markup:
-    lines: list[Markup] = []
-    heads: list[Markup] = []
-    names = []
-    for group in light.groups:
-        shown = {phase.state[n] for n in group.links} & {"G", "g"}
-        if shown:
-            names.append(group.id)
-        for link, path in zip(group.links, group.paths, strict=True):
-            kind = _LETTERS.get(phase.state[link], "red")
-            style = f"movement {kind}" + (" walk" if group.walk else "")
-            line = element("path", d=frame.path(path), class_=style)
-            if kind == "red":
-                lines.insert(0, line)
-            else:
-                lines.append(line)
-                if not group.walk and len(path) > 1:
-                    heads.append(_head(path, frame, kind))
-    words = f"stage {phase.stage}: {number(phase.seconds, 1)} s"
-    if phase.most > phase.least:
-        words = f"stage {phase.stage}: {number(phase.least, 1)} to {number(phase.most, 1)} s"
-    picture = element(
-        "svg",
-        element("title", f"{words}; green: {', '.join(names)}"),
-        *lines,
-        *heads,
-        viewBox=f"0 0 {number(SIDE)} {number(SIDE)}",
-        width=SIDE,
-        height=SIDE,
-        role="img",
-    )
-    call = " on call" if phase.on_call else ""
-    return element(
-        "figure",
-        picture,
-        element("figcaption", element("b", words), element("span", f"{' '.join(names)}{call}")),
-    )
-
-
-def _head(path: Sequence[tuple[float, float]], frame: _Frame, kind: str) -> Markup:
-    """Triangle at the end of a movement."""
-    (x0, y0), (x1, y1) = path[-2:]
-    length = max(((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5, 1e-9)
-    ux, uy = (x1 - x0) / length, (y1 - y0) / length
-    size = 7.0 / frame.scale
-    tip = (x1 + ux * size * 0.6, y1 + uy * size * 0.6)
-    left = (x1 - ux * size * 0.6 - uy * size * 0.5, y1 - uy * size * 0.6 + ux * size * 0.5)
-    right = (x1 - ux * size * 0.6 + uy * size * 0.5, y1 - uy * size * 0.6 - ux * size * 0.5)
-    return element("path", d=f"{frame.path([tip, left, right])} Z", class_=f"head {kind}")
 
 
 def program_bars(plan: ShownPlan, links: Sequence[int]) -> list[TimeBar]:
@@ -164,6 +60,92 @@ def shown_bars(rows: Sequence[tuple[float, str]], links: Sequence[int]) -> list[
     return bars
 
 
+class PhaseSpan(NamedTuple):
+    """A stretch of the cycle: ``stage`` with its id, ``yellow``, ``all-red`` or ``between``."""
+
+    begin: float
+    end: float
+    kind: str
+    stage: str = ""
+
+
+def phase_spans(plan: ShownPlan) -> list[PhaseSpan]:
+    """Stages of a plan and what lies between them, in order; together they are the cycle.
+
+    Yellow is what shows yellow to a group, all-red what shows green to none, and the rest between
+    stages is for pedestrian clearance and groups that begin before the others.
+    """
+    found: list[PhaseSpan] = []
+    now = 0.0
+    for phase in plan.phases:
+        begin, now = now, now + phase.seconds
+        kind = "between"
+        if phase.stage:
+            kind = "stage"
+        elif "y" in phase.state:
+            kind = "yellow"
+        elif not set(phase.state) & {"G", "g"}:
+            kind = "all-red"
+        if found and (found[-1].kind, found[-1].stage) == (kind, phase.stage):
+            found[-1] = found[-1]._replace(end=now)
+        else:
+            found.append(PhaseSpan(begin, now, kind, phase.stage))
+    return found
+
+
+class BarScale(NamedTuple):
+    """Seconds that a chart shows, and where: its width, its left margin, pixels of a second."""
+
+    begin: float
+    end: float
+    left: float
+    pixels: float
+    width: float
+
+    @classmethod
+    def of(
+        cls, names: Sequence[str], *, begin: float, end: float, width: float = WIDTH
+    ) -> BarScale:
+        """Scale of a chart with rows of these names."""
+        longest = max(map(len, (*names, "Stage")))
+        left = min(max(_LETTER * longest + 14.0, 40.0), 0.25 * width)
+        return cls(begin, end, left, (width - left - _RIGHT) / max(end - begin, 1e-9), width)
+
+    def x(self, second: float) -> float:
+        """Pixels of a second, which may be before the begin or after the end."""
+        return self.left + (min(max(second, self.begin), self.end) - self.begin) * self.pixels
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Where the bars begin and end, as shares of the width."""
+        return self.left / self.width, (self.width - _RIGHT) / self.width
+
+
+def plan_chart(light: LightProgram, plan: ShownPlan, *, width: float = WIDTH) -> Markup:
+    """Signal timing plan: the stages of a cycle, and below what each group shows."""
+    words = f"cycle {number(plan.cycle)} s, offset {number(plan.offset)} s"
+    return bar_chart(
+        [(group.id, program_bars(plan, group.links)) for group in light.groups],
+        begin=0.0,
+        end=plan.cycle,
+        axis=f"seconds of the cycle; {words}",
+        description=f"Signal timing plan of junction {light.junctions[0]}: {words}",
+        spans=phase_spans(plan),
+        width=width,
+    )
+
+
+def plan_height(light: LightProgram) -> float:
+    """Pixels of :func:`plan_chart`."""
+    return _HEAD + _ROW * len(light.groups) + 2.0 + _AXIS + 12.0
+
+
+def plan_scale(light: LightProgram, plan: ShownPlan, *, width: float = WIDTH) -> BarScale:
+    """Scale of :func:`plan_chart`."""
+    names = [group.id for group in light.groups]
+    return BarScale.of(names, begin=0.0, end=plan.cycle, width=width)
+
+
 def bar_chart(
     rows: Sequence[tuple[str, Sequence[TimeBar]]],
     *,
@@ -172,8 +154,13 @@ def bar_chart(
     axis: str,
     description: str,
     marks: Sequence[float] = (),
+    spans: Sequence[PhaseSpan] = (),
+    width: float = WIDTH,
 ) -> Markup:
     """Bars of green and yellow, one row for each group; a thin line where it is red.
+
+    Green that gives way is lower than green, and yellow runs out to a point, so that no one has to
+    tell colours apart.
 
     Parameters
     ----------
@@ -185,69 +172,94 @@ def bar_chart(
         What the seconds are.
     marks
         Seconds at which a dashed line is drawn: a cycle begins.
+    spans
+        Stages of a cycle, drawn above the bars.
+    width
+        Pixels.
     """
-    scale = _Scale(begin, end, (_WIDTH - _LABEL - 10.0) / max(end - begin, 1e-9))
-    bottom = _ROW * len(rows) + 2.0
-    parts: list[Markup] = [element("title", description), *_ticks(scale, bottom)]
+    scale = BarScale.of([name for name, _ in rows], begin=begin, end=end, width=width)
+    top = _HEAD if spans else 0.0
+    bottom = top + _ROW * len(rows) + 2.0
+    parts: list[Markup] = [element("title", description), *_ticks(scale, top, bottom)]
+    parts += _span_row(scale, spans)
     for row, (name, bars) in enumerate(rows):
-        parts += _group_row(scale, name, bars, _ROW * row + _ROW / 2.0 + 1.0)
+        parts += _group_row(scale, name, bars, top + _ROW * row + _ROW / 2.0 + 1.0)
     for mark in marks:
         at = number(scale.x(mark), 1)
         parts.append(element("line", x1=at, x2=at, y1=0, y2=number(bottom), class_="mark"))
     height = bottom + _AXIS + 12.0
-    place = {"x": number(_WIDTH - 10.0), "y": number(height - 4.0)}
+    place = {"x": number(width - _RIGHT), "y": number(height - 4.0)}
     parts.append(element("text", axis, **place, class_="name", text_anchor="end"))
-    picture = element(
+    return element(
         "svg",
         *parts,
-        viewBox=f"0 0 {number(_WIDTH)} {number(height)}",
+        viewBox=f"0 0 {number(width)} {number(height)}",
         role="img",
         class_="chart bars",
     )
-    return element("div", picture, class_="chart-box")
 
 
-class _Scale(NamedTuple):
-    """Seconds that are shown, and pixels of one of them."""
-
-    begin: float
-    end: float
-    pixels: float
-
-    def x(self, second: float) -> float:
-        return _LABEL + (min(max(second, self.begin), self.end) - self.begin) * self.pixels
-
-
-def _ticks(scale: _Scale, bottom: float) -> Iterator[Markup]:
+def _ticks(scale: BarScale, top: float, bottom: float) -> Iterator[Markup]:
     span = scale.end - scale.begin
-    step = next((one for one in _TICKS if span / one <= _MOST_TICKS), 1200.0)
+    most = min(_MOST_TICKS, int((scale.width - scale.left) / 40.0))
+    step = next((one for one in _TICKS if span / one <= most), 1200.0)
     tick = -(-scale.begin // step) * step
     while tick <= scale.end + 1e-9:
         at = number(scale.x(tick), 1)
-        yield element("line", x1=at, x2=at, y1=0, y2=number(bottom), class_="grid")
+        yield element("line", x1=at, x2=at, y1=number(top), y2=number(bottom), class_="grid")
         place = {"x": at, "y": number(bottom + 14.0)}
         yield element("text", number(tick), **place, text_anchor="middle")
         tick += step
 
 
+def _span_row(scale: BarScale, spans: Sequence[PhaseSpan]) -> Iterator[Markup]:
+    """Stages with their seconds where there is room, else with their ids."""
+    if spans:
+        yield _name(scale, "Stage", 15.0)
+    for span in spans:
+        left, wide = scale.x(span.begin), scale.x(span.end) - scale.x(span.begin)
+        seconds = f"{number(span.end - span.begin, 1)} s"
+        what = f"stage {span.stage}" if span.stage else _BETWEEN[span.kind]
+        style = "span" if span.stage else f"span {span.kind}"
+        place = {"x": number(left, 1), "width": number(max(wide, 0.5), 1)}
+        title = element("title", f"{what}: {seconds} from {number(span.begin, 1)} s")
+        yield element("rect", title, **place, y=2, height=18, class_=style)
+        words = next(
+            (
+                one
+                for one in (f"{span.stage}: {seconds}", span.stage)
+                if span.stage and _LETTER * len(one) < wide
+            ),
+            None,
+        )
+        if words:
+            at = number(left + wide / 2.0, 1)
+            yield element("text", words, x=at, y=15, text_anchor="middle", class_="in")
+
+
+def _name(scale: BarScale, name: str, y: float) -> Markup:
+    room = int((scale.left - 12.0) / _LETTER)
+    short = name if len(name) <= room + 1 else f"{name[:room]}…"
+    title = element("title", name) if short != name else None
+    place = {"x": number(scale.left - 8.0), "y": number(y)}
+    return element("text", title, short, **place, text_anchor="end")
+
+
 def _group_row(
-    scale: _Scale, name: str, bars: Sequence[TimeBar], middle: float
+    scale: BarScale, name: str, bars: Sequence[TimeBar], middle: float
 ) -> Iterator[Markup]:
-    place = {"x": number(_LABEL - 8.0), "y": number(middle + 4.0)}
-    yield element("text", name, **place, text_anchor="end")
-    ends = {"x1": number(_LABEL), "x2": number(scale.x(scale.end), 1)}
+    yield _name(scale, name, middle + 4.0)
+    ends = {"x1": number(scale.left), "x2": number(scale.x(scale.end), 1)}
     yield element("line", **ends, y1=number(middle), y2=number(middle), class_="red")
     for bar in bars:
         if bar.end <= scale.begin or bar.begin >= scale.end:
             continue
-        left, right = scale.x(bar.begin), scale.x(bar.end)
+        left, right = scale.x(bar.begin), max(scale.x(bar.end), scale.x(bar.begin) + 0.5)
         words = f"{bar.shown} {number(bar.end - bar.begin, 1)} s from {number(bar.begin, 1)} s"
-        yield element(
-            "rect",
-            element("title", f"{name}: {words}"),
-            x=number(left, 1),
-            y=number(middle - _BAR / 2.0),
-            width=number(max(right - left, 0.5), 1),
-            height=number(_BAR),
-            class_=f"bar {bar.shown}",
-        )
+        title = element("title", f"{name}: {words}")
+        half = _HALF[bar.shown]
+        corners = [(left, -half), (right, -half), (right, half), (left, half)]
+        if bar.shown == "yellow":
+            corners = [(left, -half), (right, -1.0), (right, 1.0), (left, half)]
+        points = " ".join(f"{number(x, 1)},{number(middle + y, 1)}" for x, y in corners)
+        yield element("polygon", title, points=points, class_=f"bar {bar.shown}")

@@ -15,7 +15,6 @@ from odscen.convert.model.net import STAGE
 from odscen.results.records.light_programs import (
     LightProgram,
     ProgramPhase,
-    ShownDetector,
     ShownGroup,
     ShownPlan,
 )
@@ -33,7 +32,7 @@ from odscen.sumo.realize.light_detectors import (
     vehicle_loops,
     waiting_places,
 )
-from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.light_views import scenario_lights, shown_detectors
 from odscen.sumo.realize.stage_phases import (
     PhasePlan,
     SumoPhase,
@@ -140,6 +139,7 @@ class _Realizing:
         self._view = view
         self._timing = timing
         self._control = control
+        self._map = sumo_map
         self._net = sumo_map.net
 
     def kept(self) -> RealizedLight:
@@ -330,12 +330,8 @@ class _Realizing:
         *,
         own: bool,
     ) -> LightProgram:
-        detectors = tuple(
-            ShownDetector(loop.id, loop.name, loop.stages, loop.walk)
-            for loop in loops
-            if loop.stages
-        )
         light = self._light
+        detectors = shown_detectors(loops, light, self._map)
         return LightProgram(
             light.id, self._view.names, self._control, own, groups, plans, detectors
         )

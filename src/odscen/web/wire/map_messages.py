@@ -123,14 +123,18 @@ class SemanticsInfo(Answer):
 class LightInfo(Answer):
     """A traffic light: its SUMO id, by which live states are reported, and what scenarios call it.
 
-    ``green`` are the seconds of each stage in the map's program. ``signals`` has, for each letter
-    of its state, the OpenDRIVE signals that show it.
+    ``green`` are the seconds of each stage in the map's program. For each letter of its state,
+    ``signals`` has the OpenDRIVE signals that show it, and ``paths`` some points of the movement
+    that it is for, the first one at the stop line; none if the network has no such movement.
+    ``walks`` says which letters are for crossings.
     """
 
     id: str
     names: list[str]
     green: list[float]
     signals: list[list[str]]
+    paths: list[list[Point]]
+    walks: list[bool]
 
 
 class MapDetails(MapInfo):

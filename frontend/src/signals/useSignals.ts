@@ -1,0 +1,68 @@
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+
+import { signals } from "../api/signals";
+import type { MapDetails } from "../api/types";
+import { changed, ShownSignal, type SignalNow } from "./cursor";
+import { type Head, Heads } from "./heads";
+
+export interface RunLights {
+  heads: Heads | null;
+  /** What is shown at a time, at all stop lines. */
+  drawn: (time: number) => Head[];
+  /** What the light of a junction shows. */
+  now: (junction: string, time: number) => SignalNow | null;
+  /** Takes in what has changed in a live run. */
+  learn: (lights: Record<string, string>, time: number) => void;
+  /** Counts what was learned, for those who draw. */
+  turn: number;
+  /** Whether there is anything to show. */
+  known: boolean;
+}
+
+/** States of all lights of a run: as they come, or as they were logged. */
+export function useRunLights(run: string, map: MapDetails | null, recorded: boolean): RunLights {
+  const heads = useMemo(() => map && new Heads(map.lights), [map]);
+  const live = useRef(new Map<string, SignalNow>());
+  const [logged, setLogged] = useState<ReadonlyMap<string, ShownSignal> | null>(null);
+  const [turn, setTurn] = useState(0);
+  useEffect(() => {
+    if (!recorded) return;
+    let current = true;
+    signals.shown(run).then(
+      ({ lights }) => {
+        if (current) setLogged(new Map(lights.map((one) => [one.light, new ShownSignal(one)])));
+      },
+      // A run of before has no log: the recording is shown without lights.
+      () => undefined,
+    );
+    return () => {
+      current = false;
+    };
+  }, [run, recorded]);
+  const learn = useCallback((lights: Record<string, string>, time: number) => {
+    for (const [light, state] of Object.entries(lights))
+      live.current.set(light, changed(live.current.get(light), state, time));
+    setTurn((n) => n + 1);
+  }, []);
+  const nowOf = useCallback(
+    (light: string, time: number): SignalNow | null => {
+      if (recorded) return logged?.get(light)?.at(time) ?? null;
+      const one = live.current.get(light);
+      return one ? { ...one, time } : null;
+    },
+    [recorded, logged],
+  );
+  const drawn = useCallback(
+    (time: number): Head[] => heads?.at((light) => nowOf(light, time)?.state) ?? [],
+    [heads, nowOf],
+  );
+  const now = useCallback(
+    (junction: string, time: number): SignalNow | null => {
+      const light = map?.lights.find(({ names }) => names.includes(junction));
+      return light ? nowOf(light.id, time) : null;
+    },
+    [map, nowOf],
+  );
+  const known = recorded ? (logged?.size ?? 0) > 0 : turn > 0;
+  return useMemo(() => ({ heads, drawn, now, learn, turn, known }), [heads, drawn, now, learn, turn, known]);
+}

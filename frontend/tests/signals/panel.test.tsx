@@ -1,0 +1,85 @@
+// @vitest-environment happy-dom
+import { screen, within } from "@testing-library/react";
+import { expect, test, vi } from "vitest";
+
+import { occupancy, SignalPanel } from "../../src/signals/SignalPanel";
+import type { LightProgram } from "../../src/api/signals";
+import type { SignalNow } from "../../src/signals/cursor";
+import { rowsOf, show } from "../page";
+import { detector, plan, program } from "./program";
+
+const panel = (light: LightProgram, more: { now?: SignalNow; onClose?: () => void } = {}) => {
+  const load = () => Promise.resolve(light);
+  return <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} {...more} />;
+};
+
+test("a program says whose it is, and its cycle, offset and splits", async () => {
+  show(panel(program()));
+  expect(await screen.findByText("the engineer’s, in this scenario")).toBeTruthy();
+  const facts = screen.getAllByRole("definition").map((one) => one.textContent);
+  expect(facts.slice(0, 3)).toEqual(["fixed-time", "40 s", "5 s"]);
+  expect(rowsOf(screen.getByRole("table", { name: "Splits" }))).toEqual([
+    ["1", "15 s", "20 s", "50 %", "K1"],
+    ["2", "5 to 25 s", "20 s", "50 %", "–"],
+  ]);
+  expect(screen.getByText("K2, on call")).toBeTruthy();
+  expect(screen.queryByText(/^Now/)).toBeNull();
+});
+
+test("in a run the stage that is shown is marked, in words and for screen readers", async () => {
+  const now: SignalNow = { time: 107, state: "gr", since: 100, before: "rr", plan: "day" };
+  const load = vi.fn(() => Promise.resolve(program()));
+  const part = (at: SignalNow) => (
+    <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} now={at} />
+  );
+  const { again } = show(part(now));
+  const stage = (await screen.findByText("stage 1: 15 s")).closest("li");
+  expect(stage?.getAttribute("aria-current")).toBe("step");
+  expect(stage?.textContent).toContain("now");
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: stage 1, for 7 s");
+  again(part({ ...now, time: 116, state: "yr", since: 115, before: "gr" }));
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: yellow, for 1 s");
+  expect(document.querySelector("[aria-current]")).toBeNull();
+  expect(load).toHaveBeenCalledTimes(1);
+});
+
+test("plans of the day can be looked at one by one; the one that runs is shown first", async () => {
+  const evening = { ...plan, id: "evening", cycle: 60, times: [18.5 * 3600] };
+  const now: SignalNow = { time: 1, state: "gr", since: null, before: null, plan: "evening" };
+  const { user } = show(panel(program({ plans: [plan, evening] }), { now }));
+  const choice = await screen.findByRole("textbox", { name: "Plan of the day" });
+  expect(choice).toHaveProperty("value", "evening, from 18:30 (runs now)");
+  await user.click(choice);
+  await user.click(screen.getByRole("option", { name: "day, from 06:00" }));
+  expect(screen.getAllByRole("definition")[1]?.textContent).toBe("40 s");
+  expect(document.querySelector("[aria-current]")).toBeNull();
+});
+
+test("detectors are listed with place and purpose, and with occupancy where calls were logged", async () => {
+  const calls: [number, number][] = [[90, 96]];
+  const detectors = [
+    detector("J1.D1.0", { calls }),
+    detector("J1.D1.1"),
+    detector("J1.call.0", { label: "C0", call: true, stages: ["2"] }),
+  ];
+  const now: SignalNow = { time: 100, state: "gr", since: null, before: null, plan: "day" };
+  show(panel(program({ control: "actuated", detectors }), { now }));
+  expect(rowsOf(await screen.findByRole("table", { name: "Detectors" }))).toEqual([
+    ["D1", "30 m before the stop line, 2 lanes", "prolongs stage 1", "free, 5 % of the last minute"],
+    ["C0", "where people wait", "calls stage 2", "free, 0 % of the last minute"],
+  ]);
+  expect(occupancy([detector("J1.D1.0", { calls })], 92)).toBe("occupied, 3 % of the last minute");
+});
+
+test("what the server refuses is said, and Escape closes", async () => {
+  const onClose = vi.fn();
+  const load = () => Promise.reject(new Error("intergreen of 3 s is too short"));
+  const { user } = show(
+    <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} onClose={onClose} />,
+  );
+  const region = screen.getByRole("region", { name: "Traffic light of junction 10" });
+  expect(await within(region).findByText("intergreen of 3 s is too short")).toBeTruthy();
+  expect(document.activeElement).toBe(region);
+  await user.keyboard("{Escape}");
+  expect(onClose).toHaveBeenCalledTimes(1);
+});

@@ -1,0 +1,98 @@
+"""Signal programs to be looked at: of a scenario or of a run, with the shape of the junction."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Literal
+
+from odscen.app.maps import map_of
+from odscen.app.scenarios import given_scenario
+from odscen.app.signal_plans import lights_of
+from odscen.base.errors import InputError, NotFoundError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from odscen.convert.model.conversion_settings import ConverterName
+    from odscen.results.records.light_programs import LightProgram
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.document.signals_document import Signals
+    from odscen.workspace.store import Workspace
+
+ProgramOrigin = Literal["scenario", "retimed", "odscen", "netconvert", "file"]
+"""Whose a program is: the scenario's own; stages of the map with times, control or priority of the
+scenario; or what a converter made, or the network that was brought in has."""
+
+
+def program_origin(
+    light: LightProgram, signals: Signals, converter: ConverterName
+) -> ProgramOrigin:
+    """Whose the program of a light is, in a scenario with these signals."""
+    if light.own:
+        return "scenario"
+    timing = next((one for one in signals.junctions if one.junction in light.junctions), None)
+    priority = signals.bus_priority if timing is None else bool(timing.bus_priority)
+    changed = timing is not None and (bool(timing.green) or timing.offset != 0.0)
+    if changed or priority or light.control != "fixed":
+        return "retimed"
+    return converter
+
+
+def chosen_lights(
+    lights: Iterable[LightProgram], junctions: Sequence[str]
+) -> tuple[LightProgram, ...]:
+    """Lights by junction or by SUMO's id; all without any names.
+
+    Raises
+    ------
+    NotFoundError
+        If one of the names is of no light.
+    """
+    known = tuple(lights)
+    named = {name: one for one in known for name in (one.id, *one.junctions)}
+    for junction in junctions:
+        if junction not in named:
+            what = "traffic light in junction"
+            raise NotFoundError(what, junction, [one.junctions[0] for one in known])
+    chosen = {named[junction].id for junction in junctions}
+    return tuple(one for one in known if not chosen or one.id in chosen)
+
+
+def signal_sheets(
+    workspace: Workspace, scenario: Scenario | Path, *, junctions: Sequence[str] = ()
+) -> dict[str, str]:
+    """Draw what lights of a scenario are told to show, with all plans of the day.
+
+    Parameters
+    ----------
+    junctions
+        Lights, by OpenDRIVE junction or SUMO's id; all if empty.
+
+    Returns
+    -------
+    File names, made of the junctions, and SVG documents.
+
+    Raises
+    ------
+    InputError
+        If the map has no lights.
+    NotFoundError
+        If a junction has no light.
+    ScenarioError
+        With every problem of the signals.
+    """
+    from odscen.results.report.signal_sheet import signal_sheet
+
+    scenario = given_scenario(scenario)
+    drawing = map_of(workspace, scenario).drawing
+    lights = chosen_lights(lights_of(workspace, scenario, whole_day=True), junctions)
+    if not lights:
+        msg = f"map {scenario.map.name!r} has no traffic lights"
+        raise InputError(msg)
+    found: dict[str, str] = {}
+    for light in lights:
+        stem = re.sub(r"[^\w.-]", "_", light.junctions[0])
+        name = f"{stem}.svg" if f"{stem}.svg" not in found else f"{stem}-{len(found)}.svg"
+        found[name] = signal_sheet(light, drawing=drawing, title=scenario.name)
+    return found

@@ -1,0 +1,121 @@
+"""What goes over the wire about programs of traffic lights, and what they showed in a run."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from odscen.app.signal_views import ProgramOrigin
+from odscen.web.messages import Answer
+
+
+class StageInfo(Answer):
+    """A stage in the cycle of a plan; seconds.
+
+    ``split`` lasts from ``begin`` until the next stage begins; ``least`` and ``most`` are those of
+    a green that may vary, else 0. ``groups`` have green, and a movement of those in ``permissive``
+    gives way. ``picture`` is SVG.
+    """
+
+    id: str
+    begin: float
+    end: float
+    split: float
+    least: float
+    most: float
+    on_call: bool
+    groups: list[str]
+    permissive: list[str]
+    words: str
+    picture: str
+
+
+class PhaseInfo(Answer):
+    """A state for so many seconds of the cycle; ``stage`` is empty if it is none's green."""
+
+    seconds: float
+    state: str
+    name: str
+    stage: str
+
+
+class DayPlanInfo(Answer):
+    """A plan of the day; ``times`` are seconds of the day at which it begins, none if always.
+
+    ``bars`` is the time bar as SVG, in which the cycle lasts from the first to the second share of
+    the width.
+    """
+
+    id: str
+    cycle: float
+    offset: float
+    times: list[float]
+    stages: list[StageInfo]
+    phases: list[PhaseInfo]
+    bars: str
+    plot: tuple[float, float]
+
+
+class LightGroupInfo(Answer):
+    """A signal group: the letters of the light's states that are its own, and their movements."""
+
+    id: str
+    movements: list[str]
+    links: list[int]
+    walk: bool
+
+
+class DetectorInfo(Answer):
+    """A detector and what it is for; metres before the stop line, and seconds of its gap.
+
+    ``label`` names it in the pictures. ``calls`` are begin and end of the times in which it saw a
+    road user, seconds of a run; none without a run.
+    """
+
+    id: str
+    label: str
+    stages: list[str]
+    call: bool
+    ahead: float
+    gap: float
+    calls: list[tuple[float, float]]
+
+
+class PictureKey(Answer):
+    """A shape of the pictures in 24 by 14 pixels, as SVG, and what it means."""
+
+    picture: str
+    words: str
+
+
+class LightProgramInfo(Answer):
+    """What a light is told to show. ``site`` is the junction with its detectors, as SVG.
+
+    ``ground`` is what the pictures of the stages refer to: it has to be in the page with them.
+    """
+
+    id: str
+    junctions: list[str]
+    control: Literal["fixed", "actuated"]
+    origin: ProgramOrigin
+    groups: list[LightGroupInfo]
+    plans: list[DayPlanInfo]
+    detectors: list[DetectorInfo]
+    site: str
+    ground: str
+    legend: list[PictureKey]
+
+
+class ShownStates(Answer):
+    """What a light showed: from ``times[i]`` on ``states[shown[i]]`` of ``plans[i]``; seconds."""
+
+    light: str
+    times: list[float]
+    shown: list[int]
+    plans: list[str]
+    states: list[str]
+
+
+class RunSignals(Answer):
+    """What the lights of a finished run showed; none if the map has none."""
+
+    lights: list[ShownStates]

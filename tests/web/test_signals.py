@@ -1,0 +1,124 @@
+"""Programs of traffic lights over the wire, of scenarios and of runs."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from pydantic import TypeAdapter
+
+from odscen.app.scenarios import SUFFIX
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.scenario_document import MapReference
+from odscen.web.wire.map_messages import MapDetails
+from odscen.web.wire.signal_messages import LightProgramInfo, RunSignals
+from tests.signal_case import JUNCTION, program, scenario
+from tests.web.conftest import CROSSING, finished
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+    from odscen.workspace.store import Workspace
+
+EVENING = 18.5 * 3600.0 - 60.0
+
+
+@pytest.fixture
+def own(workspace: Workspace) -> str:
+    """Name of a scenario with the program of the guide, a minute before its evening plan."""
+    one = scenario(program(), control="actuated", clock=EVENING, until=120.0)
+    sha256 = workspace.map(CROSSING).info["sha256"]
+    one = one.model_copy(update={"map": MapReference(name=CROSSING, sha256=sha256)})
+    workspace.scenarios.mkdir(exist_ok=True)
+    (workspace.scenarios / f"own{SUFFIX}").write_text(dumps(one))
+    return "own"
+
+
+def exact(model: Any, data: Any) -> Any:
+    """The message, if it is all that the schema says and nothing else."""
+    adapter = TypeAdapter(model)
+    made = adapter.validate_json(json.dumps(data), extra="forbid")
+    assert adapter.dump_python(made, mode="json", by_alias=True) == data
+    return made
+
+
+def test_a_program_of_a_scenario_comes_with_plans_pictures_and_whose_it_is(
+    client: TestClient, own: str
+) -> None:
+    answer = client.get(f"/api/scenarios/{own}/signals/{JUNCTION}")
+    light = exact(LightProgramInfo, answer.json())
+    assert (light.id, light.junctions, light.control) == ("J10001", [JUNCTION], "actuated")
+    assert light.origin == "scenario"
+    assert [(plan.id, plan.cycle, plan.times) for plan in light.plans] == [
+        ("day", 84.0, [6 * 3600.0]), ("evening", 76.0, [18.5 * 3600.0]),
+    ]  # fmt: skip
+    stage = light.plans[0].stages[0]
+    assert (stage.words, stage.split, stage.permissive) == (
+        "stage 1: 20 s", 32.0, ["K1", "K1L", "K3", "K3L"],
+    )  # fmt: skip
+    assert 'href="#signal-ground"' in stage.picture
+    assert 'id="signal-ground"' in light.ground
+    assert {one.label for one in light.detectors} == {"D1", "C0", "C1"}
+    assert not any(one.calls for one in light.detectors)
+    assert "all red" in [key.words for key in light.legend]
+
+
+def test_whose_a_program_is_follows_from_what_the_scenario_changes(
+    client: TestClient, sampled: str, workspace: Workspace
+) -> None:
+    path = f"/api/scenarios/{sampled}/signals/{JUNCTION}"
+    assert client.get(path).json()["origin"] == "odscen"
+    file = workspace.scenarios / f"{sampled}{SUFFIX}"
+    document = json.loads(file.read_text())
+    document["signals"] = {"junctions": [{"junction": JUNCTION, "offset": 7}]}
+    file.write_text(json.dumps(document))
+    again = client.get(path).json()
+    assert (again["origin"], again["plans"][0]["offset"]) == ("retimed", 7.0)
+
+
+def test_an_unknown_light_and_a_program_that_is_refused_are_told(
+    client: TestClient, own: str, workspace: Workspace
+) -> None:
+    wrong = client.get(f"/api/scenarios/{own}/signals/99")
+    assert wrong.status_code == 404
+    assert JUNCTION in wrong.json()["error"]["message"]
+    file = workspace.scenarios / f"{own}{SUFFIX}"
+    document = json.loads(file.read_text())
+    document["signals"]["junctions"][0]["intergreens"] = [["K2", "F1", 1]]
+    file.write_text(json.dumps(document))
+    refused = client.get(f"/api/scenarios/{own}/signals/{JUNCTION}")
+    assert refused.status_code == 422
+    assert "K2" in refused.text
+
+
+def test_a_run_tells_what_its_lights_showed_and_when_detectors_were_occupied(
+    client: TestClient, own: str
+) -> None:
+    wish = {"scenario": own, "until": 100, "paused": True}
+    run = client.post("/api/runs", json=wish).json()["run"]
+    under_way = exact(LightProgramInfo, client.get(f"/api/runs/{run}/signals/{JUNCTION}").json())
+    assert [plan.id for plan in under_way.plans] == ["day", "evening"]
+    client.post(f"/api/runs/{run}/control", json={"action": "resume"})
+    assert finished(client, run)["state"] == "completed"
+    (shown,) = exact(RunSignals, client.get(f"/api/runs/{run}/signals").json()).lights
+    assert shown.light == "J10001"
+    assert len(shown.times) == len(shown.shown) == len(shown.plans)
+    assert shown.times == sorted(shown.times)
+    assert {"day", "evening"} >= set(shown.plans)
+    light = exact(LightProgramInfo, client.get(f"/api/runs/{run}/signals/{JUNCTION}").json())
+    greens = {one.state for one in light.plans[0].phases if one.stage in ("1", "2", "3")}
+    assert greens <= set(shown.states)  # stage 4 comes on call only
+    calls = [call for one in light.detectors if one.label == "D1" for call in one.calls]
+    assert calls
+    assert all(0.0 <= begin < end <= 100.0 for begin, end in calls)
+    assert client.get(f"/api/runs/{run}/signals/99").status_code == 404
+    assert client.get("/api/runs/nothing/signals").status_code == 404
+    assert client.get("/api/runs/nothing/signals/1").status_code == 404
+
+
+def test_a_map_tells_where_its_signals_are(client: TestClient) -> None:
+    (light,) = exact(MapDetails, client.get(f"/api/maps/{CROSSING}").json()).lights
+    assert len(light.paths) == len(light.walks) == len(light.signals) == 24
+    assert sum(light.walks) == 4
+    assert light.paths[0][0] == (22.0, 5.75)
