@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Literal, Self, get_args
 
-from pydantic import Field, WithJsonSchema, field_serializer, model_validator
+from pydantic import Field, field_serializer, model_validator
 
-from odscen.scenario.document.distributions import Constant, Distribution, drawn_range
+from odscen.scenario.document.distributions import (
+    Choice,
+    Constant,
+    Distribution,
+    Normal,
+    Uniform,
+    drawn_range,
+)
 from odscen.scenario.document.document_parts import Identifier, Label, Part
 from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
 
 DrivingStyle = Literal["cautious", "normal", "sporty"]
 DRIVING_STYLES: tuple[DrivingStyle, ...] = get_args(DrivingStyle)
 
-_ANY_NAME = WithJsonSchema({"type": "object"}, mode="serialization")
-"""Whoever reads a document need not know which names can be written."""
+_Written = float | Uniform | Normal | Choice
 
 
 class DriverSet(Part):
@@ -28,7 +34,7 @@ class DriverSet(Part):
 
     id: Identifier
     style: DrivingStyle = "normal"
-    parameters: Annotated[dict[Label, Distribution], _ANY_NAME] = Field(default_factory=dict)
+    parameters: dict[Label, Distribution] = Field(default_factory=dict)
     car_following: Literal["Krauss", "IDM"] = "Krauss"
 
     @model_validator(mode="after")
@@ -41,10 +47,10 @@ class DriverSet(Part):
         return self
 
     @field_serializer("parameters")
-    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, Any]:
+    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, _Written]:
         """Write a constant as the number that it is."""
         return {
-            name: one.value if isinstance(one, Constant) else one.model_dump(mode="json")
+            name: one.value if isinstance(one, Constant) else one
             for name, one in parameters.items()
         }
 
