@@ -38,8 +38,6 @@ _KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 Fingerprint = dict[str, str]
 """What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""
 
-_VERSIONS = ("odscen", "sumo")
-
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
@@ -77,21 +75,6 @@ def fingerprint(
 def _digest(value: object) -> str:
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
-
-
-def changed_inputs(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
-    """Say what is different in what two runs were made of, in words; nothing if nothing is."""
-    changes = []
-    for name in sorted(old.keys() | new.keys()):
-        before, now = old.get(name, "none"), new.get(name, "none")
-        if before == now:
-            continue
-        if name in _VERSIONS:
-            changes.append(f"{name} {before} -> {now}")
-        else:
-            part = name.removeprefix("scenario.")
-            changes.append(f"the {name}" if part == name else f"the scenario's {part}")
-    return tuple(changes)
 
 
 def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
