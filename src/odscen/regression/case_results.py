@@ -68,8 +68,10 @@ class CaseResult:
 
     Attributes
     ----------
+    map_name
+        Of the map that the scenario names; empty if it could not be read.
     entry
-        The map that it was run on; ``None`` if it was not run.
+        The map that it was run on, whose name may be another; ``None`` if it was not run.
     made_of
         What its runs were made of.
     baseline
@@ -91,6 +93,7 @@ class CaseResult:
 
     case: Case
     runs: tuple[SeedResult, ...] = ()
+    map_name: str = ""
     entry: MapEntry | None = None
     made_of: Fingerprint = field(default_factory=dict)
     baseline: Baseline | None = None
@@ -108,11 +111,6 @@ class CaseResult:
     def name(self) -> str:
         """Of the scenario."""
         return self.case.name
-
-    @property
-    def map_name(self) -> str:
-        """Of the map that it was run on; empty if it was not."""
-        return "" if self.entry is None else self.entry.name
 
     @property
     def status(self) -> CaseStatus:
@@ -193,7 +191,7 @@ class SuiteResult:
 
     @property
     def touched(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the scenarios that each changed input touches; maps by their own name."""
+        """Names of the scenarios that each changed input touches; maps by name."""
         found: dict[str, list[str]] = {}
         for case in self.cases:
             for cause in case.causes:

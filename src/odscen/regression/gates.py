@@ -181,6 +181,7 @@ def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
     result = CaseResult(
         case,
         runs,
+        map_name=loaded.run.scenario.map.name,
         entry=loaded.run.entry,
         made_of=loaded.made_of,
         baseline=loaded.baseline,

@@ -63,8 +63,8 @@ def _case_properties(case: CaseResult) -> Iterator[tuple[str, str]]:
     yield "verdict", case.status.value
     if case.causes:
         yield "cause", case.causes[0].name
-    if case.entry is not None:
-        yield "map", case.entry.name
+    if case.map_name:
+        yield "map", case.map_name
     if case.case.baseline is not None:
         yield "baseline", str(case.case.baseline)
     before = {} if case.baseline is None else case.baseline.fingerprint

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.base.markup import Markup, element, path_data
 from odscen.results.report.report_map import fitted_view, scale_bar, view_box
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.base.arrays import FloatArray
     from odscen.results.report.place_shapes import PlaceShapes
 
 PlaceStyles = dict[tuple[str, str], tuple[str, str]]
@@ -19,7 +22,12 @@ IDLE = ("los-none", "too few vehicles")
 
 
 def place_map(
-    shapes: PlaceShapes, styles: PlaceStyles, *, title: str, names: Mapping[str, str]
+    shapes: PlaceShapes,
+    styles: PlaceStyles,
+    *,
+    title: str,
+    names: Mapping[str, str],
+    text: float = 0.017,
 ) -> Markup | None:
     """Draw segments as lines and junctions as discs; ``None`` if there is nothing to draw.
 
@@ -29,12 +37,14 @@ def place_map(
         Of the places with a colour; the others are idle.
     names
         Labels of the places that have one.
+    text
+        Height of the labels, a share of the map's extent.
     """
     bounds = fitted_view(shapes.points, None)
     if bounds is None:
         return None
     extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    size = round(extent * 1.7)
+    size = round(100 * extent * text)
     parts, labels = [], []
     for name, lines in shapes.segments.items():
         style, words = styles.get(("segment", name), IDLE)
@@ -42,7 +52,7 @@ def place_map(
         about = element("title", f"{name}: {words}")
         parts.append(element("path", about, d=data, class_=style))
         if name in names:
-            x, y = lines.xy[len(lines.xy) // 2].tolist()
+            x, y = _middle(lines.xy[: int(lines.start[1])])
             labels.append(_label(names[name], round(x * 100), round(-y * 100), size))
     width = round(100 * max(3.0, extent / 350.0))
     radius = round(100 * min(extent / 110.0, 10.0))
@@ -65,6 +75,13 @@ def place_map(
         class_="run-map",
         role="img",
     )
+
+
+def _middle(line: FloatArray) -> tuple[float, float]:
+    """Point half way along a polyline."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    x, y = (float(np.interp(along[-1] / 2.0, along, axis)) for axis in line.T)
+    return x, y
 
 
 def _label(text: str, x: int, y: int, size: int) -> Markup:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 MOST = 8
 """Places with a number."""
 
+_TEXT = 0.045
+"""Height of the numbers, a share of a map's extent; two maps share the width of the page."""
+
 _DELAY_STEPS = (10.0, 20.0, 35.0, 55.0, 80.0)
 """Limits between the colours of stopped delay, seconds: those of levels of service at lights."""
 
@@ -61,7 +64,9 @@ def change_maps(case: CaseResult, workspace: Workspace | None) -> Markup | None:
     for title, side, figures in (("Baseline", old or entry, before), ("Now", entry, now)):
         shapes = place_shapes(load_map(side).sumo.graph)
         names = {name: str(rank) for (_, name), rank in ranks.items()}
-        drawn = place_map(shapes, _styles(figures), title=f"{case.name}: {title}", names=names)
+        drawn = place_map(
+            shapes, _styles(figures), title=f"{case.name}: {title}", names=names, text=_TEXT
+        )
         heading = "Baseline, on the map of now" if title == "Baseline" and not old else title
         if drawn is not None:
             sides.append(element("figure", element("figcaption", heading), drawn))

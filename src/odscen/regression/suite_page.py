@@ -29,6 +29,13 @@ MOST_MAPS = 20
 MOST_ROWS = 40
 """Rows of a scenario's table; JSON has all."""
 
+_JUDGED = (
+    "means over all seeds. Segments and junctions are named as on the map of the editor; those "
+    "with the largest changes for the number of vehicles that passed stand first, and their "
+    "numbers are those on the maps."
+)
+_NOT_JUDGED = "there is no baseline to hold it against, or it could not be run."
+
 _STYLES = {
     CaseStatus.PASSED: "good",
     CaseStatus.CHANGED: "fair",
@@ -142,11 +149,7 @@ def _case_section(
     ranks = ranked_places(case)
     rows = [_change_row(change, ranks) for change in changes[:MOST_ROWS]]
     heads = ("Figure", "Baseline", "Now", "Difference", "Allowed", "Verdict")
-    explained = (
-        "means over all seeds. Segments and junctions are named as on the map of the editor; those "
-        "with the largest changes for the number of vehicles that passed stand first, and their "
-        "numbers are those on the maps."
-    )
+    explained = _NOT_JUDGED if verdict is None else _JUDGED
     return report_section(
         f"{case.name}: {case.label}",
         element("p", headline(case)),

@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.regression.case_results import CaseStatus
+from odscen.results.measures.figure import RunFigure
 
 if TYPE_CHECKING:
     from odscen.regression.case_results import CaseResult, SuiteResult
     from odscen.regression.verdict import Change
 
-MOST = 12
+MOST = 6
 """Problems that the terminal has of one scenario; JUnit, JSON and the page have all."""
+
+_KEY = ("mean_delay", "mean_travel_time", "mean_speed", "worst_junction_delay", "throughput")
+"""Figures of the run that come first in the headline, beside the counts of road users."""
 
 _IN_HEADLINE = 2
 """Figures of the run in the headline; a place comes after them."""
@@ -44,10 +48,19 @@ def _worst(case: CaseResult) -> list[str]:
         return list(case.failures[:_IN_HEADLINE])
     changes = {change.words for change in verdict.failing}
     found = [words for words in case.failures if words not in changes][:1]
-    found += [change.words for change in verdict.figures if change.counts][:_IN_HEADLINE]
+    failing = [change for change in verdict.figures if change.counts]
+    failing.sort(key=lambda change: not _is_key(change))  # the worst first among both
+    found += [change.words for change in failing[:_IN_HEADLINE]]
     place = verdict.where
     at = [] if place is None else [f"most at {place.words}" if found else place.words]
     return [*found, *at]
+
+
+def _is_key(change: Change) -> bool:
+    """Whether people know the figure at a glance; those of the suite's own they do."""
+    entry = change.entry
+    own = not isinstance(entry, RunFigure)
+    return own or entry.name in _KEY or (isinstance(entry, RunFigure) and entry.count)
 
 
 def _better(case: CaseResult) -> list[str]:
