@@ -111,7 +111,10 @@ def test_without_a_baseline_it_fails_and_says_how_to_write_one(store, suite):
 def test_a_seed_that_the_baseline_does_not_have_fails(store, suite):
     suite.write_text(suite.read_text().replace("[1, 2]", "[1, 7]"))
     result = run(store, suite)
-    assert "no seed 7" in lines(result.cases[0])[0]
+    found = result.cases[0]
+    assert found.status == "missing"
+    assert "the baseline has seed 2, which was not run" in found.problems[0]
+    assert "the baseline has no seed 7" in found.problems[1]
 
 
 def test_expectations_are_held_against_every_seed(store, suite):
@@ -259,6 +262,15 @@ def test_baselines_of_scenarios_that_fall_short_are_left_unless_forced(store, ti
     assert (folder / "one.json").read_bytes() != before
 
 
+def test_seeds_that_hardly_vary_are_warned_of_when_the_baseline_is_written(store, tiny):
+    suite = tiny("one")
+    suite.write_text(suite.read_text().replace("[1]", "[1, 2]").replace("20", "60"))
+    (found,) = run(store, suite, update=Update(True)).cases
+    assert found.updated
+    assert found.notes[0].startswith("the seeds hardly vary: mean_travel_time is ")
+    assert lines(found) == list(found.notes)
+
+
 def test_a_better_figure_is_a_change_and_fails_only_where_the_suite_says_so(store, tiny):
     suite = tiny("one")
     path = suite.parent / "baselines" / "one.json"
@@ -300,7 +312,9 @@ def test_demand_per_km_that_follows_a_changed_limit_is_put_down_to_the_map(store
     path.write_text(re.sub(r'<speed max="\d+"', '<speed max="8"', path.read_text()))
     (found,) = run(store, suite).cases
     assert [cause.name for cause in found.causes] == ["map"]
-    assert headline(found).startswith("map: planned is ")
+    assert headline(found).startswith("map: ")
+    (planned,) = [one for one in found.verdict.figures if one.key.figure == "planned"]
+    assert planned.difference.difference < 0
     assert "the number of road users follows the map: all is given per km" in lines(found)[-1]
 
 

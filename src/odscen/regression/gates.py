@@ -14,7 +14,7 @@ from odscen.base.errors import in_file
 from odscen.regression.baseline import baseline_of, write_baseline
 from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
 from odscen.regression.causes import causes_between, likeliest_first
-from odscen.regression.measure import measure
+from odscen.regression.measure import FigureKey, measure
 from odscen.regression.own_figures import own_values
 from odscen.regression.suite import missing_case
 from odscen.regression.suite_loading import LoadedCase, load_cases
@@ -23,7 +23,7 @@ from odscen.results.measures.expectations import evaluate
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from odscen.base.errors import InputError
     from odscen.regression.baseline import Baseline
@@ -35,6 +35,11 @@ if TYPE_CHECKING:
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
     from odscen.workspace.store import Workspace
+
+
+_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
+_LEAST_SPREAD = 0.01
+"""Share of the largest value by which this figure differs, at least, where seeds vary."""
 
 
 class Update(NamedTuple):
@@ -79,41 +84,48 @@ def run_suite(
     """
     cases = load_cases(workspace, suite, with_baseline=not update.wanted)
     loaded = [case for case in cases if isinstance(case, LoadedCase)]
-    jobs: dict[str, tuple[LoadedCase, int]] = {}
     with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
         root = out or Path(temporary)
-        runs = []
-        for case in loaded:
-            for seed in case.case.seeds:
-                name = f"{case.case.name}/seed-{seed}"
-                jobs[name] = case, seed
-                settings = replace(case.run.settings, seed=seed)
-                runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
-        follow = _Follow(len(runs), progress)
-
-        def done(job: RunJob, result: Run) -> None:
-            case, seed = jobs[job.name]
-            case.runs[seed] = _seed_result(case, seed, result, suite, kept=out is not None)
-            if out is None:
-                shutil.rmtree(result.folder)
-            follow.done(job)
-
-        def refused(job: RunJob, error: InputError) -> None:
-            case, seed = jobs[job.name]
-            case.refused[seed] = f"seed {seed}: {error}"
-            follow.done(job)
-
-        keep = out is not None
-        run_all(
-            runs,
-            processes=processes,
-            reports=keep,
-            progress=follow.step,
-            done=done,
-            refused=refused,
-        )
+        _run_all(loaded, suite, root, keep=out is not None, processes=processes, tell=progress)
     judged = [_result(case, update) for case in cases]
     return SuiteResult(suite, (*judged, *map(_missing, suite.missing)))
+
+
+def _run_all(
+    loaded: Sequence[LoadedCase],
+    suite: Suite,
+    root: Path,
+    *,
+    keep: bool,
+    processes: int,
+    tell: Callable[[str, float], None] | None,
+) -> None:
+    """Run each case with each seed in a folder of ``root``, and keep the results with the case."""
+    jobs: dict[str, tuple[LoadedCase, int]] = {}
+    runs = []
+    for case in loaded:
+        for seed in case.case.seeds:
+            name = f"{case.case.name}/seed-{seed}"
+            jobs[name] = case, seed
+            settings = replace(case.run.settings, seed=seed)
+            runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
+    follow = _Follow(len(runs), tell)
+
+    def done(job: RunJob, result: Run) -> None:
+        case, seed = jobs[job.name]
+        case.runs[seed] = _seed_result(case, seed, result, suite, kept=keep)
+        if not keep:
+            shutil.rmtree(result.folder)
+        follow.done(job)
+
+    def refused(job: RunJob, error: InputError) -> None:
+        case, seed = jobs[job.name]
+        case.refused[seed] = f"seed {seed}: {error}"
+        follow.done(job)
+
+    run_all(
+        runs, processes=processes, reports=keep, progress=follow.step, done=done, refused=refused
+    )
 
 
 class _Follow:
@@ -210,7 +222,18 @@ def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool
         note = f"the baseline {kept}, as expectations are not met; --force writes it"
         return replace(result, notes=(note,))
     write_baseline(baseline_of(figures, result.made_of), file, scenario=result.name)
-    return replace(result, updated=True)
+    return replace(result, updated=True, notes=_steady(figures))
+
+
+def _steady(figures: Mapping[int, Measured]) -> tuple[str, ...]:
+    """Warn where seeds make next to no difference: their means then say nothing of chance."""
+    values = [run.get(_OF_CHANCE) for run in figures.values()]
+    known = [value for value in values if value is not None]
+    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+        return ()
+    spread = f"{min(known):g} to {max(known):g} s"
+    words = f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more"
+    return (words,)
 
 
 def _held(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo
@@ -131,6 +130,8 @@ class Suite:
         Baselines whose scenario the suite does not have.
     figures
         The suite's own figures of a run, by name.
+    whole
+        Whether it is all of the suite, not a part.
     """
 
     name: str
@@ -139,7 +140,8 @@ class Suite:
     cases: tuple[Case, ...]
     converter: ConverterName | None = None
     missing: tuple[Path, ...] = ()
-    figures: Mapping[str, Figure] = dataclass_field(default_factory=dict)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    whole: bool = True
 
     def shard(self, number: int, count: int) -> Suite:
         """Return the ``number``-th of ``count`` parts, from 1: every scenario is in one of them.
@@ -152,6 +154,7 @@ class Suite:
             self,
             cases=tuple(case for case in self.cases if case.name in mine),
             missing=tuple(path for path in self.missing if path.stem in mine),
+            whole=count == 1,
         )
 
 

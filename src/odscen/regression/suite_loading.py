@@ -60,7 +60,7 @@ def load_cases(
     Raises
     ------
     InputError
-        If the suite names a map that is not there and that no scenario is on.
+        If the suite, as a whole, names a map that is not there and that no scenario is on.
     """
     maps = _SuiteMaps(workspace, suite)
     loaded: list[LoadedCase | UnusableCase] = []
@@ -69,7 +69,8 @@ def load_cases(
             loaded.append(_load(workspace, case, maps, with_baseline=with_baseline))
         except (InputError, ToolError) as error:
             loaded.append(UnusableCase(case, error))
-    maps.refuse_unused()
+    if suite.whole:
+        maps.refuse_unused()
     return loaded
 
 
