@@ -101,7 +101,13 @@ class _SuiteMaps:
         self._known: dict[tuple[str, str, float], MapEntry | InputError | ToolError] = {}
 
     def of(self, scenario: Scenario) -> MapEntry:
-        """Find the map of a scenario."""
+        """Find the map of a scenario.
+
+        Raises
+        ------
+        InputError, ToolError
+            If it is not there or cannot be built, each time that it is asked for.
+        """
         reference = scenario.map
         self._asked.add(reference.name)
         key = reference.name, reference.sha256, reference.spacing
@@ -116,7 +122,13 @@ class _SuiteMaps:
         return found
 
     def refuse_unused(self) -> None:
-        """Refuse a suite with a map that is not there, if that is no scenario's error."""
+        """Refuse a suite with a map that is not there, if that is no scenario's error.
+
+        Raises
+        ------
+        InputError
+            With the first of them.
+        """
         for name, path in self._files.items():
             if name not in self._asked and not path.is_file():
                 msg = f"there is no file {path}, and no scenario is on a map of that name"
