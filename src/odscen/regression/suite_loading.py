@@ -90,6 +90,22 @@ def _load(workspace: Workspace, case: Case, maps: _SuiteMaps, *, with_baseline: 
     return LoadedCase(case, run, made_of, baseline)
 
 
+def map_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> MapEntry | None:
+    """Find the map of a baseline, by its digest; ``None`` where the workspace has lost it.
+
+    Parameters
+    ----------
+    entry
+        The map of now, which may be the same.
+    digest
+        ``map`` of the baseline's fingerprint: the beginning of a SHA-256.
+    """
+    if not digest or entry.sha256.startswith(digest):
+        return entry
+    known = () if workspace is None else workspace.maps()
+    return next((one for one in known if one.sha256.startswith(digest)), None)
+
+
 class _SuiteMaps:
     """The maps of a suite, each built once; one that cannot be is the error of its scenarios."""
 

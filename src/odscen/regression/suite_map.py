@@ -10,6 +10,7 @@ import numpy as np
 from odscen.app.maps import load_map
 from odscen.base.markup import Markup, element
 from odscen.regression.place_map import place_map
+from odscen.regression.suite_loading import map_before
 from odscen.regression.verdict import FEWEST
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.plots import legend
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from odscen.regression.case_results import CaseResult
     from odscen.regression.measure import FigureKey
     from odscen.regression.place_map import PlaceStyles
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.store import Workspace
 
 MOST = 8
 """Places with a number."""
@@ -59,7 +60,7 @@ def change_maps(case: CaseResult, workspace: Workspace | None) -> Markup | None:
     before = {key: _mean(values) for key, values in baseline.figures.items()}
     keys = dict.fromkeys(key for run in case.runs for key in run.figures if key.place)
     now = {key: _mean([run.figures.get(key) for run in case.runs]) for key in keys}
-    old = _entry_before(entry, baseline.fingerprint.get("map", ""), workspace)
+    old = map_before(entry, baseline.fingerprint.get("map", ""), workspace)
     sides = []
     for title, side, figures in (("Baseline", old or entry, before), ("Now", entry, now)):
         shapes = place_shapes(load_map(side).sumo.graph)
@@ -76,14 +77,6 @@ def change_maps(case: CaseResult, workspace: Workspace | None) -> Markup | None:
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
-
-
-def _entry_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> MapEntry | None:
-    """The map of a baseline, by the beginning of its SHA-256."""
-    if not digest or entry.sha256.startswith(digest):
-        return entry
-    known = () if workspace is None else workspace.maps()
-    return next((one for one in known if one.sha256.startswith(digest)), None)
 
 
 def _styles(figures: Mapping[FigureKey, float | None]) -> PlaceStyles:
