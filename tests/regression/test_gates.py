@@ -262,15 +262,6 @@ def test_baselines_of_scenarios_that_fall_short_are_left_unless_forced(store, ti
     assert (folder / "one.json").read_bytes() != before
 
 
-def test_seeds_that_hardly_vary_are_warned_of_when_the_baseline_is_written(store, tiny):
-    suite = tiny("one")
-    suite.write_text(suite.read_text().replace("[1]", "[1, 2]").replace("20", "60"))
-    (found,) = run(store, suite, update=Update(True)).cases
-    assert found.updated
-    assert found.notes[0].startswith("the seeds hardly vary: mean_travel_time is ")
-    assert lines(found) == list(found.notes)
-
-
 def test_a_better_figure_is_a_change_and_fails_only_where_the_suite_says_so(store, tiny):
     suite = tiny("one")
     path = suite.parent / "baselines" / "one.json"

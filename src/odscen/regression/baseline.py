@@ -33,6 +33,10 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
+_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
+_LEAST_SPREAD = 0.01
+"""Share of the largest value by which this figure differs, at least, where seeds vary."""
+
 _KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
@@ -84,6 +88,16 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
     return Baseline(
         seeds, made_of, {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys}
     )
+
+
+def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
+    """Warn where seeds make next to no difference, as their scatter then says little of chance."""
+    values = baseline.figures.get(_OF_CHANCE, ())
+    known = [value for value in values if value is not None]
+    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+        return ()
+    spread = f"{min(known):g} to {max(known):g} s"
+    return (f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more",)
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:

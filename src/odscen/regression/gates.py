@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.app.runs import run_all
 from odscen.base.errors import in_file
-from odscen.regression.baseline import baseline_of, write_baseline
+from odscen.regression.baseline import baseline_of, seeds_that_hardly_vary, write_baseline
 from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
 from odscen.regression.causes import causes_between, likeliest_first
-from odscen.regression.measure import FigureKey, measure
+from odscen.regression.measure import measure
 from odscen.regression.own_figures import own_values
 from odscen.regression.suite import missing_case
 from odscen.regression.suite_loading import LoadedCase, load_cases
@@ -35,11 +35,6 @@ if TYPE_CHECKING:
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
     from odscen.workspace.store import Workspace
-
-
-_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
-_LEAST_SPREAD = 0.01
-"""Share of the largest value by which this figure differs, at least, where seeds vary."""
 
 
 class Update(NamedTuple):
@@ -221,19 +216,9 @@ def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool
         kept = "is left as it was" if file.is_file() else "is not written"
         note = f"the baseline {kept}, as expectations are not met; --force writes it"
         return replace(result, notes=(note,))
-    write_baseline(baseline_of(figures, result.made_of), file, scenario=result.name)
-    return replace(result, updated=True, notes=_steady(figures))
-
-
-def _steady(figures: Mapping[int, Measured]) -> tuple[str, ...]:
-    """Warn where seeds make next to no difference: their means then say nothing of chance."""
-    values = [run.get(_OF_CHANCE) for run in figures.values()]
-    known = [value for value in values if value is not None]
-    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
-        return ()
-    spread = f"{min(known):g} to {max(known):g} s"
-    words = f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more"
-    return (words,)
+    baseline = baseline_of(figures, result.made_of)
+    write_baseline(baseline, file, scenario=result.name)
+    return replace(result, updated=True, notes=seeds_that_hardly_vary(baseline))
 
 
 def _held(
