@@ -399,8 +399,8 @@ def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(sto
     assert written.exit_code == 0
     (case_,) = run_suite(store, read_suite(file)).cases
     assert (case_.status, case_.changed_inputs) == ("passed", ())
-    assert store.map(case_.map_name).converter == "netconvert"
+    assert case_.entry.converter == "netconvert"
     file.write_text(text.replace('converter = "netconvert"', 'converter = "odscen"'))
     (case_,) = run_suite(store, read_suite(file)).cases
     assert case_.changed_inputs == ("the network",)
-    assert store.map(case_.map_name).converter == "odscen"
+    assert case_.entry.converter == "odscen"
