@@ -19,7 +19,7 @@ demo: $(READY)
 
 # Set-up plus the tests, the suite of scenarios on the shipped maps among them.
 test: test-page $(READY) $(QC) $(PAGE) chromium allocator
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	ODSCEN_SLOW=1 $(BIN)/python -m pytest -n 2 --dist loadfile
 	$(MAKE) regression
 
 # Scenarios on the shipped maps against their baselines; see docs/regression.md.

@@ -143,5 +143,5 @@ def test_the_command_prints_json_and_writes_a_page(sides, tmp_path):
 
 
 def test_a_folder_without_runs_is_refused_by_name(tmp_path):
-    with pytest.raises(InputError, match=r"no run here: there is no summary\.json"):
+    with pytest.raises(InputError, match=r"no run here; name a run, which has a summary\.json"):
         read_runs(tmp_path)

@@ -1,16 +1,18 @@
 import json
+import os
 import re
 
 import pytest
 from lxml import etree
 
 from odscen.base.errors import InputError
-from odscen.regression.gates import run_suite
+from odscen.regression.gates import Update, run_suite
 from odscen.regression.junit import junit_xml
 from odscen.regression.suite import read_suite
 from odscen.regression.suite_page import suite_page
-from odscen.regression.suite_words import lines, to_dict
-from tests.regression.conftest import copy_suite
+from odscen.regression.suite_summary import suite_summary
+from odscen.regression.suite_words import headline, lines
+from tests.regression.conftest import copy_suite, edit_json, write_tiny
 
 
 def run(store, file, **options):
@@ -22,8 +24,11 @@ def case(result, name):
 
 
 def edit_scenario(file, name, **fields):
-    path = file.parent / f"{name}.scenario.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | fields))
+    edit_json(file.parent / f"{name}.scenario.json", **fields)
+
+
+def statuses(result):
+    return {case.name: case.status.value for case in result.cases}
 
 
 def test_an_unchanged_rerun_passes_and_writes_the_same_baseline(store, suite):
@@ -32,7 +37,7 @@ def test_an_unchanged_rerun_passes_and_writes_the_same_baseline(store, suite):
     result = run(store, suite)
     assert result.exit_code == 0
     assert [lines(case) for case in result.cases] == [[], []]
-    run(store, suite, update_baseline=True)
+    run(store, suite, update=Update(True))
     assert {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*")} == before
 
 
@@ -106,15 +111,19 @@ def test_without_a_baseline_it_fails_and_says_how_to_write_one(store, suite):
 def test_a_seed_that_the_baseline_does_not_have_fails(store, suite):
     suite.write_text(suite.read_text().replace("[1, 2]", "[1, 7]"))
     result = run(store, suite)
-    assert "no seed 7" in lines(result.cases[0])[0]
+    found = result.cases[0]
+    assert found.status == "missing"
+    assert "the baseline has seed 2, which was not run" in found.problems[0]
+    assert "the baseline has no seed 7" in found.problems[1]
 
 
 def test_expectations_are_held_against_every_seed(store, suite):
     suite.write_text(suite.read_text().replace('"teleported == 0"', '"mean_delay <= 1 s"'))
     result = run(store, suite)
-    told = lines(case(result, "signal_crossing"))
-    assert [line.split(":")[0] for line in told[:2]] == ["seed 1", "seed 2"]
+    told = case(result, "signal_crossing").problems
+    assert [line.split(":")[0] for line in told] == ["seed 1", "seed 2"]
     assert "expected mean_delay <= 1 s, but it is" in told[0]
+    assert headline(case(result, "signal_crossing")).startswith("behaviour: seed 1: expected")
 
 
 def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):
@@ -122,24 +131,6 @@ def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):
     result = run(store, suite)
     assert result.exit_code == 3
     assert {case.status for case in result.cases} == {"error"}
-
-
-def test_reports_say_what_failed(store, suite):
-    edit_scenario(suite, "signal_crossing", flows=[])
-    result = run(store, suite)
-    root = etree.fromstring(junit_xml(result).encode())
-    assert root.attrib["tests"] == "2"
-    assert root.attrib["failures"] == "1"
-    failure = root.find(".//testcase[@name='signal_crossing']/failure")
-    assert "planned is" in failure.text
-    assert "the scenario's flows" in failure.text
-    page = suite_page(result)
-    assert "1 of 2 scenarios failed" in page
-    assert ">road users planned</th>" in page
-    data = to_dict(result)
-    assert data["exit_code"] == 1
-    change = next(c for c in data["cases"][0]["changes"] if c["figure"] == "planned")
-    assert change["difference"] == change["value"] - change["baseline"] < 0
 
 
 def test_maps_of_the_same_name_in_the_workspace_are_left_alone(store, suite):
@@ -158,7 +149,15 @@ def test_maps_of_the_same_name_in_the_workspace_are_left_alone(store, suite):
         ("seeds = [1, 2]", "seed = [1]", "seed: Extra inputs"),
         ("arrived >= 97 %", "arived >= 97 %", "did you mean arrived"),
         ("teleported == 0", "mean_delay <= 40 m", "mean_delay is written in s"),
-        ("maps/*.xodr", "maps/x.xodr", "maps: there is no file 'maps/x.xodr'"),
+        ("maps/*.xodr", "maps/x*.xodr", "maps: there is no file 'maps/x*.xodr'"),
+        ("name =", "tolerance.mine = '5 %'\nname =", "tolerance.mine: no figure"),
+        ("name =", "figures.mine.function = 'a.py'\nname =", "figures.mine.function: "),
+        ("name =", "figures.mean_delay.function = 'a.py:f'\nname =", "is a figure of odscen"),
+        (
+            "name =",
+            "figures.mine = {function = 'a.py:f', tolerance = '5 apples'}\nname =",
+            "figures.mine.tolerance: ",
+        ),
         ("name =", "tolerance.mean_delay = '5 apples'\nname =", "tolerance.mean_delay: "),
         ("name =", "tolerance.mean_delai = '5 %'\nname =", "tolerance.mean_delai: no figure"),
         ("name =", "tolerance.segment.fast = '5 %'\nname =", "tolerance.segment.fast: no figure"),
@@ -173,23 +172,235 @@ def test_a_bad_suite_is_refused_with_file_key_and_value(suite, old, new, words):
     assert words in str(caught.value)
 
 
-def test_a_file_that_is_no_baseline_is_refused_before_anything_runs(store, suite):
-    path = suite.parent / "baselines" / "signal_crossing.json"
-    path.write_text('{"format": "odscen-baseline", "version": 9}')
-    with pytest.raises(InputError, match=r"signal_crossing\.json.*version 9"):
+def test_each_scenario_that_cannot_be_used_is_one_error_and_the_others_run(store, tiny):
+    suite = tiny("good", "misfit", "unreadable", "elsewhere", "spoilt")
+    folder = suite.parent
+    actors = json.loads((folder / "misfit.scenario.json").read_text())["actors"]
+    edit_scenario(suite, "misfit", actors=[actors[0] | {"spawn": "9.9.9.9"}])
+    (folder / "unreadable.scenario.json").write_text("{")
+    reference = {"name": "no_such_map", "sha256": "0" * 64, "spacing": 2.0}
+    edit_scenario(suite, "elsewhere", map=reference)
+    (folder / "baselines" / "spoilt.json").write_text('{"format": "odscen-baseline", "version": 9}')
+    result = run(store, suite)
+    assert statuses(result) == {
+        "elsewhere": "error",
+        "good": "passed",
+        "misfit": "error",
+        "spoilt": "error",
+        "unreadable": "error",
+    }
+    assert result.exit_code == 2
+    assert "'9.9.9.9'" in headline(case(result, "misfit"))
+    assert "unreadable.scenario.json" in headline(case(result, "unreadable"))
+    assert "no map named 'no_such_map'" in headline(case(result, "elsewhere"))
+    assert "version 9" in headline(case(result, "spoilt"))
+
+
+def test_a_map_that_cannot_be_built_is_an_error_of_its_scenarios_only(store, tiny):
+    suite = tiny("good", "on_broken")
+    maps = suite.parent / "maps"
+    (maps / "broken.xodr").write_text("<OpenDRIVE><road/></OpenDRIVE>")
+    reference = json.loads((suite.parent / "good.scenario.json").read_text())["map"]
+    edit_scenario(suite, "on_broken", map=reference | {"name": "broken"})
+    result = run(store, suite)
+    assert statuses(result) == {"good": "passed", "on_broken": "error"}
+    assert "broken.xodr" in headline(case(result, "on_broken"))
+
+
+def test_a_scenario_or_map_that_is_named_and_not_there_is_an_error_of_its_own(store, tiny):
+    suite = tiny("good")
+    text = suite.read_text().replace('"maps/*.xodr"', '"maps/t_junction_signs.xodr"')
+    suite.write_text(text + '[[scenario]]\nfile = "gone.scenario.json"\n')
+    result = run(store, suite)
+    assert statuses(result) == {"good": "passed", "gone": "error"}
+    (suite.parent / "maps" / "t_junction_signs.xodr").unlink()
+    result = run(store, suite)
+    assert statuses(result) == {"good": "error", "gone": "error"}
+    assert "maps/t_junction_signs.xodr" in headline(case(result, "good"))
+
+
+def test_a_map_that_is_not_there_and_that_no_scenario_needs_refuses_the_suite(store, tiny):
+    suite = tiny("good")
+    suite.write_text(suite.read_text().replace("maps/*.xodr", "maps/typo.xodr"))
+    with pytest.raises(InputError, match=r"tiny\.toml: maps: there is no file .*typo\.xodr"):
         run(store, suite)
+
+
+def test_what_the_baseline_has_and_the_suite_has_not_is_missing(store, tiny, tiny_baseline):
+    suite = tiny("here")
+    folder = suite.parent / "baselines"
+    (folder / "gone.json").write_bytes(tiny_baseline.read_bytes())
+    two = json.loads(tiny_baseline.read_text())
+    two["seeds"] = [1, 2]
+    for row in two["rows"]:
+        row.update({key: value * 2 for key, value in row.items() if isinstance(value, list)})
+    (folder / "here.json").write_text(json.dumps(two))
+    result = run(store, suite)
+    assert statuses(result) == {"here": "missing", "gone": "missing"}
+    assert "the baseline has seed 2, which was not run" in headline(case(result, "here"))
+    assert "gone.json" in headline(case(result, "gone"))
+    assert result.exit_code == 1
+
+
+def test_baselines_of_scenarios_that_fall_short_are_left_unless_forced(store, tiny):
+    suite = tiny("one", "other")
+    folder = suite.parent / "baselines"
+    (folder / "other.json").unlink()
+    before = (folder / "one.json").read_bytes()
+    suite.write_text('expect = ["mean_speed >= 200 km/h"]\n' + suite.read_text())
+    edit_scenario(suite, "one", actors=[])
+    result = run(store, suite, update=Update(True))
+    assert statuses(result) == {"one": "failed", "other": "failed"}
+    assert result.exit_code == 1
+    assert (folder / "one.json").read_bytes() == before
+    assert not (folder / "other.json").exists()
+    assert "is left as it was" in lines(case(result, "one"))[-1]
+    assert "is not written" in lines(case(result, "other"))[-1]
+    result = run(store, suite, update=Update(True, force=True))
+    assert [case.updated for case in result.cases] == [True, True]
+    assert result.exit_code == 1
+    assert (folder / "one.json").read_bytes() != before
+
+
+def test_a_better_figure_is_a_change_and_fails_only_where_the_suite_says_so(store, tiny):
+    suite = tiny("one")
+    path = suite.parent / "baselines" / "one.json"
+    data = json.loads(path.read_text())
+    row = next(row for row in data["rows"] if row.get("figure") == "mean_speed")
+    row["values"] = [value / 2 for value in row["values"]]
+    path.write_text(json.dumps(data))
+    result = run(store, suite)
+    (better,) = result.cases[0].verdict.better
+    assert better.difference.relative == pytest.approx(1.0, abs=1e-3)
+    assert (result.cases[0].label, result.exit_code) == ("changed (better)", 0)
+    assert headline(result.cases[0]).startswith("better: mean_speed is")
+    suite.write_text('better = "fail"\n' + suite.read_text())
+    result = run(store, suite)
+    assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
+
+
+def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
+    suite = tiny("one")
+    path = suite.parent / "maps" / "t_junction_signs.xodr"
+    path.write_text(path.read_text() + "<!-- other -->\n")
+    result = run(store, suite)
+    assert (statuses(result), result.exit_code) == ({"one": "changed"}, 0)
+    assert headline(result.cases[0]) == "changed since the baseline: the map"
+    assert result.touched == {"the map t_junction_signs": ("one",)}
+    suite.write_text('map = "fail"\n' + suite.read_text())
+    result = run(store, suite)
+    assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
+    assert headline(result.cases[0]).startswith("map: the map has changed")
+
+
+def test_demand_per_km_that_follows_a_changed_limit_is_put_down_to_the_map(store, tmp_path):
+    suite = write_tiny(tmp_path / "suite", "one")
+    background = {"id": "all", "mix": {"car": 1}, "per_km": 6}
+    edit_scenario(suite, "one", actors=[], demand={"background": [background]})
+    suite.write_text(suite.read_text().replace("until = 20", "until = 60"))
+    assert run(store, suite, update=Update(True)).exit_code == 0
+    path = suite.parent / "maps" / "t_junction_signs.xodr"
+    path.write_text(re.sub(r'<speed max="\d+"', '<speed max="8"', path.read_text()))
+    (found,) = run(store, suite).cases
+    assert [cause.name for cause in found.causes] == ["map"]
+    assert headline(found).startswith("map: ")
+    (planned,) = [one for one in found.verdict.figures if one.key.figure == "planned"]
+    assert planned.difference.difference < 0
+    assert "the number of road users follows the map: all is given per km" in lines(found)[-1]
+
+
+def test_the_shards_of_a_suite_have_each_scenario_once(tiny, tiny_baseline):
+    suite = tiny("a", "b", "c", "d")
+    (suite.parent / "baselines" / "gone.json").write_bytes(tiny_baseline.read_bytes())
+    whole = read_suite(suite)
+    shards = [whole.shard(number, 3) for number in (1, 2, 3)]
+    names = [[case.name for case in shard.cases] for shard in shards]
+    assert names == [["a", "d"], ["b"], ["c"]]
+    assert [[path.stem for path in shard.missing] for shard in shards] == [[], ["gone"], []]
+
+
+FIGURES = """
+def longest_stop(run):
+    return max(run.actors()["waiting_time"])
+
+def wrong(run):
+    return "much"
+"""
+
+
+def test_a_figure_of_the_suites_own_is_expected_and_held_against_the_baseline(store, tiny):
+    suite = tiny("one")
+    (suite.parent / "figures.py").write_text(FIGURES)
+    own = '[figures.longest_stop]\nfunction = "figures.py:longest_stop"\nunit = "s"\n'
+    own += 'better = "lower"\ntolerance = "1 s"\n'
+    text = suite.read_text()
+    suite.write_text('expect = ["longest_stop <= 60 s"]\n' + text + own)
+    assert run(store, suite, update=Update(True)).exit_code == 0
+    path = suite.parent / "baselines" / "one.json"
+    data = json.loads(path.read_text())
+    (row,) = [row for row in data["rows"] if row.get("figure") == "longest_stop"]
+    (stop,) = row["values"]
+    row["values"] = [stop - 7]
+    path.write_text(json.dumps(data))
+    (failed,) = run(store, suite).cases
+    (change,) = failed.verdict.failing
+    assert change.words.startswith(f"longest_stop is {stop:.2f} s, was {stop - 7:.2f} s (+7.00 s")
+    row["values"] = [stop + 7]
+    path.write_text(json.dumps(data))
+    assert run(store, suite).cases[0].label == "changed (better)"
+    suite.write_text(text + own.replace("figures.py:longest_stop", "figures.py:wrong"))
+    (broken,) = run(store, suite).cases
+    assert (broken.status, broken.exit_code) == ("error", 2)
+    assert "figures.longest_stop: figures.py:wrong returned 'much'" in headline(broken)
+
+
+def number_of_scenarios():
+    slow = pytest.mark.skipif(not os.environ.get("ODSCEN_SLOW"), reason="takes ODSCEN_SLOW=1")
+    return [8, pytest.param(100, marks=slow)]
+
+
+@pytest.mark.parametrize("count", number_of_scenarios())
+def test_a_large_suite_with_everything_in_it_is_reported_whole(store, tiny, count):
+    names = [f"s{number:03d}" for number in range(count)]
+    suite = tiny(*names)
+    folder = suite.parent
+    broken, deleted, new, slow = names[1], names[2], names[3], names[4]
+    edit_scenario(suite, broken, actors=[{"id": "a", "category": "car", "spawn": "9.9.9.9"}])
+    (folder / f"{deleted}.scenario.json").unlink()
+    (folder / "baselines" / f"{new}.json").unlink()
+    limit = f'[[scenario]]\nfile = "{slow}.scenario.json"\ntime_limit = 0.01\n'
+    suite.write_text(suite.read_text() + limit)
+    result = run(store, suite)
+    expected = dict.fromkeys(names, "passed") | {
+        broken: "error",
+        deleted: "missing",
+        new: "new",
+        slow: "error",
+    }
+    assert statuses(result) == expected
+    assert [case.exit_code for case in result.worst_first[:5]] == [2, 3, 1, 1, 0]
+    assert result.exit_code == 3
+    root = etree.fromstring(junit_xml(result).encode())
+    # Of each scenario a test case, and of each that could be run one for its seed.
+    assert root.attrib["tests"] == str(count + count - 2)
+    assert (root.attrib["errors"], root.attrib["failures"]) == ("3", "2")
+    assert {one.get("name") for one in root.iter("testcase")} >= set(names)
+    page = suite_page(result)
+    assert all(f">{name}<" in page for name in names)
+    assert f"4 of {count} scenarios do not pass" in page
+    assert f"2 error, 1 missing, 1 new, {count - 4} passed" in suite_summary(result)
 
 
 def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(store, tmp_path):
     file = copy_suite(tmp_path, "signal_crossing")
     text = file.read_text().replace('name = "small"', 'name = "small"\nconverter = "netconvert"')
     file.write_text(text)
-    written = run_suite(store, read_suite(file), update_baseline=True)
+    written = run_suite(store, read_suite(file), update=Update(True))
     assert written.exit_code == 0
     (case_,) = run_suite(store, read_suite(file)).cases
     assert (case_.status, case_.changed_inputs) == ("passed", ())
-    assert store.map(case_.map_name).converter == "netconvert"
+    assert case_.entry.converter == "netconvert"
     file.write_text(text.replace('converter = "netconvert"', 'converter = "odscen"'))
     (case_,) = run_suite(store, read_suite(file)).cases
     assert case_.changed_inputs == ("the network",)
-    assert store.map(case_.map_name).converter == "odscen"
+    assert case_.entry.converter == "odscen"

@@ -211,6 +211,7 @@ def run_all(
     reports: bool = True,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, Run], None] | None = None,
+    refused: Callable[[RunJob, InputError], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> tuple[Run, ...]:
     """Prepare and carry out several runs.
@@ -223,16 +224,21 @@ def run_all(
         Whether reports are written.
     progress, done
         Called from the threads that wait for the runs, ``done`` in the order in which they end.
+    refused
+        Called with a run that cannot be prepared, and why; the others go on. Without it, the first
+        such run ends all.
     tell
         Called with what the user should know before a long run.
 
     Returns
     -------
     tuple of Run
-        In the order of ``runs``.
+        In the order of ``runs``, without those refused.
     """
     jobs = [_job(run, report=reports) for run in runs]
-    return run_jobs(jobs, processes=processes, progress=progress, done=done, tell=tell)
+    return run_jobs(
+        jobs, processes=processes, progress=progress, done=done, refused=refused, tell=tell
+    )
 
 
 def check_given(

@@ -17,8 +17,8 @@ WorkspaceOption = Annotated[
     Path | None,
     typer.Option(
         "--workspace",
-        help="Folder with maps, scenarios and runs. [default: $ODSCEN_WORKSPACE, "
-        "else the user's data folder]",
+        help="Folder with maps, scenarios and runs. (default: $ODSCEN_WORKSPACE, "
+        "else the user's data folder)",
         file_okay=False,
         show_default=False,
     ),
@@ -86,7 +86,7 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
         )
     for row in rows:
         table.add_row(*(_cell(value) for value in row))
-    Console().print(table)
+    Console(markup=False, emoji=False).print(table)  # brackets are part of what is written
 
 
 def _cell(value: object) -> str:
@@ -112,7 +112,7 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.fields[what]}"),
+        TextColumn("{task.fields[what]}", markup=False),
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

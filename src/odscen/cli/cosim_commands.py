@@ -33,7 +33,7 @@ def cosim(
         str, typer.Option(help="Where the CARLA server is.", metavar="HOST:PORT")
     ] = "127.0.0.1:2000",
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the run. [default: the workspace's runs]")
+        Path | None, typer.Option(help="Folder for the run. (default: the workspace's runs)")
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")
@@ -49,7 +49,7 @@ def cosim(
         typer.Option(
             min=0.001,
             max=1,
-            help="Seconds per tick of CARLA's. [default: a step, or parts of it up to 0.05]",
+            help="Seconds per tick of CARLA's. (default: a step, or parts of it up to 0.05)",
         ),
     ] = None,
     radius: Annotated[

@@ -21,10 +21,10 @@ app = typer.Typer(
 
 OutOption = Annotated[
     Path | None,
-    typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
+    typer.Option("-o", "--out", help="File to write. (default: the scenario itself)"),
 ]
 NameOption = Annotated[
-    str | None, typer.Option("--id", help="Name of this part of the demand. [default: its kind]")
+    str | None, typer.Option("--id", help="Name of this part of the demand. (default: its kind)")
 ]
 MixOption = Annotated[
     str | None,
@@ -47,7 +47,8 @@ def import_(
         Path | None, typer.Option(help="Table of counts: place,begin,end,count.", metavar="CSV")
     ] = None,
     profile: Annotated[
-        Path | None, typer.Option(help="Table of a day profile: [time,]share.", metavar="CSV")
+        Path | None,
+        typer.Option(help="Table of a day profile: share, or time and share.", metavar="CSV"),
     ] = None,
     zones: Annotated[
         Path | None, typer.Option(help="Table of zones: zone,segment.", metavar="CSV")
@@ -130,7 +131,7 @@ def weekday(
     day: Annotated[str, typer.Option(help="Day profile: weekday or weekend.")] = "weekday",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenario.")] = 0,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File. [default: in the workspace]")
+        Path | None, typer.Option("-o", "--out", help="File. (default: in the workspace)")
     ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,

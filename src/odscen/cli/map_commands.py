@@ -50,13 +50,13 @@ app = typer.Typer(help="Add maps, look at them, remove them.", no_args_is_help=T
 def add(
     files: Annotated[list[Path], typer.Argument(help="OpenDRIVE files.", metavar="FILE.xodr...")],
     name: Annotated[
-        str | None, typer.Option(help="Name in the catalogue. [default: the file's name]")
+        str | None, typer.Option(help="Name in the catalogue. (default: the file's name)")
     ] = None,
     spacing: Annotated[float, typer.Option(help="Metres between nodes of the lane graph.")] = 2.0,
     converter: Annotated[
         ConverterChoice | None,
         typer.Option(
-            help="Who writes the SUMO network. [default: as the map has it, odscen for a new one]"
+            help="Who writes the SUMO network. (default: as the map has it, odscen for a new one)"
         ),
     ] = None,
     workspace: WorkspaceOption = None,

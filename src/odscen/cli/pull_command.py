@@ -14,7 +14,7 @@ from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, pro
 def pull(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Maps of the server. [default: the one that it shows]"),
+        typer.Argument(help="Maps of the server. (default: the one that it shows)"),
     ] = None,
     carla: Annotated[
         str, typer.Option(help="Where the CARLA server is.", metavar="HOST:PORT")

@@ -2,68 +2,123 @@
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from odscen.regression.gates import SuiteResult
+    from odscen.regression.case_results import SuiteResult
+    from odscen.workspace.store import Workspace
 
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a page for people.", dir_okay=False)
 ]
 
 
+def _shard(text: str) -> tuple[int, int]:
+    """Read ``2/3``."""
+    match = re.fullmatch(r"([1-9]\d{0,3})/([1-9]\d{0,3})", text)
+    if match is None or int(match[1]) > int(match[2]):
+        msg = f"{text!r} is no part of a suite; write for example 1/3, 2/3 and 3/3"
+        raise typer.BadParameter(msg)
+    return int(match[1]), int(match[2])
+
+
 def gate(
     suite: Annotated[Path, typer.Argument(help="Suite, as TOML.", metavar="SUITE.toml")],
     update_baseline: Annotated[
-        bool, typer.Option("--update-baseline", help="Write the baselines of what comes out.")
+        bool,
+        typer.Option(
+            "--update-baseline",
+            help="Write the baselines of what comes out, but of scenarios that miss expectations.",
+        ),
     ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="With --update-baseline: of those, too.")
+    ] = False,
+    shard: Annotated[
+        Any,
+        typer.Option(
+            parser=_shard, metavar="K/N", help="Only the K-th of N parts, for N jobs side by side."
+        ),
+    ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
     out: Annotated[
-        Path | None, typer.Option(help="Keep the runs in this folder. [default: deleted]")
+        Path | None, typer.Option(help="Keep the runs in this folder; they are deleted without.")
     ] = None,
     junit: Annotated[
         Path | None, typer.Option(help="Write JUnit XML for CI.", dir_okay=False)
     ] = None,
     html: HtmlOption = None,
+    summary: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a summary in Markdown; added to the end of $GITHUB_STEP_SUMMARY.",
+            dir_okay=False,
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a suite of scenarios, each with several seeds, against expectations and baselines.
 
-    Exit code 0: all as it should be; 1: something differs or falls short; 2: bad input; 3: a run
-    failed.
+    Exit code 0: all pass; 1: something differs or falls short; 2: bad input; 3: a run failed. The
+    largest that a scenario has is that of the suite.
     """
-    from odscen.base.text_files import write_text
-    from odscen.regression.gates import run_suite
-    from odscen.regression.junit import junit_xml
+    from odscen.regression.gates import Update, run_suite
     from odscen.regression.suite import read_suite
-    from odscen.regression.suite_page import suite_page
     from odscen.regression.suite_words import to_dict
     from odscen.workspace.store import Workspace
 
-    read = read_suite(suite)
+    read, store = read_suite(suite), Workspace.open(workspace)
+    if force and not update_baseline:
+        raise typer.BadParameter("it goes with --update-baseline", param_hint="--force")
+    if shard is not None:
+        read = read.shard(*shard)
     with progress("testing") as step:
         result = run_suite(
-            Workspace.open(workspace),
+            store,
             read,
             processes=jobs,
-            update_baseline=update_baseline,
+            update=Update(update_baseline, force),
             out=out,
             progress=step,
         )
-    if junit is not None:
-        write_text(junit, junit_xml(result))
-    if html is not None:
-        write_text(html, suite_page(result))
+    _write(result, store, junit=junit, html=html, summary=summary)
     if as_json:
         print_json(to_dict(result))
     _show(result, as_json=as_json)
     raise typer.Exit(result.exit_code)
+
+
+def _write(
+    result: SuiteResult,
+    workspace: Workspace,
+    *,
+    junit: Path | None,
+    html: Path | None,
+    summary: Path | None,
+) -> None:
+    from odscen.base.text_files import write_text
+    from odscen.regression.junit import junit_xml
+    from odscen.regression.suite_page import suite_page
+    from odscen.regression.suite_summary import suite_summary
+
+    if junit is not None:
+        write_text(junit, junit_xml(result))
+    if html is not None:
+        write_text(html, suite_page(result, workspace=workspace, beside=html.parent))
+    if summary is not None:
+        before = ""
+        # GitHub shows what all commands of a step have added to this file.
+        if str(summary) == os.environ.get("GITHUB_STEP_SUMMARY") and summary.is_file():
+            before = summary.read_text(encoding="utf-8")
+        write_text(summary, before + suite_summary(result))
 
 
 def _show(result: SuiteResult, *, as_json: bool) -> None:
@@ -71,18 +126,13 @@ def _show(result: SuiteResult, *, as_json: bool) -> None:
 
     if not as_json:
         rows = [
-            (
-                case.case.name,
-                "baseline written" if case.updated and not case.problems else case.status,
-                len(case.runs),
-                f"{case.wall_seconds:.1f} s",
-            )
+            (case.name, case.label, len(case.runs), f"{case.wall_seconds:.1f} s")
             for case in result.cases
         ]
         print_table(result.suite.name, ("scenario", "verdict", "runs", "computed in"), rows)
-    for case in result.cases:
+    for case in result.worst_first:
         for line in lines(case):
-            log(f"{case.case.name}: {line}")
+            log(f"{case.name}: {line}")
 
 
 def compare(

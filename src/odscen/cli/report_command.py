@@ -17,7 +17,7 @@ def report(
         typer.Option(
             metavar="SEGMENT,SEGMENT,...",
             help="Follow vehicles along these segments, in driving direction; junctions between "
-            "them may be left out. [default: the busiest route through several junctions]",
+            "them may be left out. (default: the busiest route through several junctions)",
         ),
     ] = None,
     first: Annotated[
@@ -27,7 +27,7 @@ def report(
     last: Annotated[str | None, typer.Option("--to", metavar="SEGMENT", help="to here.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="File to write. [default: report.html of the run]", dir_okay=False),
+        typer.Option(help="File to write. (default: report.html of the run)", dir_okay=False),
     ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,

@@ -50,7 +50,7 @@ def run(
         typer.Argument(help="Scenarios, or folders of them.", metavar="SCENARIO..."),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs. [default: the workspace's runs]")
+        Path | None, typer.Option(help="Folder for the runs. (default: the workspace's runs)")
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from odscen.app.export import EXPORTERS
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, progress
+from odscen.base.errors import InputError, in_file
+from odscen.cli.console import (
+    JsonOption,
+    WorkspaceOption,
+    error_fields,
+    log,
+    print_json,
+    progress,
+)
+
+if TYPE_CHECKING:
+    from odscen.workspace.store import Workspace
 
 ScenarioArgument = Annotated[
     Path, typer.Argument(help="Scenario, as JSON or GraphML.", metavar="SCENARIO")
@@ -25,7 +36,7 @@ def _format(text: str) -> str:
 
 def generate(
     map_name: Annotated[
-        str | None, typer.Option("--map", help="Map to use. [default: drawn from the catalogue]")
+        str | None, typer.Option("--map", help="Map to use. (default: drawn from the catalogue)")
     ] = None,
     count: Annotated[int, typer.Option(min=1, max=100_000, help="How many scenarios.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first; the others count on.")] = 0,
@@ -40,7 +51,7 @@ def generate(
         Path | None, typer.Option(help="Sampling configuration, TOML or JSON.", dir_okay=False)
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write to. [default: the workspace's scenarios]")
+        Path | None, typer.Option(help="Folder to write to. (default: the workspace's scenarios)")
     ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -74,33 +85,55 @@ def generate(
 
 
 def check(
-    scenario: ScenarioArgument,
+    scenarios: Annotated[
+        list[Path], typer.Argument(help="Scenarios, as JSON or GraphML.", metavar="SCENARIO...")
+    ],
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check a scenario: everything that is wrong with it, where and why.
+    """Check scenarios: everything that is wrong with them, where and why.
 
-    Exit code 0 without errors (warnings are allowed), 2 with errors.
+    Exit code 0 without errors (warnings are allowed), 2 with errors. Of several files, one that
+    cannot be read does not keep the others from being checked.
     """
-    from odscen.app.scenarios import check_scenario, read_scenario
     from odscen.workspace.store import Workspace
 
-    problems = check_scenario(Workspace.open(workspace), read_scenario(scenario))
+    store = Workspace.open(workspace)
+    if len(scenarios) == 1:  # an error of reading it is the command's own
+        files = [_checked(store, scenarios[0])]
+    else:
+        files = [_checked_or_refused(store, path) for path in scenarios]
+    valid = all(file["valid"] for file in files)
+    if as_json:
+        print_json(files[0] if len(files) == 1 else {"valid": valid, "files": files})
+    raise typer.Exit(0 if valid else 2)
+
+
+def _checked_or_refused(workspace: Workspace, path: Path) -> dict[str, Any]:
+    """One of several files: one that cannot be read, or has no map, is a file with an error."""
+    try:
+        return _checked(workspace, path)
+    except InputError as error:
+        log(f"error: {error}")
+        return {"file": str(path), "valid": False, "error": error_fields(error)}
+
+
+def _checked(workspace: Workspace, path: Path) -> dict[str, Any]:
+    from odscen.app.scenarios import check_scenario, read_scenario
+
+    with in_file(str(path)):
+        problems = check_scenario(workspace, read_scenario(path))
     errors = sum(problem.severity == "error" for problem in problems)
     for problem in problems:
         log(f"{problem.severity}: {problem.where}: {problem.message}")
-    log(f"{scenario}: {errors} errors, {len(problems) - errors} warnings")
-    if as_json:
-        print_json(
-            {
-                "file": str(scenario),
-                "valid": errors == 0,
-                "errors": errors,
-                "warnings": len(problems) - errors,
-                "problems": [asdict(problem) for problem in problems],
-            }
-        )
-    raise typer.Exit(2 if errors else 0)
+    log(f"{path}: {errors} errors, {len(problems) - errors} warnings")
+    return {
+        "file": str(path),
+        "valid": errors == 0,
+        "errors": errors,
+        "warnings": len(problems) - errors,
+        "problems": [asdict(problem) for problem in problems],
+    }
 
 
 def export(

@@ -23,7 +23,7 @@ JunctionOption = Annotated[
 ]
 OutOption = Annotated[
     Path | None,
-    typer.Option("-o", "--out", help="File to write. [default: the scenario itself]"),
+    typer.Option("-o", "--out", help="File to write. (default: the scenario itself)"),
 ]
 
 app = typer.Typer(
@@ -146,7 +146,7 @@ def webster(
     junction: JunctionOption = None,
     begin: Annotated[
         float | None,
-        typer.Option(help="Second of the scenario. [default: the busiest hour]", min=0.0),
+        typer.Option(help="Second of the scenario. (default: the busiest hour)", min=0.0),
     ] = None,
     end: Annotated[float | None, typer.Option(help="Second of the scenario.", min=0.0)] = None,
     saturation: Annotated[
@@ -199,10 +199,10 @@ def coordinate(
         str, typer.Option(help="Whose band is to be the widest: both, out or back.")
     ] = "both",
     speed: Annotated[
-        float | None, typer.Option(help="Progression speed, km/h. [default: the speed limits]")
+        float | None, typer.Option(help="Progression speed, km/h. (default: the speed limits)")
     ] = None,
     cycle: Annotated[
-        float | None, typer.Option(help="Seconds. [default: the longest of the lights]", min=1.0)
+        float | None, typer.Option(help="Seconds. (default: the longest of the lights)", min=1.0)
     ] = None,
     svg: Annotated[
         Path | None, typer.Option("--svg", help="Write the time-space diagram here.")

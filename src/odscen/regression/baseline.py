@@ -33,12 +33,14 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
+_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
+_LEAST_SPREAD = 0.01
+"""Share of the largest value by which this figure differs, at least, where seeds vary."""
+
 _KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
 """What a run was made of, by name: ``map``, ``scenario.actors``, ``odscen``, ``sumo``, ..."""
-
-_VERSIONS = ("odscen", "sumo")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,21 +81,6 @@ def _digest(value: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
 
 
-def changed_inputs(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:
-    """Say what is different in what two runs were made of, in words; nothing if nothing is."""
-    changes = []
-    for name in sorted(old.keys() | new.keys()):
-        before, now = old.get(name, "none"), new.get(name, "none")
-        if before == now:
-            continue
-        if name in _VERSIONS:
-            changes.append(f"{name} {before} -> {now}")
-        else:
-            part = name.removeprefix("scenario.")
-            changes.append(f"the {name}" if part == name else f"the scenario's {part}")
-    return tuple(changes)
-
-
 def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
     """Make the baseline of the runs of a scenario, given by seed."""
     seeds = tuple(sorted(runs))
@@ -101,6 +88,16 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
     return Baseline(
         seeds, made_of, {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys}
     )
+
+
+def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
+    """Warn where seeds make next to no difference, as their scatter then says little of chance."""
+    values = baseline.figures.get(_OF_CHANCE, ())
+    known = [value for value in values if value is not None]
+    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+        return ()
+    spread = f"{min(known):g} to {max(known):g} s"
+    return (f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more",)
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:

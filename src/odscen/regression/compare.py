@@ -36,6 +36,9 @@ VERSION = 1
 MOST = 8
 """Places that are named, at most."""
 
+NAMED = 3
+"""Folders that an error names."""
+
 _TELLING = {(figure.kind, figure.name) for figure in SEGMENT_FIGURES if figure.tells}
 """The one figure of each kind of place that says how well traffic moves there."""
 
@@ -197,8 +200,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     else:
         folders = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
     if not folders:
-        msg = f"no run here: there is no {SUMMARY_FILE}"
-        raise InputError(msg, file=str(folder))
+        raise InputError(_no_run(folder), file=str(folder))
     runs: dict[int, Measured] = {}
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
@@ -231,6 +233,16 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
         tuple(networks),
         None if workspace is None else _shapes(workspace, maps),
     )
+
+
+def _no_run(folder: Path) -> str:
+    """Say what is wanted, with the folders further down that would do."""
+    wanted = f"name a run, which has a {SUMMARY_FILE}, or a folder of runs of one scenario"
+    deeper = sorted({path.parent.parent for path in folder.glob(f"*/*/{SUMMARY_FILE}")})
+    if not deeper:
+        return f"no run here; {wanted}"
+    listed = ", ".join(map(str, deeper[:NAMED])) + (", ..." if len(deeper) > NAMED else "")
+    return f"runs of {len(deeper)} scenarios, one folder further down; {wanted}: {listed}"
 
 
 def _summary(folder: Path) -> dict[str, Any]:

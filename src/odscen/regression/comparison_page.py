@@ -6,18 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from odscen.base.markup import Markup, element, join, number, path_data
+from odscen.base.markup import Markup, element, join, number
+from odscen.regression.place_map import place_map
 from odscen.results.measures.comparison import Finding
 from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.results.report.plots import Dots, dot_chart, legend
 from odscen.results.report.report_flow import DENSITY, FLOW, column
-from odscen.results.report.report_map import fitted_view, scale_bar, view_box
 from odscen.results.report.report_words import stretch
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.regression.compare import Row, RunComparison, RunSet
+    from odscen.regression.place_map import PlaceStyles
     from odscen.results.report.place_shapes import PlaceShapes
 
 STEPS = (0.05, 0.15, 0.3)
@@ -200,6 +201,12 @@ def _place_section(result: RunComparison) -> Markup | None:
     )
 
 
+def grade(worse: float) -> str:
+    """Class of the colour of a change, a share of the value before; positive is worse."""
+    step = int(np.searchsorted(STEPS, abs(worse)))
+    return f"d{3 - step if worse > 0 else 3 + step}"
+
+
 _GRADES = (
     "over 30 % worse in B", "15 to 30 % worse", "5 to 15 % worse", "about the same",
     "5 to 15 % better", "15 to 30 % better", "over 30 % better in B",
@@ -207,54 +214,28 @@ _GRADES = (
 
 
 def _change_map(result: RunComparison, shapes: PlaceShapes) -> Markup | None:
-    bounds = fitted_view(shapes.points, None)
-    if bounds is None:
-        return None
-    extent = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    grades = _grades(result)
-    named = {row.key.place for row in result.places}
-    parts = []
-    for name, lines in shapes.segments.items():
-        style, words = grades.get(("segment", name), ("los-none", "too few vehicles"))
-        title = element("title", f"{name}: {words}")
-        parts.append(element("path", title, d=path_data(lines.xy * (1, -1), lines.start),
-                             class_=style))  # fmt: skip
-    width = round(100 * max(3.0, extent / 350.0))
-    roads = element("g", *parts, class_="change-roads", stroke_width=width)
-    radius = round(100 * min(extent / 110.0, 10.0))
-    discs, labels = [], []
-    for name, (x, y) in shapes.junctions.items():
-        style, words = grades.get(("junction", name), ("los-none", "too few vehicles"))
-        cx, cy = round(x * 100), round(-y * 100)
-        title = element("title", f"{name}: {words}")
-        discs.append(element("circle", title, cx=cx, cy=cy, r=radius, class_=style))
-        if name in named:
-            labels.append(element("text", name, x=cx, y=cy - round(radius * 1.4),
-                                  font_size=round(extent * 1.7)))  # fmt: skip
-    svg = element(
-        "svg",
-        element("title", "Map of the roads and junctions, coloured by how they have changed"),
-        roads,
-        element("g", *discs, class_="los-discs", stroke_width=round(width / 5)),
-        element("g", *labels, class_="place-names"),
-        scale_bar(bounds),
-        viewBox=view_box(bounds),
-        class_="run-map",
-        role="img",
+    junctions = {row.key.place for row in result.places if row.key.kind == "junction"}
+    svg = place_map(
+        shapes,
+        _grades(result),
+        title="Map of the roads and junctions, coloured by how they have changed",
+        names={name: name for name in junctions},
     )
+    if svg is None:
+        return None
     keys = [(f"d{index}", grade) for index, grade in enumerate(_GRADES)]
     return element("div", svg, legend([*keys, ("los-none", "too few vehicles")]),
                    class_="map-figure")  # fmt: skip
 
 
-def _grades(result: RunComparison) -> dict[tuple[str, str], tuple[str, str]]:
+def _grades(result: RunComparison) -> PlaceStyles:
     """Colour and words of each place with traffic on both sides."""
     passed = {
         (str(row.key.kind), row.key.place): min(row.difference.a or 0.0, row.difference.b or 0.0)
         for row in result.rows
         if row.key.figure == "vehicles"
     }
-    found: dict[tuple[str, str], tuple[str, str]] = {}
+    found: PlaceStyles = {}
     for row in result.place_rows:
         key = (str(row.key.kind), row.key.place)
         difference = row.difference
@@ -264,11 +245,9 @@ def _grades(result: RunComparison) -> dict[tuple[str, str], tuple[str, str]]:
         base = max(abs(difference.a or 0.0), 1.0)
         worse = -1.0 if row.improves else 1.0
         share = worse * abs(difference.difference) / base
-        step = int(np.searchsorted(STEPS, abs(share)))
-        grade = 3 - step if share > 0 else 3 + step
         values = (f"{row.key.entry.written(value or 0.0)} in {side}"
                   for value, side in ((difference.a, "A"), (difference.b, "B")))  # fmt: skip
-        found[key] = (f"d{grade}", f"{row.key.entry.label} {', '.join(values)}")
+        found[key] = (grade(share), f"{row.key.entry.label} {', '.join(values)}")
     return found
 
 

@@ -2,135 +2,49 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import tempfile
 import threading
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.app.runs import check_run, run_all
-from odscen.app.scenarios import read_scenario
-from odscen.base.errors import InputError, in_file
-from odscen.convert.model.conversion_settings import ConversionSettings
-from odscen.regression.baseline import (
-    baseline_of,
-    changed_inputs,
-    fingerprint,
-    read_baseline,
-    write_baseline,
-)
+from odscen.app.runs import run_all
+from odscen.base.errors import in_file
+from odscen.regression.baseline import baseline_of, seeds_that_hardly_vary, write_baseline
+from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
+from odscen.regression.causes import causes_between, likeliest_first
 from odscen.regression.measure import measure
+from odscen.regression.own_figures import own_values
+from odscen.regression.suite import missing_case
+from odscen.regression.suite_loading import LoadedCase, load_cases
 from odscen.regression.verdict import hold_against
-from odscen.results.measures.expectations import evaluate, needs_criticality
+from odscen.results.measures.expectations import evaluate
 from odscen.results.records.outcomes import RunStatus
-from odscen.sumo.realize.recording import Recording
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.workspace.asset_catalogue import shipped_assets
-from odscen.workspace.store import name_from_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-    from odscen.app.runs import CheckedRun
-    from odscen.convert.model.conversion_settings import ConverterName
-    from odscen.regression.baseline import Baseline, Fingerprint
+    from odscen.base.errors import InputError
+    from odscen.regression.baseline import Baseline
     from odscen.regression.measure import Measured
-    from odscen.regression.suite import Case, Suite
-    from odscen.regression.verdict import BaselineVerdict
-    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.regression.suite import Suite
+    from odscen.regression.suite_loading import UnusableCase
+    from odscen.regression.verdict import Change
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.store import Workspace
 
 
-class CaseStatus(StrEnum):
-    """Verdict on a scenario of a suite; ``error`` if a run of it failed."""
+class Update(NamedTuple):
+    """Whether baselines are written anew; ``force`` also of scenarios that fall short."""
 
-    PASSED = "passed"
-    FAILED = "failed"
-    ERROR = "error"
-
-    @property
-    def label(self) -> str:
-        """In words."""
-        return "run failed" if self is CaseStatus.ERROR else self.value
+    wanted: bool = False
+    force: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class SeedResult:
-    """One run of a case; ``error`` in SUMO's words if it failed, ``missed`` in ours."""
-
-    seed: int
-    wall_seconds: float
-    error: str | None
-    missed: tuple[str, ...]
-    figures: Measured
-
-
-@dataclass(frozen=True, slots=True)
-class CaseResult:
-    """What became of one scenario of a suite.
-
-    Attributes
-    ----------
-    changed_inputs
-        What the runs are made of that the baseline was not made of; empty without a baseline.
-    verdict
-        Against the baseline; ``None`` without one.
-    problems
-        Every reason to fail, in words.
-    updated
-        Whether the baseline was written anew.
-    """
-
-    case: Case
-    map_name: str
-    runs: tuple[SeedResult, ...]
-    changed_inputs: tuple[str, ...] = ()
-    verdict: BaselineVerdict | None = None
-    problems: tuple[str, ...] = ()
-    updated: bool = False
-
-    @property
-    def status(self) -> CaseStatus:
-        """``error`` if a run failed, ``failed`` if one fell short, else ``passed``."""
-        if any(run.error for run in self.runs):
-            return CaseStatus.ERROR
-        return CaseStatus.FAILED if self.problems else CaseStatus.PASSED
-
-    @property
-    def wall_seconds(self) -> float:
-        """Of all runs, one after the other."""
-        return sum(run.wall_seconds for run in self.runs)
-
-
-@dataclass(frozen=True, slots=True)
-class SuiteResult:
-    """A suite that has been run."""
-
-    suite: Suite
-    cases: tuple[CaseResult, ...]
-
-    @property
-    def exit_code(self) -> int:
-        """0 all passed; 1 something differs or falls short; 3 a run failed."""
-        found = {case.status for case in self.cases}
-        return 3 if CaseStatus.ERROR in found else 1 if CaseStatus.FAILED in found else 0
-
-
-@dataclass(slots=True)
-class _Loaded:
-    """A case with its scenario on the map that it will run on; ``run`` is without a seed."""
-
-    case: Case
-    run: CheckedRun
-    made_of: Fingerprint
-    baseline: Baseline | None
-    runs: dict[int, SeedResult] = field(default_factory=dict)
+NO_UPDATE = Update()
 
 
 def run_suite(
@@ -138,49 +52,75 @@ def run_suite(
     suite: Suite,
     *,
     processes: int = 1,
-    update_baseline: bool = False,
+    update: Update = NO_UPDATE,
     out: Path | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> SuiteResult:
     """Run every scenario of a suite with every seed, and judge what comes out.
 
+    A scenario that cannot be read, does not fit its map, or whose map or baseline cannot be used is
+    an error of its own, and the others run.
+
     Parameters
     ----------
     processes
         How many run at a time.
-    update_baseline
-        Write baselines anew of what comes out, instead of holding it against them.
+    update
+        Whether baselines are written anew of what comes out, instead of holding it against them.
     out
         Keeps the runs there, one folder per scenario and seed, with reports; else they are deleted.
 
     Raises
     ------
     InputError
-        If a map, a scenario or a baseline cannot be used; nothing is run then.
+        If the suite names a map that is not there and that no scenario is on.
+    WorkspaceError
+        If the workspace or ``out`` cannot be written.
     """
-    loaded = _load(workspace, suite, with_baseline=not update_baseline)
-    jobs: dict[str, tuple[_Loaded, int]] = {}
+    cases = load_cases(workspace, suite, with_baseline=not update.wanted)
+    loaded = [case for case in cases if isinstance(case, LoadedCase)]
     with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
         root = out or Path(temporary)
-        runs = []
-        for case in loaded:
-            for seed in case.case.seeds:
-                name = f"{case.case.name}/seed-{seed}"
-                jobs[name] = case, seed
-                settings = replace(case.run.settings, seed=seed)
-                runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
-        follow = _Follow(len(runs), progress)
+        _run_all(loaded, suite, root, keep=out is not None, processes=processes, tell=progress)
+    judged = [_result(case, update) for case in cases]
+    return SuiteResult(suite, (*judged, *map(_missing, suite.missing)))
 
-        def done(job: RunJob, result: Run) -> None:
-            case, seed = jobs[job.name]
-            case.runs[seed] = _seed_result(case, seed, result)
-            if out is None:
-                shutil.rmtree(result.folder)
-            follow.done(job)
 
-        keep = out is not None
-        run_all(runs, processes=processes, reports=keep, progress=follow.step, done=done)
-    return SuiteResult(suite, tuple(_judge(case, update=update_baseline) for case in loaded))
+def _run_all(
+    loaded: Sequence[LoadedCase],
+    suite: Suite,
+    root: Path,
+    *,
+    keep: bool,
+    processes: int,
+    tell: Callable[[str, float], None] | None,
+) -> None:
+    """Run each case with each seed in a folder of ``root``, and keep the results with the case."""
+    jobs: dict[str, tuple[LoadedCase, int]] = {}
+    runs = []
+    for case in loaded:
+        for seed in case.case.seeds:
+            name = f"{case.case.name}/seed-{seed}"
+            jobs[name] = case, seed
+            settings = replace(case.run.settings, seed=seed)
+            runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
+    follow = _Follow(len(runs), tell)
+
+    def done(job: RunJob, result: Run) -> None:
+        case, seed = jobs[job.name]
+        case.runs[seed] = _seed_result(case, seed, result, suite, kept=keep)
+        if not keep:
+            shutil.rmtree(result.folder)
+        follow.done(job)
+
+    def refused(job: RunJob, error: InputError) -> None:
+        case, seed = jobs[job.name]
+        case.refused[seed] = f"seed {seed}: {error}"
+        follow.done(job)
+
+    run_all(
+        runs, processes=processes, reports=keep, progress=follow.step, done=done, refused=refused
+    )
 
 
 class _Follow:
@@ -207,100 +147,116 @@ class _Follow:
             self._tell(name, total)
 
 
-def _load(workspace: Workspace, suite: Suite, *, with_baseline: bool) -> list[_Loaded]:
-    maps = {name_from_file(path): path for path in suite.maps}
-    loaded = []
-    for case in suite.cases:
-        scenario = read_scenario(case.file)
-        with in_file(str(case.file)):
-            entry = _map_of(workspace, scenario, maps, suite.converter)
-            # The suite names the map to test on; a baseline knows if it is not the one of before.
-            reference = scenario.map.model_copy(update={"sha256": entry.sha256})
-            scenario = scenario.model_copy(update={"map": reference})
-            settings = _settings(case, suite)
-            run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
-        network = None if entry.converter == "odscen" else entry.net_sha256
-        made_of = fingerprint(scenario, entry.sha256, settings, network=network)
-        baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
-        run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
-        loaded.append(_Loaded(case, run, made_of, baseline))
-    return loaded
-
-
-def _map_of(
-    workspace: Workspace,
-    scenario: Scenario,
-    maps: Mapping[str, Path],
-    converter: ConverterName | None,
-) -> MapEntry:
-    """Find the map of the suite, built in the workspace if need be; else the workspace's own.
-
-    A map of that name and another content or converter in the workspace is left alone.
-    """
-    name = scenario.map.name
-    if name not in maps:
-        own = workspace.map_for(name, scenario.map.sha256)
-        if converter in (None, own.converter):
-            return own
-    source = maps[name] if name in maps else own.path("xodr")
-    wished = ConversionSettings(spacing=scenario.map.spacing, converter=converter or "odscen")
-    try:
-        content = source.read_bytes()
-    except OSError as error:
-        raise InputError(error.strerror or str(error), file=str(source)) from error
-    sha256 = hashlib.sha256(content).hexdigest()
-    for entry in workspace.maps():
-        if (entry.sha256, entry.conversion) == (sha256, wished):
-            return entry
-    free = name not in workspace.map_names()
-    new = name if free else f"{name[:40]}-{sha256[:8]}-{wished.converter}"
-    return workspace.add_map(source, name=new, settings=wished)
-
-
-def _settings(case: Case, suite: Suite) -> RunSettings:
-    return RunSettings(
-        until=case.until,
-        step_length=case.step_length,
-        recording=Recording(criticality=needs_criticality(case.expectations)),
-        time_limit=suite.time_limit,
-    )
-
-
-def _seed_result(loaded: _Loaded, seed: int, result: Run) -> SeedResult:
+def _seed_result(
+    loaded: LoadedCase, seed: int, result: Run, suite: Suite, *, kept: bool
+) -> SeedResult:
     summary = result.summary
+    folder, seconds = result.folder if kept else None, summary["wall_seconds"]
+    if result.status is RunStatus.FAILED:
+        error = f"seed {seed}: the run failed: {summary['error']}"
+        return SeedResult(seed, seconds, error, (), measure(result.folder, summary), folder)
+    with in_file(str(suite.file)):
+        own = own_values(suite.figures, result, beside=suite.file.parent)
+    summary = {**summary, "figures": {**summary["figures"], **own}}
     missed = [
         f"seed {seed}: expected {verdict.expectation}, but it is "
         f"{'nothing' if verdict.value is None else f'{verdict.value:g}'}"
         for verdict in evaluate(loaded.case.expectations, summary)
         if not verdict.passed
     ]
-    error = None
-    if result.status is RunStatus.FAILED:
-        error = f"seed {seed}: the run failed: {summary['error']}"
-        missed = []
-    figures = measure(result.folder, summary)
-    return SeedResult(seed, summary["wall_seconds"], error, tuple(missed), figures)
+    return SeedResult(seed, seconds, None, tuple(missed), measure(result.folder, summary), folder)
 
 
-def _judge(loaded: _Loaded, *, update: bool) -> CaseResult:
+def _missing(baseline: Path) -> CaseResult:
+    problem = f"the suite has no scenario of this name; delete {baseline} if it is to go"
+    return CaseResult(missing_case(baseline), missing=(problem,))
+
+
+def _result(loaded: LoadedCase | UnusableCase, update: Update) -> CaseResult:
+    if isinstance(loaded, LoadedCase):
+        return _judge(loaded, update)
+    error = loaded.error
+    return CaseResult(loaded.case, errors=(str(error),), error_code=error.exit_code)
+
+
+def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
+    """Status of a scenario that was run, without or with its baseline."""
     case = loaded.case
-    runs = tuple(loaded.runs[seed] for seed in case.seeds)
-    problems = [run.error for run in runs if run.error]
-    problems += [missed for run in runs for missed in run.missed]
-    figures = {run.seed: run.figures for run in runs if not run.error}
-    if case.baseline is None or (update and len(figures) < len(runs)):
-        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
-    if update:
-        write_baseline(baseline_of(figures, loaded.made_of), case.baseline, scenario=case.name)
-        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems), updated=True)
+    runs = tuple(loaded.runs[seed] for seed in case.seeds if seed in loaded.runs)
+    broken = [run.error for run in runs if run.error]
+    missed = tuple(missed for run in runs for missed in run.missed)
+    result = CaseResult(
+        case,
+        runs,
+        map_name=loaded.run.scenario.map.name,
+        entry=loaded.run.entry,
+        made_of=loaded.made_of,
+        baseline=loaded.baseline,
+        errors=(*broken, *loaded.refused.values()),
+        error_code=3 if broken else 2,
+        failures=missed,
+    )
+    if case.baseline is None or result.errors:
+        return result
+    figures = {run.seed: run.figures for run in runs}
+    if update.wanted:
+        return _updated(result, figures, force=update.force)
     if loaded.baseline is None:
-        problems.append(f"there is no baseline {case.baseline}; write it with --update-baseline")
-        return CaseResult(case, loaded.run.entry.name, runs, problems=tuple(problems))
-    unknown = sorted(figures.keys() - set(loaded.baseline.seeds))
-    if unknown:
-        listed = ", ".join(map(str, unknown))
-        problems.append(f"the baseline has no seed {listed}; write it with --update-baseline")
-    verdict = hold_against(loaded.baseline, figures, case.tolerances)
-    inputs = changed_inputs(loaded.baseline.fingerprint, loaded.made_of)
-    problems += [change.words for change in verdict.failing]
-    return CaseResult(case, loaded.run.entry.name, runs, inputs, verdict, tuple(problems))
+        new = f"there is no baseline {case.baseline}; write it with --update-baseline"
+        return replace(result, new=(new,))
+    return _held(result, loaded, loaded.baseline, figures)
+
+
+def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool) -> CaseResult:
+    """Write the baseline, unless an expectation is missed."""
+    file = result.case.baseline
+    if file is None:
+        return result
+    if result.failures and not force:
+        kept = "is left as it was" if file.is_file() else "is not written"
+        note = f"the baseline {kept}, as expectations are not met; --force writes it"
+        return replace(result, notes=(note,))
+    baseline = baseline_of(figures, result.made_of)
+    write_baseline(baseline, file, scenario=result.name)
+    return replace(result, updated=True, notes=seeds_that_hardly_vary(baseline))
+
+
+def _held(
+    result: CaseResult, loaded: LoadedCase, baseline: Baseline, figures: Mapping[int, Measured]
+) -> CaseResult:
+    """Hold a scenario against its baseline."""
+    case = result.case
+    verdict = hold_against(baseline, figures, case.tolerances, better_fails=case.better_fails)
+    worst = sorted(verdict.failing, key=lambda change: -change.score)
+    causes = likeliest_first(causes_between(baseline.fingerprint, loaded.made_of), worst)
+    names = {cause.name for cause in causes}
+    failures = [*result.failures, *(change.words for change in verdict.failing)]
+    if case.map_fails and "map" in names:
+        failures.append("the map has changed, which this suite does not allow")
+    return replace(
+        result,
+        causes=causes,
+        verdict=verdict,
+        failures=tuple(failures),
+        missing=_seeds(baseline.seeds, figures, "the baseline has seed {}, which was not run"),
+        new=_seeds(figures, baseline.seeds, "the baseline has no seed {}"),
+        notes=_notes(loaded, verdict.figures, names),
+    )
+
+
+def _seeds(there: Iterable[int], known: Iterable[int], words: str) -> tuple[str, ...]:
+    """Seeds of one side that the other does not have, in words."""
+    listed = ", ".join(map(str, sorted(set(there) - set(known))))
+    return (f"{words.format(listed)}; write it with --update-baseline",) if listed else ()
+
+
+def _notes(
+    loaded: LoadedCase, figures: Iterable[Change], causes: Collection[str]
+) -> tuple[str, ...]:
+    """Say that demand given by the size or the speed of the map follows the map."""
+    follows = [one for one in loaded.run.scenario.demand.background if one.trips is None]
+    planned = any(change.key.figure == "planned" for change in figures)
+    if not (planned and follows and "map" in causes and "demand" not in causes):
+        return ()
+    names = ", ".join(one.id for one in follows)
+    return (f"the number of road users follows the map: {names} is given per km or as a share",)

@@ -19,19 +19,33 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.run_settings import RunSettings
 
 _SUFFIX = ".scenario.json"
+_WORKSPACE = "--odscen-workspace"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Declare the options of the plugin."""
     group = parser.getgroup("odscen", "traffic scenarios")
     group.addoption(
-        "--odscen-workspace",
+        _WORKSPACE,
         metavar="DIR",
-        help="workspace with the maps of the scenarios [default: as for the odscen command]",
+        help="workspace with the maps of the scenarios, written with = before DIR "
+        "(default: odscen_workspace of the configuration, else as for the odscen command)",
     )
+    parser.addini("odscen_workspace", "workspace with the maps, relative to this file")
     parser.addini("odscen_collect", "collect *.scenario.json files as tests", type="bool")
     parser.addini("odscen_expect", "expectations of every collected scenario", type="linelist")
     parser.addini("odscen_seeds", "seeds of every collected scenario", type="args")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse the form of the option that makes pytest take the workspace for a folder of tests.
+
+    pytest looks for its configuration before it knows the options of plugins: what follows one
+    after a space is a path to it, and moves its root.
+    """
+    if _WORKSPACE in config.invocation_params.args:
+        msg = f"write {_WORKSPACE}=DIR: after a space, pytest takes DIR for a folder of tests"
+        raise pytest.UsageError(msg)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -89,14 +103,14 @@ class _ScenarioTest(pytest.Item):
         return self.path, None, f"{self.path.name}: {self.name}"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def odscen_run(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[..., Run]:
     """Return a function that runs a scenario and gives the finished :class:`Run`.
 
     ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``. A run that
-    fails or falls short of ``expect`` fails the test.
+    fails or falls short of ``expect`` fails the test. Fixtures of any scope can use it.
     """
 
     def run(
@@ -107,13 +121,20 @@ def odscen_run(
         expect: Sequence[str] = (),
         workspace: Path | None = None,
     ) -> Run:
-        settings = _settings(seed=seed, until=until, expect=expect)
+        __tracebackhide__ = True  # a failure shows the test's own line
+        from odscen.base.errors import OdscenError
+
         folder = tmp_path_factory.mktemp("odscen")
-        result = _run(request.config, folder, scenario, settings, workspace=workspace)
-        found = _shortcomings(result)
-        if found:
-            pytest.fail("\n".join(found))
-        return result
+        try:
+            settings = _settings(seed=seed, until=until, expect=expect)
+            result = _run(request.config, folder, scenario, settings, workspace=workspace)
+        except OdscenError as error:
+            problem = str(error)
+        else:
+            problem = "\n".join(_shortcomings(result))
+            if not problem:
+                return result
+        pytest.fail(problem)
 
     return run
 
@@ -141,7 +162,10 @@ def _run(
     from odscen.app import runs
     from odscen.workspace.store import Workspace
 
-    named = workspace or config.getoption("--odscen-workspace")
+    named = workspace or config.getoption(_WORKSPACE)
+    configured = config.getini("odscen_workspace")
+    if not named and configured:
+        named = (config.inipath or config.rootpath / "-").parent / configured
     store = Workspace.open(Path(named) if named else None)
     return runs.run(store, Path(scenario), settings=settings, out=out)
 
@@ -152,7 +176,11 @@ def _shortcomings(result: Run) -> list[str]:
     if result.status is RunStatus.FAILED:
         return [f"the run failed: {result.summary['error']}"]
     return [
-        f"expected {verdict['expectation']}, but it is {verdict['value']}"
+        f"expected {verdict['expectation']}, but it is {_plain(verdict['value'])}"
         for verdict in result.summary["expectations"]
         if not verdict["passed"]
     ]
+
+
+def _plain(value: float | None) -> str:
+    return "nothing" if value is None else f"{value:g}"

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, ValidationInfo
 
 from odscen.app.scenarios import scenario_name
-from odscen.base.errors import InputError, ScenarioError
+from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.regression.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
 from odscen.regression.tolerance import Tolerances, parse_tolerance
 from odscen.results.measures.expectations import parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
@@ -17,31 +19,35 @@ from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validation_problems
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.regression.tolerance import Tolerance
     from odscen.results.measures.expectations import Expectation
+    from odscen.results.measures.figure import Figure
 
 Seeds = Annotated[
     tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], Field(min_length=1, max_length=1000)
 ]
 ToleranceTable = dict[str, str | dict[str, str]]
 
+_WILD = re.compile(r"[*?\[]")
+
 _PLACE_KINDS = {figure.kind for figure in ALL_FIGURES} - {"run"}
 
 
-def _expectation(text: str) -> str:
+def _expectation(text: str, info: ValidationInfo) -> str:
     try:
-        parse_expectation(text)
+        parse_expectation(text, own=info.context or {})
     except InputError as error:
         raise ValueError(error.problem) from error
     return text
 
 
-def _tolerance_table(table: ToleranceTable) -> ToleranceTable:
+def _tolerance_table(table: ToleranceTable, info: ValidationInfo) -> ToleranceTable:
     try:
-        _tolerances(table)
+        _tolerances(table, own=info.context or {})
     except InputError as error:
         raise ValueError(str(error)) from error
     return table
@@ -57,6 +63,9 @@ class _Settings(Part):
     )
     until: Annotated[float, Field(gt=0, le=1e9)] | None = None
     step_length: Annotated[float, Field(gt=0, le=1)] | None = None
+    time_limit: Annotated[float, Field(gt=0)] | None = None
+    better: Literal["pass", "fail"] | None = None
+    map: Literal["report", "fail"] | None = None
 
 
 class _ScenarioEntry(_Settings):
@@ -70,12 +79,28 @@ class _SuiteDocument(_Settings):
     scenario: tuple[_ScenarioEntry, ...] = ()
     baselines: Label | None = None
     converter: Literal["odscen", "netconvert"] | None = None
-    time_limit: Annotated[float, Field(gt=0)] | None = None
+    figures: dict[FigureName, FigureEntry] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One scenario of a suite, with everything that is set for it."""
+    """One scenario of a suite, with everything that is set for it.
+
+    Attributes
+    ----------
+    file
+        Of the scenario; need not be there.
+    until, step_length
+        Seconds; the scenario's own without.
+    time_limit
+        Wall seconds of one run.
+    baseline
+        Its file, whether it is there or not; ``None`` if only expectations count.
+    better_fails
+        Whether a figure fails, too, that is better than its tolerance allows.
+    map_fails
+        Whether it fails when its map has changed since the baseline.
+    """
 
     name: str
     file: Path
@@ -85,6 +110,9 @@ class Case:
     until: float | None
     step_length: float | None
     baseline: Path | None
+    time_limit: float | None = None
+    better_fails: bool = False
+    map_fails: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,20 +122,45 @@ class Suite:
     Attributes
     ----------
     maps
-        The .xodr files to test on.
+        The .xodr files to test on; need not be there.
     converter
         Who writes their SUMO networks; ``None`` is odscen for ``maps``, and for those of the
         workspace who did.
-    time_limit
-        Wall seconds of one run.
+    missing
+        Baselines whose scenario the suite does not have.
+    figures
+        The suite's own figures of a run, by name.
+    whole
+        Whether it is all of the suite, not a part.
     """
 
     name: str
     file: Path
     maps: tuple[Path, ...]
     cases: tuple[Case, ...]
-    time_limit: float | None
     converter: ConverterName | None = None
+    missing: tuple[Path, ...] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    whole: bool = True
+
+    def shard(self, number: int, count: int) -> Suite:
+        """Return the ``number``-th of ``count`` parts, from 1: every scenario is in one of them.
+
+        Scenarios are dealt in the order of their names, those that are missing with the others.
+        """
+        names = sorted({case.name for case in self.cases} | {path.stem for path in self.missing})
+        mine = set(names[number - 1 :: count])
+        return replace(
+            self,
+            cases=tuple(case for case in self.cases if case.name in mine),
+            missing=tuple(path for path in self.missing if path.stem in mine),
+            whole=count == 1,
+        )
+
+
+def missing_case(baseline: Path) -> Case:
+    """Stand for a scenario that only its baseline knows; the baseline is its file."""
+    return Case(baseline.stem, baseline, (), (), Tolerances({}), None, None, baseline)
 
 
 def read_suite(file: Path) -> Suite:
@@ -125,22 +178,25 @@ def read_suite(file: Path) -> Suite:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         msg = f"the suite cannot be read: {error}"
         raise InputError(msg, file=str(file)) from error
+    own = declared(data)
     try:
-        document = _SuiteDocument.model_validate(data)
+        document = _SuiteDocument.model_validate(data, context=own)
     except ValidationError as error:
         msg = "the suite has problems"
         raise ScenarioError(msg, problems=validation_problems(error), file=str(file)) from error
-    return _suite(document, file)
+    with in_file(str(file)):
+        refuse_tolerances(own)
+    return _suite(document, file, own)
 
 
-def _suite(document: _SuiteDocument, file: Path) -> Suite:
+def _suite(document: _SuiteDocument, file: Path, own: Mapping[str, Figure]) -> Suite:
     named = [("scenarios", pattern, _ScenarioEntry(file=pattern)) for pattern in document.scenarios]
     named += [("scenario", entry.file, entry) for entry in document.scenario]
     folder = None if document.baselines is None else file.parent / document.baselines
     cases: dict[str, Case] = {}
     for key, pattern, entry in named:
         for path in _found(file, key, pattern):
-            case = _case(document, entry, path, folder)
+            case = _case(document, entry, path, folder, own)
             if case.name in cases and key == "scenarios":
                 msg = f"{path} has the name of {cases[case.name].file}; baselines go by name"
                 raise InputError(msg, file=str(file), element=key)
@@ -148,17 +204,22 @@ def _suite(document: _SuiteDocument, file: Path) -> Suite:
     if not cases:
         raise InputError("the suite names no scenario", file=str(file), element="scenarios")
     maps = [path for pattern in document.maps for path in _found(file, "maps", pattern)]
+    old = () if folder is None else sorted(folder.glob("*.json"))
     return Suite(
         name=document.name or file.stem,
         file=file,
         maps=tuple(dict.fromkeys(maps)),
         cases=tuple(cases.values()),
-        time_limit=document.time_limit,
         converter=document.converter,
+        missing=tuple(path for path in old if path.stem not in cases),
+        figures=own,
     )
 
 
 def _found(file: Path, key: str, pattern: str) -> list[Path]:
+    """Files of a pattern; one that is named need not be there, which is its scenario's error."""
+    if not _WILD.search(pattern):
+        return [file.parent / pattern]
     try:
         found = sorted(path for path in file.parent.glob(pattern) if path.is_file())
     except (ValueError, NotImplementedError) as error:
@@ -170,28 +231,40 @@ def _found(file: Path, key: str, pattern: str) -> list[Path]:
     return found
 
 
-def _case(document: _SuiteDocument, entry: _ScenarioEntry, path: Path, folder: Path | None) -> Case:
+def _case(
+    document: _SuiteDocument,
+    entry: _ScenarioEntry,
+    path: Path,
+    folder: Path | None,
+    own: Mapping[str, Figure],
+) -> Case:
     name = scenario_name(path)
-    tolerances = _tolerances(document.tolerance) | _tolerances(entry.tolerance)
+    tolerances = _tolerances(document.tolerance, own=own) | _tolerances(entry.tolerance, own=own)
     expect = dict.fromkeys((*document.expect, *entry.expect))
     return Case(
         name=name,
         file=path,
         seeds=tuple(dict.fromkeys(entry.seeds or document.seeds or (0,))),
-        expectations=tuple(parse_expectation(text) for text in expect),
-        tolerances=Tolerances(tolerances),
+        expectations=tuple(parse_expectation(text, own=own) for text in expect),
+        tolerances=Tolerances(tolerances, own),
         until=entry.until or document.until,
         step_length=entry.step_length or document.step_length,
         baseline=None if folder is None else folder / f"{name}.json",
+        time_limit=entry.time_limit or document.time_limit,
+        better_fails=(entry.better or document.better) == "fail",
+        map_fails=(entry.map or document.map) == "fail",
     )
 
 
-def _tolerances(table: ToleranceTable) -> dict[tuple[str, str], Tolerance]:
+def _tolerances(
+    table: ToleranceTable, *, own: Mapping[str, Figure]
+) -> dict[tuple[str, str], Tolerance]:
     """Tolerances by kind of place and figure; ``segment.vehicles`` is in a table."""
     found = {}
     for key, value in table.items():
         kind, rows = ("run", {key: value}) if isinstance(value, str) else (key, value)
         known = {figure.name: figure for figure in ALL_FIGURES if figure.kind == kind}
+        known |= own if kind == "run" else {}
         for name, text in rows.items():
             where = f"tolerance.{name}" if kind == "run" else f"tolerance.{kind}.{name}"
             if name not in known:

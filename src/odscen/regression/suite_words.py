@@ -4,31 +4,90 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from odscen.regression.case_results import CaseStatus
+from odscen.results.measures.figure import RunFigure
+
 if TYPE_CHECKING:
-    from odscen.regression.gates import CaseResult, SuiteResult
+    from odscen.regression.case_results import CaseResult, SuiteResult
     from odscen.regression.verdict import Change
 
-MOST = 12
-"""Changes that are reported of one scenario; JSON has all."""
+MOST = 6
+"""Problems that the terminal has of one scenario; JUnit, JSON and the page have all."""
+
+_KEY = ("mean_delay", "mean_travel_time", "mean_speed", "worst_junction_delay", "throughput")
+"""Figures of the run that come first in the headline, beside the counts of road users."""
+
+_IN_HEADLINE = 2
+"""Figures of the run in the headline; a place comes after them."""
 
 
-def reason(result: CaseResult) -> str | None:
+def headline(case: CaseResult) -> str:
+    """Say in one line what is wrong: the likeliest cause, its worst figures, and the worst place.
+
+    Of a scenario that passes: what has changed; empty if nothing has.
+    """
+    if case.status in (CaseStatus.ERROR, CaseStatus.MISSING, CaseStatus.NEW):
+        first = case.problems[0].splitlines()
+        return first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+    if case.status is CaseStatus.FAILED:
+        return f"{_cause(case)}{'; '.join(_worst(case))}"
+    return "; ".join([*_better(case)[:_IN_HEADLINE], *([why] if (why := _inputs(case)) else [])])
+
+
+def _cause(case: CaseResult) -> str:
+    """``"map: "``; the figures' own behaviour if no input has changed, nothing without baseline."""
+    if case.verdict is None:
+        return ""
+    return f"{case.causes[0].name if case.causes else 'behaviour'}: "
+
+
+def _worst(case: CaseResult) -> list[str]:
+    """The first missed expectation, the worst figures, the worst place."""
+    verdict = case.verdict
+    if verdict is None:
+        return list(case.failures[:_IN_HEADLINE])
+    changes = {change.words for change in verdict.failing}
+    found = [words for words in case.failures if words not in changes][:1]
+    failing = [change for change in verdict.figures if change.counts]
+    failing.sort(key=lambda change: not _is_key(change))  # the worst first among both
+    found += [change.words for change in failing[:_IN_HEADLINE]]
+    place = verdict.where
+    at = [] if place is None else [f"most at {place.words}" if found else place.words]
+    return [*found, *at]
+
+
+def _is_key(change: Change) -> bool:
+    """Whether people know the figure at a glance; those of the suite's own they do."""
+    entry = change.entry
+    own = not isinstance(entry, RunFigure)
+    return own or entry.name in _KEY or (isinstance(entry, RunFigure) and entry.count)
+
+
+def _better(case: CaseResult) -> list[str]:
+    better = () if case.verdict is None else case.verdict.better
+    return [f"better: {change.words}" for change in better]
+
+
+def _inputs(case: CaseResult) -> str | None:
+    changed = ", ".join(case.changed_inputs)
+    return f"changed since the baseline: {changed}" if changed else None
+
+
+def reason(case: CaseResult) -> str | None:
     """Say why figures may differ from the baseline: what was changed, or that nothing was."""
-    if result.verdict is None:
+    if case.verdict is None:
         return None
-    if result.changed_inputs:
-        return f"changed since the baseline: {', '.join(result.changed_inputs)}"
-    if result.verdict.failing:
+    if case.verdict.failing and not case.causes:
         return "map, scenario and versions are those of the baseline: the behaviour has changed"
-    return None
+    return _inputs(case)
 
 
-def where(result: CaseResult) -> str | None:
+def where(case: CaseResult) -> str | None:
     """Name the segments, the junction and the actor that have changed most, if something fails.
 
     Two segments: where one has changed, the next one often has as well.
     """
-    verdict = result.verdict
+    verdict = case.verdict
     if verdict is None or not verdict.failing:
         return None
     changes = (*verdict.places, *verdict.actors)
@@ -43,12 +102,22 @@ def where(result: CaseResult) -> str | None:
     return f"most changed: {'; '.join(named)}" if named else None
 
 
-def lines(result: CaseResult) -> list[str]:
-    """All that is reported of a scenario, one line each; nothing of one that passed."""
-    found = list(result.problems[:MOST])
-    if len(result.problems) > MOST:
-        found.append(f"and {len(result.problems) - MOST} more")
-    return [*found, *(text for text in (where(result), reason(result)) if text)]
+def details(case: CaseResult) -> list[str]:
+    """All there is to say of a scenario below its headline, one line each."""
+    found = [*case.problems, *_better(case)]
+    found += [text for text in (where(case), reason(case)) if text]
+    return list(dict.fromkeys(text for text in (*found, *case.notes) if text != headline(case)))
+
+
+def lines(case: CaseResult) -> list[str]:
+    """What the terminal has of a scenario, one line each; nothing of one that is as it was."""
+    top = headline(case)
+    below = details(case)
+    rest = [words for words in below if words not in (*case.problems, *_better(case))]
+    shown = [words for words in below if words not in rest]
+    if len(shown) > MOST:
+        shown = [*shown[:MOST], f"and {len(shown) - MOST} more"]
+    return [text for text in (top, *shown, *rest) if text]
 
 
 def to_dict(result: SuiteResult) -> dict[str, Any]:
@@ -58,6 +127,8 @@ def to_dict(result: SuiteResult) -> dict[str, Any]:
         "file": str(result.suite.file),
         "passed": result.exit_code == 0,
         "exit_code": result.exit_code,
+        "verdicts": {status.value: number for status, number in result.counts.items()},
+        "changed_inputs": {words: list(names) for words, names in result.touched.items()},
         "cases": [_case(case) for case in result.cases],
     }
 
@@ -66,15 +137,19 @@ def _case(case: CaseResult) -> dict[str, Any]:
     verdict = case.verdict
     most = None if verdict is None else verdict.where
     return {
-        "name": case.case.name,
+        "name": case.name,
         "file": str(case.case.file),
         "map": case.map_name,
         "status": case.status,
+        "headline": headline(case),
+        "cause": case.causes[0].name if case.causes else None,
         "seeds": [run.seed for run in case.runs],
         "wall_seconds": round(case.wall_seconds, 3),
         "problems": list(case.problems),
+        "notes": list(case.notes),
         "changed_inputs": list(case.changed_inputs),
         "changes": [_change(change) for change in verdict.failing] if verdict else [],
+        "better": [_change(change) for change in verdict.better] if verdict else [],
         "most_changed": None if most is None else _change(most),
         "baseline": None if case.case.baseline is None else str(case.case.baseline),
         "baseline_updated": case.updated,

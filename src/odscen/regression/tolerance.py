@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -73,8 +73,15 @@ class Tolerances:
     """Tolerances by kind of place and figure, for whatever differs from the usual."""
 
     given: Mapping[tuple[str, str], Tolerance]
+    own: Mapping[str, Figure] = field(default_factory=dict)
+    """Figures of the run that the suite defines, by name."""
+
+    def entry(self, key: FigureKey) -> Figure:
+        """What is known of a figure, be it the suite's own."""
+        own = self.own.get(key.figure) if key.kind == "run" else None
+        return own or key.entry
 
     def of(self, key: FigureKey) -> Tolerance:
         """Tolerance of one figure."""
         given = self.given.get((key.kind, key.figure))
-        return usual(key.entry) if given is None else given
+        return usual(self.entry(key)) if given is None else given

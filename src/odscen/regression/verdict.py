@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from odscen.regression.tolerance import EXACT
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from odscen.regression.measure import FigureKey, Measured
     from odscen.regression.tolerance import Tolerance, Tolerances
     from odscen.results.measures.comparison import Difference
+    from odscen.results.measures.figure import Figure
 
 FEWEST = 5
 """A place with fewer vehicles, as a mean over the seeds, is reported but fails nothing."""
@@ -24,20 +26,51 @@ _NOISE = 1e-4
 """Figures are written with that many decimals; a smaller difference is none."""
 
 
+class Effect(StrEnum):
+    """What a change amounts to."""
+
+    FAILS = "fails"
+    BETTER = "better"
+    FEW = "too few vehicles to fail"
+    EXPLAINS = "explains"
+
+
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A figure that is not as it was; ``score`` orders places by how much they have changed."""
+    """A figure that is not as it was.
+
+    Attributes
+    ----------
+    entry
+        What is known of the figure.
+    score
+        Orders changes: the difference over what is allowed, weighted by vehicles at places.
+    effect
+        What it amounts to.
+    """
 
     key: FigureKey
+    entry: Figure
     difference: Difference
     tolerance: Tolerance
     score: float
-    counts: bool
+    effect: Effect
+
+    @property
+    def counts(self) -> bool:
+        """Whether it fails the gate."""
+        return self.effect is Effect.FAILS
+
+    @property
+    def label(self) -> str:
+        """Figure and place for people."""
+        place = f"{self.key.kind} {self.key.place}: " if self.key.place else ""
+        return f"{place}{self.entry.label}"
 
     @property
     def row(self) -> tuple[str, str, str, str, str]:
         """Figure, baseline, value, difference and what is allowed, for people."""
-        figure, found = self.key.entry, self.difference
+        figure, found = self.entry, self.difference
         before, now = (
             "none" if value is None else figure.written(value) for value in (found.a, found.b)
         )
@@ -64,9 +97,9 @@ class BaselineVerdict:
     Attributes
     ----------
     figures
-        Of the whole run, in their order.
+        Of the whole run, those that have changed most for their tolerance first.
     places
-        Segments and junctions, the most changed first; those with ``counts`` fail the gate.
+        Segments and junctions, those that fail the gate first, the most changed before others.
     actors
         The most changed first; they explain, and fail only where the suite gives a tolerance.
     """
@@ -83,17 +116,33 @@ class BaselineVerdict:
         )
 
     @property
+    def better(self) -> tuple[Change, ...]:
+        """Changes for the better, figures of the run first."""
+        return tuple(
+            change for change in (*self.figures, *self.places) if change.effect is Effect.BETTER
+        )
+
+    @property
     def where(self) -> Change | None:
         """The place that has changed most, else the actor; ``None`` if all are as they were."""
         return next(iter((*self.places, *self.actors)), None)
 
 
 def hold_against(
-    baseline: Baseline, runs: Mapping[int, Measured], tolerances: Tolerances
+    baseline: Baseline,
+    runs: Mapping[int, Measured],
+    tolerances: Tolerances,
+    *,
+    better_fails: bool = False,
 ) -> BaselineVerdict:
     """Hold new runs, given by seed, against a baseline, by the means over the seeds of both.
 
     Figures of the run that the baseline does not have are newer than it, and are not judged.
+
+    Parameters
+    ----------
+    better_fails
+        Whether a figure fails, too, that is better than its tolerance allows.
     """
     seeds = [seed for seed in baseline.seeds if seed in runs]
     position = {seed: index for index, seed in enumerate(baseline.seeds)}
@@ -111,13 +160,14 @@ def hold_against(
         weight = _vehicles(key, baseline, runs, seeds, position)
         change = _change(key, compare_figure(old, new), tolerances, weight)
         if change is not None:
+            if better_fails and change.effect is Effect.BETTER:
+                change = replace(change, effect=Effect.FAILS)
             changes.append(change)
 
     def of(*kinds: str) -> tuple[Change, ...]:
         chosen = [change for change in changes if change.key.kind in kinds]
-        if kinds != ("run",):
-            chosen.sort(key=lambda change: (not change.counts, -change.score, change.key))
-        return tuple(chosen)
+        # Sorting is stable: figures of the run that are equally far off stay in their order.
+        return tuple(sorted(chosen, key=lambda change: (not change.counts, -change.score)))
 
     return BaselineVerdict(of("run"), of("segment", "junction"), of("actor"))
 
@@ -125,23 +175,30 @@ def hold_against(
 def _change(
     key: FigureKey, difference: Difference, tolerances: Tolerances, weight: float
 ) -> Change | None:
-    tolerance = tolerances.of(key)
+    tolerance, entry = tolerances.of(key), tolerances.entry(key)
     if difference.a is None or difference.b is None:
         # Places and actors without a figure are seen by who passed and who arrived.
         if difference.a is difference.b or key.kind != "run":
             return None
-        return Change(key, difference, EXACT, math.inf, counts=True)
+        return Change(key, entry, difference, EXACT, 1.0, Effect.FAILS)
     allowed = tolerance.allowed(difference.a)
     size = abs(difference.b - difference.a)
     if size <= allowed + _NOISE:
         return None
-    # A mean over n vehicles varies by chance with 1 / sqrt(n).
-    score = size / max(allowed, _NOISE) * math.sqrt(weight)
-    counts = {
-        "run": True,
-        "actor": (key.kind, key.figure) in tolerances.given,
-    }.get(key.kind, weight >= FEWEST)
-    return Change(key, difference, tolerance, score, counts=counts)
+    # A mean over n vehicles varies by chance with 1 / sqrt(n). Where none is allowed, one counts.
+    score = size / (allowed or 1.0) * math.sqrt(weight)
+    effect = _effect(key, tolerances, weight, better=entry.improves(difference.difference))
+    return Change(key, entry, difference, tolerance, score, effect)
+
+
+def _effect(
+    key: FigureKey, tolerances: Tolerances, weight: float, *, better: bool | None
+) -> Effect:
+    if key.kind == "actor" and (key.kind, key.figure) not in tolerances.given:
+        return Effect.EXPLAINS
+    if key.place and key.kind != "actor" and weight < FEWEST:
+        return Effect.FEW
+    return Effect.BETTER if better else Effect.FAILS
 
 
 def _vehicles(

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from odscen.base.errors import InputError
 from odscen.results.measures.expectations import NAMES, evaluate, parse_expectation
+from odscen.results.measures.figure import Figure
 from odscen.results.measures.registry import COUNTS
 
 SUMMARY = {
@@ -43,6 +44,17 @@ def test_a_failed_run_fails_every_expectation() -> None:
     failed = {"sim_seconds": None, "actors": {"planned": 5}, "figures": {}}
     wanted = [parse_expectation(f"{name}>=0") for name in NAMES if name != "planned"]
     assert not any(verdict.passed for verdict in evaluate(wanted, failed))
+
+
+def test_figures_of_ones_own_are_expected_as_others_are() -> None:
+    own = {"queue": Figure(name="queue", unit="m", label="", definition="", source="")}
+    longer = parse_expectation("queue <= 2 km", own=own)
+    assert (longer.bound, longer.share) == (2000.0, False)
+    summary = {"sim_seconds": 1.0, "actors": {"planned": 1}, "figures": {"queue": 2001.0}}
+    (verdict,) = evaluate([longer], summary)
+    assert (verdict.value, verdict.passed) == (2001.0, False)
+    with pytest.raises(InputError, match="no figure is named 'queue'"):
+        parse_expectation("queue <= 2 km")
 
 
 def test_shares_of_nobody_are_not_met() -> None:

@@ -44,6 +44,17 @@ def test_figures_and_counts_are_those_of_the_summary(finished: Run) -> None:
     assert finished.counts["planned"] == finished.actors().height
 
 
+def test_one_figure_is_a_number_or_says_why_there_is_none(finished: Run) -> None:
+    assert finished.figure("mean_delay") == finished.figures["mean_delay"]
+    assert finished.figure("planned") == finished.counts["planned"]
+    assert finished.figure("sim_seconds") == finished.summary["sim_seconds"]
+    with pytest.raises(NotFoundError, match=r"no figure named 'mean_dealy'; did you mean mean_del"):
+        finished.figure("mean_dealy")
+    with pytest.raises(InputError, match="the run has no min_ttc"):
+        finished.figure("min_ttc")
+    assert repr(finished).startswith("<Run of signal_crossing, seed ")
+
+
 def test_actors_agree_with_counts_and_events(finished: Run) -> None:
     actors, events = finished.actors(), finished.events()
     arrived = actors.filter(pl.col("status") == "arrived")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from odscen.base.errors import WorkspaceError
+from odscen.base.errors import InputError, WorkspaceError
 from odscen.results.measures.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import EventKind, events_from_json
@@ -201,6 +201,23 @@ def test_a_run_that_cannot_be_prepared_ends_the_others_and_tells_its_reason(
     with pytest.raises(WorkspaceError, match="no such map"):
         run_many(jobs, processes=1)
     assert not (tmp_path / "r3").exists()
+
+
+def test_a_run_that_cannot_be_prepared_is_left_out_where_somebody_is_told(
+    prepare: Prepare, tmp_path: Path
+) -> None:
+    def broken() -> PreparedRun:
+        msg = "no such place"
+        raise InputError(msg)
+
+    jobs = [
+        RunJob("broken", broken, tmp_path / "broken"),
+        RunJob("good", lambda: prepare(cars=2), tmp_path / "good"),
+    ]
+    told: dict[str, str] = {}
+    results = run_many(jobs, refused=lambda job, error: told.update({job.name: str(error)}))
+    assert told == {"broken": "no such place"}
+    assert [result.folder.name for result in results] == ["good"]
 
 
 def test_finish_adds_files_before_the_folder_appears(prepare: Prepare, tmp_path: Path) -> None:

@@ -18,11 +18,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.results.measures.figure import Basis
+from odscen.results.measures.figure import Basis, RunFigure
 from odscen.results.measures.registry import names_of, run_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from odscen.results.measures.figure import Figure
 
 NAMES = names_of("run")
 
@@ -59,7 +61,7 @@ class ExpectationVerdict:
     passed: bool
 
 
-def parse_expectation(text: str) -> Expectation:
+def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> Expectation:
     """Read one expectation, for ``expectations`` of the settings of a run.
 
     Parameters
@@ -67,6 +69,8 @@ def parse_expectation(text: str) -> Expectation:
     text
         ``NAME OP NUMBER [UNIT]``, for example ``arrived >= 95 %`` or ``mean_delay <= 40 s``; SI
         without a unit. The table of figures in docs/runs.md has the names.
+    own
+        Further figures by name, whose values are put into the ``figures`` of the summary.
 
     Returns
     -------
@@ -87,13 +91,14 @@ def parse_expectation(text: str) -> Expectation:
         raise InputError(msg)
     name, number, unit = match["name"], match["number"], match["unit"] or ""
     percent = unit == "%"
-    figure = run_figure(name)
+    figure = run_figure(name) or (own or {}).get(name)
+    counts = isinstance(figure, RunFigure) and figure.count
     if figure is None:
         close = difflib.get_close_matches(name, NAMES, n=3, cutoff=0.5)
         hint = f"did you mean {', '.join(close)}?" if close else f"known are {', '.join(NAMES)}"
         msg = f"expectation {text!r}: no figure is named {name!r}; {hint}"
         raise InputError(msg)
-    if percent and not figure.count:
+    if percent and not counts:
         msg = f"expectation {text!r}: {name} is no count of actors, so it has no percentage"
         raise InputError(msg)
     if percent:
@@ -110,7 +115,7 @@ def parse_expectation(text: str) -> Expectation:
         name=name,
         op=match["op"],
         bound=bound,
-        share=figure.count and (percent or written_as_share),
+        share=counts and (percent or written_as_share),
     )
 
 
@@ -138,7 +143,8 @@ def _verdict(expectation: Expectation, summary: Mapping[str, Any]) -> Expectatio
 
 def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
     figure = run_figure(expectation.name)
-    value = None if figure is None else figure.of_summary(summary)
+    own = (summary.get("figures") or {}).get(expectation.name)
+    value = own if figure is None else figure.of_summary(summary)
     if value is None or not expectation.share:
         return value
     planned = summary["actors"]["planned"]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.results.by_place.lane_places import LanePlaces
+from odscen.results.measures.registry import names_of, run_figure
 from odscen.results.measures.summary import ActorOutcome, actors_from_json
 from odscen.results.measures.traffic_files import places_from_json, read_tables
 from odscen.results.records.body_centres import body_centres
@@ -33,7 +34,7 @@ _TABLES: dict[PlaceKind, TableName] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Run:
     """A run that has ended: what became of it, what was measured, what was recorded.
 
@@ -51,7 +52,7 @@ class Run:
     Examples
     --------
     >>> run = Run.open(Path("runs/Town01-0007"))
-    >>> run.figures["mean_delay"]
+    >>> run.figure("mean_delay")
     12.4
     >>> run.figures_by("junction").sort("delay", descending=True)
     """
@@ -100,6 +101,41 @@ class Run:
         ``mean_speed`` m/s, with definition and source of each.
         """
         return dict(self.summary["figures"])
+
+    def figure(self, name: str) -> float:
+        """Return one figure of the run, or one of its counts, to be asserted on.
+
+        Parameters
+        ----------
+        name
+            Of the table of figures in docs/runs.md: ``mean_delay``, ``arrived``, ...
+
+        Returns
+        -------
+        float
+            In the unit of the figure.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no figure of this name.
+        InputError
+            If the run has nothing to compute it from, as it failed or nobody arrived.
+        """
+        __tracebackhide__ = True  # pytest shows the test, not this
+        entry = run_figure(name)
+        if entry is None:
+            what = "figure"
+            raise NotFoundError(what, name, names_of("run"))
+        value = entry.of_summary(self.summary)
+        if value is None:
+            msg = f"the run has no {name}: {entry.definition} It is {self.status}."
+            raise InputError(msg, file=str(self.folder))
+        return value
+
+    def __repr__(self) -> str:
+        seed, scenario = self.summary.get("seed"), self.summary.get("scenario")
+        return f"<Run of {scenario}, seed {seed}: {self.summary['status']}>"
 
     @property
     def report(self) -> Path | None:

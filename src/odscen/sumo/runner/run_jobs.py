@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import new_folder
-from odscen.base.errors import WorkspaceError
+from odscen.base.errors import InputError, WorkspaceError
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
@@ -131,17 +131,28 @@ def run_many(
     processes: int = 1,
     progress: Callable[[RunJob, Progress], None] | None = None,
     done: Callable[[RunJob, Run], None] | None = None,
+    refused: Callable[[RunJob, InputError], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> tuple[Run, ...]:
     """Run several scenarios, ``processes`` at a time; results in the order of ``jobs``.
 
-    ``progress`` and ``done`` are called from the threads that wait for the processes, ``done`` in
-    the order in which runs end. An error in preparing a run ends all of it: scenarios are checked
-    before they are run.
+    ``progress``, ``done`` and ``refused`` are called from the threads that wait for the processes,
+    ``done`` in the order in which runs end. An error in preparing a run ends all of it, as
+    scenarios are checked before they are run; with ``refused`` that is told it, the others go on
+    and the result leaves it out.
     """
     stopping = threading.Event()
 
-    def one(job: RunJob) -> Run:
+    def one(job: RunJob) -> Run | None:
+        try:
+            return carried_out(job)
+        except InputError as error:
+            if refused is None:
+                raise
+            refused(job, error)
+            return None
+
+    def carried_out(job: RunJob) -> Run:
         def follow(message: Progress) -> None:
             if stopping.is_set():  # ends this worker process too
                 raise _StoppedError
@@ -158,14 +169,15 @@ def run_many(
         futures = [pool.submit(one, job) for job in jobs]
         try:
             _wait(futures)
-            return tuple(future.result() for future in futures)
+            ended = (future.result() for future in futures)
+            return tuple(run for run in ended if run is not None)
         except BaseException:
             stopping.set()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-def _wait(futures: Sequence[Future[Run]]) -> None:
+def _wait(futures: Sequence[Future[Run | None]]) -> None:
     """Wait until all have ended, or raise what the first of them raises.
 
     Polars has system calls go on after Ctrl-C (https://github.com/pola-rs/polars/issues/21739): a

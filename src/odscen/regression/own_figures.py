@@ -1,0 +1,111 @@
+"""Figures of a suite's own: a Python function of the finished run, named in the suite."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from odscen.base.errors import InputError
+from odscen.regression.tolerance import parse_tolerance
+from odscen.results.measures.figure import Better, Figure
+from odscen.results.measures.registry import names_of
+from odscen.scenario.document.document_parts import Label, Part
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from odscen.sumo.folder.finished_run import Run
+
+
+def _free(name: str) -> str:
+    if name in names_of("run"):
+        msg = f"{name} is a figure of odscen; give yours another name"
+        raise ValueError(msg)
+    return name
+
+
+FigureName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), AfterValidator(_free)]
+
+
+class FigureEntry(Part):
+    """``[figures.NAME]`` of a suite; ``function`` is ``FILE.py:NAME``, relative to the suite."""
+
+    function: Annotated[str, Field(pattern=r"^[^:\x00]+\.py:[A-Za-z_][A-Za-z0-9_]*$")]
+    unit: Annotated[str, Field(max_length=20)] = ""
+    label: Label | None = None
+    better: Better = Better.NEITHER
+    tolerance: str = "2 %"
+
+
+def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
+    """Figures that the text of a suite declares, before it has been validated."""
+    entries = data.get("figures")
+    found = {}
+    for name, entry in entries.items() if isinstance(entries, dict) else ():
+        given = entry if isinstance(entry, dict) else {}
+        found[name] = Figure(
+            name=name,
+            unit=str(given.get("unit", "")),
+            label=str(given.get("label") or name.replace("_", " ")),
+            definition="Defined by the suite.",
+            source=str(given.get("function", "")),
+            better=next((one for one in Better if one == given.get("better")), Better.NEITHER),
+            tolerance=str(given.get("tolerance", "2 %")),
+        )
+    return found
+
+
+def refuse_tolerances(figures: Mapping[str, Figure]) -> None:
+    """Read the tolerance of each figure.
+
+    Raises
+    ------
+    InputError
+        If one is none; names the figure.
+    """
+    for name, figure in figures.items():
+        try:
+            parse_tolerance(figure.tolerance, figure)
+        except InputError as error:
+            raise InputError(error.problem, element=f"figures.{name}.tolerance") from error
+
+
+def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict[str, float | None]:
+    """Compute the figures of a finished run; functions are in files relative to ``beside``.
+
+    Raises
+    ------
+    InputError
+        If a function cannot be loaded, raises, or returns anything but a number or ``None``.
+    """
+    found: dict[str, float | None] = {}
+    for name, figure in figures.items():
+        file, _, function = figure.source.rpartition(":")
+        element = f"figures.{name}"
+        try:
+            value = _function(beside / file, function)(run)
+        except Exception as error:  # whatever the user's own code raises
+            msg = f"{figure.source}: {type(error).__name__}: {error}"
+            raise InputError(msg, element=element) from error
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+            msg = f"{figure.source} returned {value!r}, not a number or None"
+            raise InputError(msg, element=element)
+        found[name] = None if value is None else float(value)
+    return found
+
+
+@cache
+def _function(file: Path, name: str) -> Callable[[Run], object]:
+    """Load a function from a file; the file is run once."""
+    spec = importlib.util.spec_from_file_location(f"odscen_figures_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        msg = f"{file} is no Python file"
+        raise ImportError(msg)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    function: Callable[[Run], object] = getattr(module, name)
+    return function

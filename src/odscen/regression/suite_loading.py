@@ -1,0 +1,186 @@
+"""From the scenarios of a suite to checked runs, each on its map and with its baseline.
+
+What is wrong with one scenario is an error of that scenario; the others go on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from odscen.app.runs import check_run
+from odscen.app.scenarios import read_scenario
+from odscen.base.errors import InputError, ToolError, in_file
+from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.regression.baseline import fingerprint, read_baseline
+from odscen.results.measures.expectations import needs_criticality
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.asset_catalogue import shipped_assets
+from odscen.workspace.store import name_from_file
+
+if TYPE_CHECKING:
+    from odscen.app.runs import CheckedRun
+    from odscen.regression.baseline import Baseline, Fingerprint
+    from odscen.regression.case_results import SeedResult
+    from odscen.regression.suite import Case, Suite
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.workspace.store import MapEntry, Workspace
+
+
+@dataclass(slots=True)
+class LoadedCase:
+    """A case with its scenario on the map that it will run on; ``run`` is without a seed.
+
+    ``runs`` by seed, and ``refused``, the words of a seed that could not be run, are filled later.
+    """
+
+    case: Case
+    run: CheckedRun
+    made_of: Fingerprint
+    baseline: Baseline | None
+    runs: dict[int, SeedResult] = field(default_factory=dict)
+    refused: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class UnusableCase:
+    """A case that cannot be run, and why."""
+
+    case: Case
+    error: InputError | ToolError
+
+
+def load_cases(
+    workspace: Workspace, suite: Suite, *, with_baseline: bool
+) -> list[LoadedCase | UnusableCase]:
+    """Read and check every scenario of a suite on its map.
+
+    Raises
+    ------
+    InputError
+        If the suite, as a whole, names a map that is not there and that no scenario is on.
+    """
+    maps = _SuiteMaps(workspace, suite)
+    loaded: list[LoadedCase | UnusableCase] = []
+    for case in suite.cases:
+        try:
+            loaded.append(_load(workspace, case, maps, with_baseline=with_baseline))
+        except (InputError, ToolError) as error:
+            loaded.append(UnusableCase(case, error))
+    if suite.whole:
+        maps.refuse_unused()
+    return loaded
+
+
+def _load(workspace: Workspace, case: Case, maps: _SuiteMaps, *, with_baseline: bool) -> LoadedCase:
+    scenario = read_scenario(case.file)
+    with in_file(str(case.file)):
+        entry = maps.of(scenario)
+        # The suite names the map to test on; a baseline knows if it is not the one of before.
+        reference = scenario.map.model_copy(update={"sha256": entry.sha256})
+        scenario = scenario.model_copy(update={"map": reference})
+        settings = _settings(case)
+        run = check_run(workspace, scenario, name=case.name, settings=settings, entry=entry)
+    network = None if entry.converter == "odscen" else entry.net_sha256
+    made_of = fingerprint(scenario, entry.sha256, settings, network=network)
+    baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
+    run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
+    return LoadedCase(case, run, made_of, baseline)
+
+
+def map_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> MapEntry | None:
+    """Find the map of a baseline, by its digest; ``None`` where the workspace has lost it.
+
+    Parameters
+    ----------
+    entry
+        The map of now, which may be the same.
+    digest
+        ``map`` of the baseline's fingerprint: the beginning of a SHA-256.
+    """
+    if not digest or entry.sha256.startswith(digest):
+        return entry
+    known = () if workspace is None else workspace.maps()
+    return next((one for one in known if one.sha256.startswith(digest)), None)
+
+
+class _SuiteMaps:
+    """The maps of a suite, each built once; one that cannot be is the error of its scenarios."""
+
+    def __init__(self, workspace: Workspace, suite: Suite) -> None:
+        self._workspace = workspace
+        self._suite = suite
+        self._files = {name_from_file(path): path for path in suite.maps}
+        self._asked: set[str] = set()
+        self._known: dict[tuple[str, str, float], MapEntry | InputError | ToolError] = {}
+
+    def of(self, scenario: Scenario) -> MapEntry:
+        """Find the map of a scenario.
+
+        Raises
+        ------
+        InputError, ToolError
+            If it is not there or cannot be built, each time that it is asked for.
+        """
+        reference = scenario.map
+        self._asked.add(reference.name)
+        key = reference.name, reference.sha256, reference.spacing
+        if key not in self._known:
+            try:
+                self._known[key] = self._found(scenario)
+            except (InputError, ToolError) as error:
+                self._known[key] = error
+        found = self._known[key]
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def refuse_unused(self) -> None:
+        """Refuse a suite with a map that is not there, if that is no scenario's error.
+
+        Raises
+        ------
+        InputError
+            With the first of them.
+        """
+        for name, path in self._files.items():
+            if name not in self._asked and not path.is_file():
+                msg = f"there is no file {path}, and no scenario is on a map of that name"
+                raise InputError(msg, file=str(self._suite.file), element="maps")
+
+    def _found(self, scenario: Scenario) -> MapEntry:
+        """The map of the suite, built in the workspace if need be; else the workspace's own.
+
+        A map of that name and another content or converter in the workspace is left alone.
+        """
+        workspace, converter = self._workspace, self._suite.converter
+        name = scenario.map.name
+        source = self._files.get(name)
+        if source is None:
+            own = workspace.map_for(name, scenario.map.sha256)
+            if converter in (None, own.converter):
+                return own
+            source = own.path("xodr")
+        wished = ConversionSettings(spacing=scenario.map.spacing, converter=converter or "odscen")
+        try:
+            content = source.read_bytes()
+        except OSError as error:
+            raise InputError(error.strerror or str(error), file=str(source)) from error
+        sha256 = hashlib.sha256(content).hexdigest()
+        for entry in workspace.maps():
+            if (entry.sha256, entry.conversion) == (sha256, wished):
+                return entry
+        free = name not in workspace.map_names()
+        new = name if free else f"{name[:40]}-{sha256[:8]}-{wished.converter}"
+        return workspace.add_map(source, name=new, settings=wished)
+
+
+def _settings(case: Case) -> RunSettings:
+    return RunSettings(
+        until=case.until,
+        step_length=case.step_length,
+        recording=Recording(criticality=needs_criticality(case.expectations)),
+        time_limit=case.time_limit,
+    )
