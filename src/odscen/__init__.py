@@ -21,7 +21,8 @@ from odscen.base.version import __version__ as __version__
 if TYPE_CHECKING:
     from odscen.app.export import export
     from odscen.app.reports import renew_report
-    from odscen.app.runs import resume, run, run_many
+    from odscen.app.resumed_runs import resume
+    from odscen.app.runs import run, run_many
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
     from odscen.app.watched_runs import WatchedRun, watch
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Workspace": "odscen.workspace.store",
-    "MapEntry": "odscen.workspace.store",
+    "MapEntry": "odscen.workspace.map_entry",
     "shipped_maps": "odscen.workspace.shipped",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
@@ -66,7 +67,7 @@ _HOMES = {
     "parse_expectation": "odscen.results.measures.expectations",
     "run": "odscen.app.runs",
     "run_many": "odscen.app.runs",
-    "resume": "odscen.app.runs",
+    "resume": "odscen.app.resumed_runs",
     "watch": "odscen.app.watched_runs",
     "WatchedRun": "odscen.app.watched_runs",
     "Step": "odscen.sumo.runner.in_step",

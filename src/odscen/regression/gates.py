@@ -243,7 +243,7 @@ def _map_of(
         own = workspace.map_for(name, scenario.map.sha256)
         if converter in (None, own.converter):
             return own
-    source = maps[name] if name in maps else own.path("xodr")
+    source = maps[name] if name in maps else own.checked("xodr")
     wished = ConversionSettings(spacing=scenario.map.spacing, converter=converter or "odscen")
     try:
         content = source.read_bytes()

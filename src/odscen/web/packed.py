@@ -54,7 +54,7 @@ def answer(request: Request, packed: Packed) -> Response:
 @lru_cache(maxsize=8)
 def packed_drawing(entry: MapEntry) -> Packed:
     """``drawing.json`` of a map."""
-    return pack(entry.path("drawing").read_bytes())
+    return pack(entry.read("drawing"))
 
 
 @lru_cache(maxsize=8)
