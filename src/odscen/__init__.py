@@ -21,7 +21,8 @@ from odscen.base.version import __version__ as __version__
 if TYPE_CHECKING:
     from odscen.app.export import export
     from odscen.app.reports import renew_report
-    from odscen.app.runs import resume, run, run_many
+    from odscen.app.resumed_runs import resume
+    from odscen.app.runs import run, run_many
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
     from odscen.app.watched_runs import WatchedRun, watch
@@ -44,12 +45,13 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.recording import Recording
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.in_step import Step
+    from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.shipped import shipped_maps
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.store import Workspace
 
 _HOMES = {
     "Workspace": "odscen.workspace.store",
-    "MapEntry": "odscen.workspace.store",
+    "MapEntry": "odscen.workspace.map_entry",
     "shipped_maps": "odscen.workspace.shipped",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
@@ -65,7 +67,7 @@ _HOMES = {
     "parse_expectation": "odscen.results.measures.expectations",
     "run": "odscen.app.runs",
     "run_many": "odscen.app.runs",
-    "resume": "odscen.app.runs",
+    "resume": "odscen.app.resumed_runs",
     "watch": "odscen.app.watched_runs",
     "WatchedRun": "odscen.app.watched_runs",
     "Step": "odscen.sumo.runner.in_step",

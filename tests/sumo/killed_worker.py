@@ -3,7 +3,7 @@
 Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it is the first time
 after that slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that
 completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many
-bytes fail as on a full disk.
+bytes fail as on a full disk; with ``MEMORY_LEFT`` it gets so many bytes more than it has at first.
 """
 
 from __future__ import annotations
@@ -50,4 +50,8 @@ if __name__ == "__main__":
     if "FILE_LIMIT" in os.environ:
         limit = int(os.environ["FILE_LIMIT"])
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    if "MEMORY_LEFT" in os.environ:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        most = pages * resource.getpagesize() + int(os.environ["MEMORY_LEFT"])
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
     sys.exit(main())

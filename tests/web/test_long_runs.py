@@ -58,7 +58,9 @@ def test_an_interrupted_run_goes_on_to_the_same_end(
     info = client.get(f"/api/runs/{run}").json()
     assert info["slices"]["length"] == 3600
     assert info["slices"]["time"] == 3600 * info["slices"]["done"]
-    assert client.get(f"/api/runs/{run}/report.html").status_code == 404
+    refused = client.get(f"/api/runs/{run}/report.html")
+    assert refused.status_code == 409
+    assert "resumes it" in refused.json()["error"]["message"]
     with TestClient(create_app(workspace, hosts=LOOPBACK | {"testserver"})) as later:
         (row,) = [one for one in later.get("/api/runs").json() if one["run"] == run]
         assert (row["state"], row["slices"]) == ("interrupted", info["slices"])

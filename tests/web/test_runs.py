@@ -22,6 +22,7 @@ from odscen.base.errors import SimulationError
 from odscen.base.frames import SumoPose, sumo_to_xodr
 from odscen.carla.client import Address
 from odscen.results.records.run_records import Plan
+from odscen.sumo.folder.run_sums import seal_again
 from odscen.web import active_runs
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING, finished, wait_for
@@ -248,6 +249,10 @@ def test_incidents_of_a_finished_run_are_those_that_were_told_live(
     document = json.loads(file.read_text())
     document["events"].append(crash)
     file.write_text(json.dumps(document))
+    refused = client.get(f"/api/runs/{run}/events")
+    assert refused.status_code == 422
+    assert "events.json: expected sha256" in refused.json()["error"]["message"]
+    seal_again(file.parent, "events.json")
     assert crash in client.get(f"/api/runs/{run}/events").json()["events"]
 
 
@@ -474,6 +479,7 @@ from pathlib import Path
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario
 from odscen.workspace.store import Workspace
+from odscen.sumo.folder.run_sums import seal_again
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.worker.protocol import Pace
@@ -532,6 +538,8 @@ def test_an_interrupted_long_run_is_listed_as_such_and_can_be_removed(
     assert info["progress"]["arrived"] == 45
     assert info["error"].startswith("Interrupted at 2:00 of 24:00 h.")
     for part in ("summary", "report.html", "trajectories"):
-        assert client.get(f"/api/runs/night/{part}").status_code == 404
+        refused = client.get(f"/api/runs/night/{part}")
+        assert refused.status_code == 409
+        assert "odscen resume" in refused.json()["error"]["message"]
     assert client.delete("/api/runs/night").status_code == 204
     assert not folder.exists()

@@ -3,7 +3,13 @@ from pathlib import Path
 
 import pytest
 
-from odscen.base.errors import InputError, NotFoundError, OpenDriveError, WorkspaceError
+from odscen.base.errors import (
+    DamagedError,
+    InputError,
+    NotFoundError,
+    OpenDriveError,
+    WorkspaceError,
+)
 from odscen.workspace import map_build
 from odscen.workspace.store import Workspace, check_name, name_from_file
 
@@ -74,6 +80,7 @@ def test_a_map_is_found_by_its_content_under_another_name(workspace):
 def test_a_map_of_an_older_builder_is_built_again(tmp_path):
     store = Workspace.open(tmp_path)
     entry = store.add_map(SMALL)
+    (entry.folder / "SHA256SUMS").unlink()
     old = {**entry.info, "builder": "0"}
     (entry.folder / "map.json").write_text(json.dumps(old), encoding="utf-8")
     assert store.map("t_junction_signs").info["builder"] != "0"
@@ -121,3 +128,61 @@ def test_every_real_map_is_added(shared_maps, tmp_path):
         entry = store.add_map(path)
         assert entry.info["graph"]["nodes"] > 0, path.name
         assert entry.info["sumo"]["lanes"] > 0, path.name
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def test_one_broken_map_hides_no_other_and_can_be_added_again_or_removed(tmp_path):
+    store = Workspace.open(tmp_path)
+    good, bad = store.add_map(SMALL, name="good"), store.add_map(SMALL, name="bad")
+    (bad.folder / "map.json").write_text("{", encoding="utf-8")
+    entries, broken = store.catalogue()
+    assert entries == [good]
+    assert [one.name for one in broken] == ["bad"]
+    assert "map.json: expected sha256" in broken[0].problem
+    assert store.map_for("bad", good.sha256) == good
+    with pytest.raises(DamagedError, match="odscen doctor --repair builds map 'bad' anew"):
+        store.map("bad")
+    assert store.add_map(SMALL, name="bad").sha256 == good.sha256
+    (bad.folder / "map.json").unlink()
+    assert [one.name for one in store.catalogue()[1]] == ["bad"]
+    store.remove_map("bad")
+    assert store.map_names() == ["good"]
+
+
+@pytest.mark.parametrize("key", ["graph_npz", "net", "lane_table", "drawing", "xodr"])
+def test_a_byte_that_has_changed_in_a_map_is_named_before_it_is_read(tmp_path, key):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL)
+    flip(entry.path(key))
+    with pytest.raises(DamagedError, match=rf"{entry.path(key).name}: expected sha256"):
+        store.map(entry.name).read(key)
+    with pytest.raises(DamagedError):
+        entry.checked(key)
+    assert [one.file for one in entry.damaged()] == [entry.path(key).name]
+    assert store.add_map(SMALL).damaged() == []
+
+
+def test_a_map_without_checksums_opens_and_says_so_once(tmp_path, caplog):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL)
+    (entry.folder / "SHA256SUMS").unlink()
+    assert store.map(entry.name).graph().map_sha256 == entry.sha256
+    assert store.map(entry.name).drawing().name == entry.name
+    assert [one.message for one in caplog.records] == [
+        f"{entry.folder} has no SHA256SUMS, as of earlier versions: its files are not checked"
+    ]
+
+
+def test_what_killed_processes_left_is_gone_when_a_workspace_is_opened(tmp_path):
+    store = Workspace.open(tmp_path)
+    entry = store.add_map(SMALL)
+    for name in (".building-x", ".removed-y", ".replaced-z"):
+        (tmp_path / "maps" / name / "m").mkdir(parents=True)
+    (tmp_path / "maps" / ".m.lock").write_text("{}", encoding="utf-8")
+    Workspace.open(tmp_path)
+    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == ["m", entry.name]

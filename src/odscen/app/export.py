@@ -70,7 +70,7 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
     loaded = map_of(workspace, document)
-    name, net = scenario_name(scenario), loaded.entry.path("net")
+    name, net = scenario_name(scenario), loaded.entry.checked("net")
     source = ExportSource(name, document, loaded.sumo, net, workspace.assets())
     return _write(exporter.files(source), out)
 

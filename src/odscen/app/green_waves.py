@@ -277,6 +277,5 @@ def _roads_called(loaded: LoadedMap, name: str) -> set[str]:
     """Ids of the roads with a name in the file of the map."""
     from odscen.opendrive.parse import parse
 
-    path = loaded.entry.path("xodr")
-    roads = parse(path.read_bytes(), file=str(path)).roads
+    roads = parse(loaded.entry.read("xodr"), file=str(loaded.entry.path("xodr"))).roads
     return {str(road.id) for road in roads.values() if road.name == name}

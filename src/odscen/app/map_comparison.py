@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.sumo.folder.finished_run import Run
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 PER_FLOW = 60.0
 """Vehicles per hour from one place: far below what a lane takes in from standstill."""
@@ -203,15 +203,15 @@ def _networks(
         tell(f"converting by {converter}", _HALF * number / len(names))
         own = ConversionSettings(spacing=entry.conversion.spacing, converter=converter)
         try:
-            made = place.add_map(entry.path("xodr"), name=converter, settings=own)
+            made = place.add_map(entry.checked("xodr"), name=converter, settings=own)
         except ToolError as error:
             yield ConvertedMap(converter, None, None, str(error))
         else:
             yield ConvertedMap(converter, made, made.fidelity())
     if entry.converter == "file":
         own = ConversionSettings(spacing=entry.conversion.spacing, converter="odscen")
-        place.add_map(entry.path("xodr"), name="file", settings=own)
-        made = place.set_network("file", entry.path("net"))
+        place.add_map(entry.checked("xodr"), name="file", settings=own)
+        made = place.set_network("file", entry.checked("net"))
         yield ConvertedMap("file", made, made.fidelity())
 
 

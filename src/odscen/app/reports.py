@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import logging
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import polars as pl
 
 from odscen.app.maps import load_map
-from odscen.base.errors import NotFoundError
+from odscen.base.errors import InputError, NotFoundError
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.light_programs import programs_from_json
+from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Plan, events_from_json
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.recorded import read_conflicts, read_light_states, read_trajectories
+from odscen.sumo.folder.run_status import unfinished
+from odscen.sumo.folder.run_sums import damaged_in, seal_again, whole_summary
 from odscen.sumo.outputs.corridor_traces import corridor_traces
+from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -139,7 +144,9 @@ def renew_report(
     NotFoundError
         If there is no such run.
     InputError
-        If it has not ended, its map is not in the workspace, or one cannot drive so.
+        If it has not completed, its map is not in the workspace, or one cannot drive so.
+    DamagedError
+        If a file of the run is not as it was written; that of the report is reported only.
     """
     if isinstance(run, Run):
         run = run.folder
@@ -148,9 +155,25 @@ def renew_report(
         names = [path.name for path in workspace.runs.glob("*")]
         msg = "run"
         raise NotFoundError(msg, str(run), names)
-    summary = read_summary(folder)
-    loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-    graph = loaded.sumo.graph
-    segments = path_between(graph, *ends) if ends is not None else corridor
-    along = corridor_along(graph, segments) if segments else None
-    return write_report(folder, summary, loaded=loaded, corridor=along, out=out)
+    own = out is None and not unfinished(folder)
+    with run_lock(folder) if own else nullcontext():
+        summary = _completed(folder)
+        loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+        graph = loaded.sumo.graph
+        segments = path_between(graph, *ends) if ends is not None else corridor
+        along = corridor_along(graph, segments) if segments else None
+        report = write_report(folder, summary, loaded=loaded, corridor=along, out=out)
+        if out is None:
+            seal_again(folder, layout.REPORT_FILE)
+    return report
+
+
+def _completed(folder: Path) -> dict[str, Any]:
+    """Summary of a run that has completed, with all of its files as they were written."""
+    summary = whole_summary(folder, leave=(layout.REPORT_FILE,))
+    for one in damaged_in(folder, only=layout.REPORT_FILE):
+        logging.getLogger("odscen").warning("%s: %s; it is written anew", folder, one)
+    if summary["status"] != RunStatus.COMPLETED:
+        msg = f"run {folder.name!r} has not completed, it is {summary['status']!r}"
+        raise InputError(msg)
+    return summary

@@ -14,7 +14,6 @@ The command line, the page, suites of tests, and CARLA beside or instead of SUMO
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +21,10 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.maps import load_map
 from odscen.app.reports import write_report
 from odscen.app.scenarios import read_scenario, scenario_name
-from odscen.base.errors import InputError, in_file
+from odscen.base.errors import in_file
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
-from odscen.sumo.runner import long_runs
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import RunJob, run_prepared
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.errors import InputError
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
@@ -42,7 +41,8 @@ if TYPE_CHECKING:
     from odscen.sumo.runner.worker_process import Companion, Ended
     from odscen.sumo.worker.protocol import OnProgress, Progress
     from odscen.workspace.asset_catalogue import Assets
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +152,7 @@ def prepare_run(run: CheckedRun) -> PreparedRun:
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
     """
-    net = run.entry.path("net")
+    net = run.entry.checked("net")
     return prepare(run.scenario, run.map.sumo, net, run.assets, settings=run.settings)
 
 
@@ -354,57 +354,6 @@ def run_many(
         own = _own_name(scenario_name(scenario), names)
         runs.append(check_given(workspace, scenario, name=own, out=out, settings=settings))
     return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
-
-
-def resume(
-    workspace: Workspace,
-    run: Path,
-    *,
-    time_limit: float | None = None,
-    progress: OnProgress | None = None,
-    tell: Callable[[str], None] | None = None,
-    live: Companion | None = None,
-) -> Run:
-    """Resume an interrupted run and write its report.
-
-    Parameters
-    ----------
-    workspace
-        Has the map.
-    run
-        Its folder, or its name in the workspace.
-    time_limit
-        Wall seconds after which it is interrupted again.
-    progress
-        Called in this thread, a few times a second.
-    tell
-        Called with where it goes on, and what is damaged.
-    live
-        Makes it a run that can be watched and steered.
-
-    Returns
-    -------
-    Run
-        With the same results as if it had not been interrupted.
-
-    Raises
-    ------
-    NotFoundError
-        If there is no such run.
-    ConflictError
-        If it has ended, or is going on.
-    """
-
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        loaded = None
-        with suppress(InputError):  # the map has been removed meanwhile
-            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-        write_report(folder, summary, loaded=loaded)
-
-    folder = run if run.is_dir() else workspace.runs / run
-    return long_runs.resume(
-        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
-    )
 
 
 def _job(run: CheckedRun, *, report: bool) -> RunJob:

@@ -1,7 +1,13 @@
-"""Folders that appear whole or not at all."""
+"""Folders that appear whole or not at all, and what is left of those that did not.
+
+While a process fills or deletes a folder it holds a lock on it, the system's own: what is left of a
+process that was killed is recognised by a lock that nobody holds, see :func:`clear_leftovers`.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
 import tempfile
 from contextlib import contextmanager, suppress
@@ -9,51 +15,136 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import WorkspaceError
+from odscen.base.folder_locks import same_file
+from odscen.base.to_disk import all_to_disk, to_disk
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _ATTEMPTS = 20
+_BUILDING, _REMOVED, _REPLACED = ".building-", ".removed-", ".replaced-"
 
 
 @contextmanager
 def new_folder(final: Path) -> Iterator[Path]:
     """Yield an empty folder that is renamed to ``final`` when the block succeeds.
 
-    It lies beside ``final``, so that the rename is one step; whatever ``final`` held is replaced.
-    If the block raises, nothing is left of the new folder and ``final`` is untouched.
+    It lies beside ``final``, so that the rename is one step; whatever ``final`` held is replaced,
+    when all of the new folder is on the disk. If the block raises, nothing is left of the new
+    folder and ``final`` is untouched.
     """
     final.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix=".building-", dir=final.parent))
-    folder.chmod(0o755)  # mkdtemp makes it private, which a finished map or run need not be
-    try:
+    with _temporary(final.parent, _BUILDING) as folder:
+        folder.chmod(0o755)  # mkdtemp makes it private, which a finished map or run need not be
         yield folder
+        all_to_disk(folder)
         _put(folder, final)
+        to_disk(final.parent)
+
+
+@contextmanager
+def in_use(folder: Path) -> Iterator[None]:
+    """Keep a folder in the making from being cleared away, for another process that works in it."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH)
+        yield
     finally:
-        with suppress(OSError):
-            shutil.rmtree(folder)
+        os.close(descriptor)
 
 
 def discard(folder: Path) -> None:
     """Take a folder out of sight in one step, then delete it."""
-    grave = Path(tempfile.mkdtemp(prefix=".removed-", dir=folder.parent))
-    try:
+    with _temporary(folder.parent, _REMOVED) as grave:
         folder.rename(grave / folder.name)
+
+
+def clear_leftovers(parent: Path) -> list[str]:
+    """Remove what processes that were killed have left in a folder of maps or runs.
+
+    What was about to be replaced when its process was killed is put back. Nothing that a process
+    works on is touched, and nothing raises.
+
+    Returns
+    -------
+    list of str
+        Names of what was removed.
+    """
+    try:
+        found = sorted(path for path in parent.iterdir() if path.name.startswith("."))
+    except OSError:
+        return []
+    kinds = (_BUILDING, _REMOVED, _REPLACED)
+    cleared = []
+    for path in found:
+        is_lock = path.name.endswith(".lock")
+        if (is_lock or path.name.startswith(kinds)) and _clear(path):
+            cleared.append(path.name)
+    return cleared
+
+
+@contextmanager
+def _temporary(parent: Path, prefix: str) -> Iterator[Path]:
+    """Yield a new folder whose lock is held, and delete what is left of it."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+        with suppress(FileNotFoundError):  # cleared away before we had the lock
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
+            if same_file(descriptor, folder):
+                break
+            os.close(descriptor)
+    try:
+        yield folder
     finally:
-        shutil.rmtree(grave)
+        with suppress(OSError):
+            shutil.rmtree(folder)
+        os.close(descriptor)
 
 
 def _put(folder: Path, final: Path) -> None:
     """Rename ``folder`` to ``final``; the last of several processes that do so at a time wins."""
     for _ in range(_ATTEMPTS):
-        with suppress(FileNotFoundError):
-            discard(final)
-        try:
-            folder.rename(final)
-        except OSError:
-            if not final.exists():  # not that another process was faster
-                raise
-        else:
-            return
+        with _temporary(final.parent, _REPLACED) as grave:
+            with suppress(FileNotFoundError):
+                final.rename(grave / final.name)
+            try:
+                folder.rename(final)
+            except OSError:
+                if not final.exists():  # not that another process was faster
+                    with suppress(OSError):
+                        (grave / final.name).rename(final)
+                    raise
+            else:
+                return
     msg = f"{final} is written by other processes all the time"
     raise WorkspaceError(msg)
+
+
+def _clear(path: Path) -> bool:
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if not same_file(descriptor, path):
+            return False
+        if path.name.startswith(_REPLACED):
+            _put_back(path)
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+    except OSError:  # held, or not ours to delete
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def _put_back(grave: Path) -> None:
+    for old in grave.iterdir():
+        final = grave.parent / old.name
+        if not final.exists():
+            old.rename(final)

@@ -6,8 +6,10 @@
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
     |   |-- ScenarioError           a scenario document or its graph form; carries all problems
     |   |-- NotFoundError           a name that is not in the catalogue, with close names
-    |   `-- ConflictError           it is taken, in use, or has changed meanwhile
+    |   |-- ConflictError           it is taken, in use, or has changed meanwhile
+    |   `-- DamagedError            stored files are not as they were written; names each
     |-- WorkspaceError (2)          a workspace that cannot be read or written
+    |   `-- ResourceError (3)       the machine has no more of something; says what to do
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
     `-- ToolError (3)               a program or library that we call failed, in its own words
         |-- SimulationError         SUMO: refused to start, died, or stopped early
@@ -21,7 +23,7 @@ from __future__ import annotations
 
 import difflib
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -121,10 +123,57 @@ class ConflictError(InputError):
         super().__init__(problem)
 
 
+class DamagedFile(NamedTuple):
+    """A stored file that is not as it was written.
+
+    Attributes
+    ----------
+    file
+        Its name, relative to the folder that has its checksum.
+    expected, found
+        SHA-256, hexadecimal; ``found`` may say in words that it is missing or cannot be read.
+    """
+
+    file: str
+    expected: str
+    found: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: expected {_short(self.expected)}, found {_short(self.found)}"
+
+
+class DamagedError(InputError):
+    """Stored files are not as they were written; nothing has been computed from them.
+
+    Parameters
+    ----------
+    folder
+        That has the files.
+    files
+        Each of them.
+    advice
+        What to do.
+    """
+
+    def __init__(self, folder: str, files: Sequence[DamagedFile], *, advice: str = "") -> None:
+        self.files = tuple(files)
+        self.advice = advice
+        many = f"{len(files)} files are" if len(files) > 1 else "a file is"
+        listed = "".join(f"\n  - {one}" for one in files)
+        more = f"; {advice}" if advice else ""
+        super().__init__(f"{many} not as written{more}{listed}", file=folder)
+
+
 class WorkspaceError(OdscenError):
     """The workspace cannot be read or written."""
 
     exit_code = 2
+
+
+class ResourceError(WorkspaceError):
+    """The machine has no more room, memory or open files, or lets nothing be written."""
+
+    exit_code = 3
 
 
 class MissingDependencyError(OdscenError):
@@ -153,6 +202,10 @@ class CarlaError(ToolError):
 
 class CarlaReleaseError(CarlaError):
     """A CARLA server of another release than the client that is installed."""
+
+
+def _short(digest: str) -> str:
+    return f"sha256 {digest[:12]}..." if len(digest) == 64 else digest
 
 
 @contextmanager

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import WorkspaceError
+from odscen.base.system_errors import disk_errors
+from odscen.base.to_disk import replace_by
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,12 +25,7 @@ def write_text(path: Path, text: str) -> Path:
     WorkspaceError
         If it cannot be written.
     """
-    try:
+    with disk_errors(str(path)):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.{os.getpid()}.part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        msg = f"{path}: {error.strerror or error}"
-        raise WorkspaceError(msg) from error
+        replace_by(path, path.with_name(f".{path.name}.{os.getpid()}.part"), text)
     return path

@@ -127,7 +127,7 @@ def cosim(
         Server(options.address) as server,
         ExitStack() as stack,
     ):
-        xodr = run.entry.path("xodr").read_text(encoding="utf-8")
+        xodr = run.entry.read("xodr").decode()
         report.map = ensure_map(server, run.entry.name, xodr, load=options.load_map)
         server.synchronize(prepared.plan.step_length / ticks)
         mirrored = MirroredPlan.on(server, run, prepared.plan, options)

@@ -153,7 +153,7 @@ def _job(run: CheckedRun, plan: Plan, options: NativeOptions, *, log: Path) -> N
         actors=native_actors(run.scenario, run.map.sumo.graph, plan),
         delta=options.tick or min(plan.step_length, 0.05),
         map_name=run.entry.name,
-        xodr=run.entry.path("xodr").read_text(encoding="utf-8"),
+        xodr=run.entry.read("xodr").decode(),
         log=log,
         view=first_view(plan, options.pictures),
         weather=weather_parameters(run.scenario.environment, run.assets),

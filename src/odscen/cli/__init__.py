@@ -5,12 +5,14 @@ Heavy imports stay inside the commands, so that ``odscen --help`` starts fast.
 
 from __future__ import annotations
 
+import signal
 import sys
 from typing import Annotated
 
 import typer
 
-from odscen.base.errors import OdscenError
+from odscen.base.errors import OdscenError, ResourceError
+from odscen.base.system_errors import NO_MEMORY, disk_errors
 from odscen.base.version import __version__
 from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
@@ -76,12 +78,22 @@ def _options(
 
 
 def main() -> None:
-    """Entry point: runs the command and turns odscen's own errors into messages and exit codes."""
+    """Entry point: runs the command and turns errors into messages and exit codes.
+
+    Errors are odscen's own, and those of the system that nobody has given a place.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
     try:
-        app()
+        with disk_errors("odscen"):
+            app()
     except OdscenError as error:
         report_error(error)
         sys.exit(error.exit_code)
+    except RuntimeError as error:
+        if "can't start new thread" not in str(error):
+            raise
+        report_error(ResourceError(NO_MEMORY))
+        sys.exit(ResourceError.exit_code)
     except SystemExit as stop:
         # Typer has told people what is wrong with the call; scripts want it as JSON too.
         told = getattr(stop.__context__, "format_message", None)

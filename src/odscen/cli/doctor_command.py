@@ -6,12 +6,17 @@ import platform
 import shutil
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from odscen.base.errors import OdscenError
-from odscen.cli.console import JsonOption, WorkspaceOption, print_json, print_table
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from odscen.app.map_repairs import RepairStep
 
 NEEDED = (
     "odscen",
@@ -30,8 +35,26 @@ OPTIONAL = {
 }
 
 
-def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> None:
-    """Show versions, what is installed, what is missing and how to get it."""
+def doctor(
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Folders of runs outside the workspace.", metavar="RUN..."),
+    ] = None,
+    repair: Annotated[
+        bool,
+        typer.Option(
+            "--repair",
+            help="Rebuild what is damaged in the workspace from what is not, and set aside what "
+            "cannot be rebuilt.",
+        ),
+    ] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show versions, what is missing and how to get it, and what is damaged in the workspace.
+
+    Exit code 0: all is well, or was repaired; 2: something is missing, damaged, or was set aside.
+    """
     checks = [
         _check("python", platform.python_version(), needed=True),
         *(_package(name, needed=True, advice=f"pip install {name}") for name in NEEDED),
@@ -41,15 +64,31 @@ def doctor(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> No
         _workspace(workspace),
     ]
     healthy = all(check["found"] is not None for check in checks if check["needed"])
-    if as_json:
-        print_json({"healthy": healthy, "checks": checks})
-    else:
+    if not as_json:
         rows = [
             (check["name"], check["found"] or "missing", "" if check["found"] else check["advice"])
             for check in checks
         ]
         print_table("", ("part", "found", "how to get it"), rows)
+    steps = [] if checks[-1]["found"] is None else _steps(workspace, runs or [], repair=repair)
+    told = []
+    for step in steps:
+        told.append(step.to_dict())
+        if step.harm:
+            healthy = False
+        if not as_json:
+            place = f" -> {step.place}" if step.place else ""
+            log(f"{step.what} {step.name}: {step.action}: {step.words}{place}")
+    if as_json:
+        print_json({"healthy": healthy, "checks": checks, "stored": told})
     raise typer.Exit(0 if healthy else 2)
+
+
+def _steps(workspace: Path | None, runs: list[Path], *, repair: bool) -> Iterator[RepairStep]:
+    from odscen.app.doctor import examine
+    from odscen.workspace.store import Workspace
+
+    return examine(Workspace.open(workspace), runs, repair=repair)
 
 
 def _check(name: str, found: str | None, *, needed: bool, advice: str = "") -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 UNITS = dict.fromkeys(
     ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"
@@ -119,10 +120,11 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
     """List the maps with their statistics."""
     from odscen.workspace.store import Workspace
 
-    rows = [_row(entry) for entry in Workspace.open(workspace).maps()]
+    entries, broken = Workspace.open(workspace).catalogue()
+    rows = [_row(entry) for entry in entries]
     if as_json:
-        print_json({"maps": rows})
-    elif not rows:
+        print_json({"maps": rows, "broken": [asdict(one) for one in broken]})
+    elif not rows and not broken:
         log("No maps yet. Add one with: odscen maps add FILE.xodr")
     else:
         shown = ("name", "rule", "road km", "junctions", "crosswalks", "lights", "nodes", "network")
@@ -144,6 +146,8 @@ def list_(workspace: WorkspaceOption = None, as_json: JsonOption = False) -> Non
                 for row in rows
             ],
         )
+    for one in broken:
+        log(f"broken: {one.name}: {one.problem}")
 
 
 @app.command()
@@ -188,7 +192,8 @@ def remove(
 
     store = Workspace.open(workspace)
     for name in names:
-        store.map(name)
+        if name not in store.map_names():
+            store.map(name)
     for name in names:
         store.remove_map(name)
         log(f"Removed {name}")

@@ -58,7 +58,7 @@ def network(
         _print_changes(done, as_json=as_json)
         return
     entry = store.map(name)
-    path = entry.path("net")
+    path = entry.checked("net")
     if out is not None:
         write_text(out, path.read_text(encoding="utf-8"))
         log(f"Wrote {out}")

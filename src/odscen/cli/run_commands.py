@@ -121,7 +121,8 @@ def run(
 ) -> None:
     """Run scenarios in SUMO, without a window; write records, events, figures and a report.
 
-    Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input; 3: a run failed.
+    Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input, or the folder is
+    in the hands of another process; 3: a run failed, or the machine lacks room, memory or handles.
     """
     from odscen.app import runs
     from odscen.app.scenarios import scenario_files
@@ -173,7 +174,7 @@ def resume(
 
     Exit codes as of ``run``.
     """
-    from odscen.app import runs
+    from odscen.app import resumed_runs
     from odscen.workspace.store import Workspace
 
     with progress("resuming") as step:
@@ -181,7 +182,7 @@ def resume(
         def follow(message: Progress) -> None:
             step(_words(run.name, message), message.time / message.until)
 
-        result = runs.resume(
+        result = resumed_runs.resume(
             Workspace.open(workspace), run, time_limit=time_limit, progress=follow, tell=log
         )
     show_results([result], as_json=as_json, several=False)

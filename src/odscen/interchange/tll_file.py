@@ -118,7 +118,7 @@ def _root(text: str | bytes) -> etree._Element:
     try:
         return etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
     except etree.XMLSyntaxError as error:
-        msg = f"not XML: {error}"
+        msg = f"not XML: {error.msg}"
         raise InputError(msg) from error
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
     from odscen.regression.verdict import BaselineVerdict
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 
 class CaseStatus(StrEnum):

@@ -15,9 +15,9 @@ from odscen.results.measures.registry import SEGMENT_FIGURES
 from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.report.place_shapes import place_shapes
-from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.layout import FIGURES_FOLDER, SUMMARY_FILE
+from odscen.sumo.folder.run_sums import whole_summary
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -194,6 +194,8 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     ------
     InputError
         If there is no run, one has failed, or two have the same seed.
+    DamagedError
+        If a file of a run is not as it was written.
     """
     if (folder / SUMMARY_FILE).is_file():
         folders = [folder]
@@ -246,7 +248,7 @@ def _no_run(folder: Path) -> str:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    summary = read_summary(folder)
+    summary = whole_summary(folder)
     status = summary["status"]
     if status != RunStatus.COMPLETED or not isinstance(summary["seed"], int):
         msg = f"the run has not completed, it is {status!r}"

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from odscen.regression.case_results import SeedResult
     from odscen.regression.suite import Case, Suite
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
 
 
 @dataclass(slots=True)
@@ -162,7 +163,7 @@ class _SuiteMaps:
             own = workspace.map_for(name, scenario.map.sha256)
             if converter in (None, own.converter):
                 return own
-            source = own.path("xodr")
+            source = own.checked("xodr")
         wished = ConversionSettings(spacing=scenario.map.spacing, converter=converter or "odscen")
         try:
             content = source.read_bytes()

@@ -13,7 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from odscen.app.runs import carry_out, check_run, prepare_run, resume
+from odscen.app.resumed_runs import resume
+from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError

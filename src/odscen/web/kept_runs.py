@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from odscen.base.checksums import read_checked, read_sums
 from odscen.base.durations import clock
-from odscen.base.errors import NotFoundError
+from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.run_status import going, read_status
+from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.run_status import going, read_status, unfinished, unfinished_words
+from odscen.sumo.folder.run_sums import REPAIR, check_run_files
 from odscen.sumo.runner.long_runs import about
 from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
 from odscen.web.wire.summary_messages import RunSummary
@@ -32,6 +35,7 @@ class KeptRuns:
 
     def __init__(self, runs: Path) -> None:
         self._runs = runs
+        self._checked: dict[str, FileStates] = {}
 
     def folder(self, run: str) -> Path:
         """Folder of a run that is finished, or in slices and not.
@@ -43,9 +47,48 @@ class KeptRuns:
         """
         folder = self._runs / check_name(run, what="run")
         if _shown(folder) is None:
-            what = "finished run"
-            raise NotFoundError(what, run, [])
+            what = "run"
+            raise NotFoundError(what, run, self.by_age())
         return folder
+
+    def whole(self, run: str) -> Path:
+        """Folder of a run whose files are all as they were written.
+
+        They are compared with their checksums when a run is opened first, and after any change.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such run.
+        DamagedError
+            If one is not as it was written.
+        """
+        folder = self.folder(run)
+        states = _states(folder)
+        if self._checked.get(run) != states:
+            check_run_files(folder)
+            self._checked[run] = states
+        return folder
+
+    def finished_file(self, run: str, name: str) -> Path:
+        """A file that a run has written at its end.
+
+        Raises
+        ------
+        ConflictError
+            If the run has not ended; says how to resume it.
+        NotFoundError
+            If it was never written.
+        DamagedError
+            If a file of the run is not as it was written.
+        """
+        path = self.whole(run) / name
+        if not path.is_file():
+            if (words := unfinished_words(path.parent)) is not None:
+                raise ConflictError(words)
+            what = f"{name} of run"
+            raise NotFoundError(what, run, [])
+        return path
 
     def by_age(self) -> list[str]:
         """Names of all runs, the newest last."""
@@ -57,18 +100,21 @@ class KeptRuns:
         """What a run says of itself."""
         folder = self.folder(run)
         summary = self.summary(run)
-        if read_status(folder) is not None or not (folder / layout.SUMMARY_FILE).is_file():
+        if unfinished(folder) or not (folder / layout.SUMMARY_FILE).is_file():
             return _unfinished(folder, summary)
         state: RunState = "failed"
         if summary is not None and summary.status == "completed":
             state = "stopped" if summary.stopped else "completed"
+        damage = _summary_damage(folder)
+        if damage is not None:
+            state = "failed"
         return RunInfo(
             run=run,
             state=state,
             scenario=run if summary is None else summary.scenario,
             map=None if summary is None else summary.map,
             summary=summary,
-            error=f"{layout.SUMMARY_FILE} cannot be read" if summary is None else summary.error,
+            error=damage or (None if summary is None else summary.error),
             finished=self.end_time(run),
         )
 
@@ -143,6 +189,25 @@ def _shown(folder: Path) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
+FileStates = dict[str, tuple[int, int]]
+"""Size and time of change of each file of a run, by its path in it."""
+
+
+def _states(folder: Path) -> FileStates:
+    found = ((path, path.stat()) for path in folder.rglob("*") if path.is_file())
+    return {str(path): (state.st_size, state.st_mtime_ns) for path, state in found}
+
+
+def _summary_damage(folder: Path) -> str | None:
+    """What is wrong with a run as far as its summary shows, in words."""
+    try:
+        read_checked(folder, layout.SUMMARY_FILE, read_sums(folder))
+        read_summary(folder)
+    except InputError as error:
+        return f"The run is damaged: {error}\n{REPAIR}."
+    return None
+
+
 def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
     """Describe a run in slices that has not ended, from what it last said of itself."""
     status = read_status(folder) or {}
@@ -151,6 +216,8 @@ def _unfinished(folder: Path, summary: RunSummary | None) -> RunInfo:
     message = (
         f"Interrupted at {clock(at)} of {clock(until)} h. odscen resume {folder.name} resumes it."
     )
+    if not status:
+        message = f"Interrupted; {layout.STATUS_FILE} is damaged. {REPAIR}."
     if summary is not None and summary.error:
         message = f"{message}\n{summary.error}"
     return RunInfo(

@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
-from odscen.base.errors import ConflictError
+from odscen.base.errors import ConflictError, DamagedError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.messages import (
@@ -27,6 +27,7 @@ from odscen.web.messages import (
 from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
 from odscen.web.wire.map_messages import (
+    BrokenMapInfo,
     ConversionInfo,
     DrawingColumns,
     GraphColumns,
@@ -44,12 +45,20 @@ from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
-    from odscen.workspace.store import MapEntry, ProgressCallback
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import ProgressCallback
 
 router = APIRouter(prefix="/api")
 
 _DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 """Content security policy of a drawing that is opened by itself."""
+
+
+@router.get("/broken-maps")
+def list_broken_maps(shared: Shared) -> list[BrokenMapInfo]:
+    """Maps that cannot be used, and why; adding such a map again builds it anew."""
+    _, broken = shared.workspace.catalogue()
+    return [BrokenMapInfo(name=one.name, problem=one.problem) for one in broken]
 
 
 @router.get("/maps")
@@ -81,7 +90,7 @@ def show_map(name: str, shared: Shared) -> MapDetails:
 @router.get("/maps/{name}/preview.svg", response_class=Response, responses=SVG)
 def preview(name: str, shared: Shared) -> Response:
     """Drawing of the map as SVG."""
-    content = shared.workspace.map(name).path("preview").read_bytes()
+    content = shared.workspace.map(name).read("preview")
     headers = {"Content-Security-Policy": _DRAWING, "Cache-Control": "no-cache"}
     return Response(content, media_type="image/svg+xml", headers=headers)
 
@@ -203,7 +212,11 @@ def _refuse_other(shared: Shared, name: str, source: Path) -> None:
 
     if name not in shared.workspace.map_names():
         return
-    if shared.workspace.map(name).sha256 != hashlib.sha256(source.read_bytes()).hexdigest():
+    try:
+        there = shared.workspace.map(name)
+    except DamagedError:
+        return  # adding it builds it anew
+    if there.sha256 != hashlib.sha256(source.read_bytes()).hexdigest():
         msg = f"there is another map named {name!r}; give this one another name, or remove that one"
         raise ConflictError(msg)
 

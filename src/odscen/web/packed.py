@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from starlette.requests import Request
 
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 
 UNCHANGED: Responses = {304: {"description": "What the client has is right."}}
@@ -54,7 +54,7 @@ def answer(request: Request, packed: Packed) -> Response:
 @lru_cache(maxsize=8)
 def packed_drawing(entry: MapEntry) -> Packed:
     """``drawing.json`` of a map."""
-    return pack(entry.path("drawing").read_bytes())
+    return pack(entry.read("drawing"))
 
 
 @lru_cache(maxsize=8)

@@ -34,7 +34,7 @@ def file(run: str, name: str, shared: Shared) -> Response:
 @router.get("/fit")
 def fit(run: str, shared: Shared) -> RunFit:
     """How well a finished run meets the counts of its scenario."""
-    folder = shared.runs.kept.folder(run)
+    folder = shared.runs.kept.whole(run)
     found = demands.fit(shared.workspace, folder)
     scenario = read_scenario(folder / SCENARIO_FILE)
     graph = shared.map_of(scenario).sumo.graph

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import orjson
@@ -44,6 +43,8 @@ from odscen.web.wire.media_types import HTML
 from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import polars as pl
 
 REPLAY_ROWS = 4_000_000
@@ -117,7 +118,7 @@ def page_of_run(shared: Shared, run: str, name: str) -> Response:
 @router.get("/{run}/summary")
 def summary(run: str, shared: Shared) -> RunSummary:
     """Key figures of a finished run: its ``summary.json``."""
-    shared.runs.kept.folder(run)
+    _kept(shared, run, layout.SUMMARY_FILE)
     found = shared.runs.kept.summary(run)
     if found is None:
         what = "summary of run"
@@ -178,12 +179,7 @@ def trajectories(
 
 
 def _kept(shared: Shared, run: str, name: str) -> Path:
-    """A file of a finished run; :class:`NotFoundError` if it was never written."""
-    path = shared.runs.kept.folder(run) / name
-    if not path.is_file():
-        what = f"{name} of run"
-        raise NotFoundError(what, run, [])
-    return path
+    return shared.runs.kept.finished_file(run, name)
 
 
 def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
@@ -196,7 +192,7 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     plan = Plan.from_json(_kept(shared, run, layout.PLAN_FILE).read_text(encoding="utf-8"))
     what = "complete trajectories of run"
     try:
-        recorded = read_trajectories(shared.runs.kept.folder(run), most=REPLAY_ROWS)
+        recorded = read_trajectories(shared.runs.kept.whole(run), most=REPLAY_ROWS)
     except pl.exceptions.PolarsError as error:
         raise NotFoundError(what, run, []) from error
     if recorded is None:

@@ -7,33 +7,27 @@ before they become paths.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from odscen.base.atomic_folders import discard, new_folder
-from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.base.atomic_folders import clear_leftovers, discard, new_folder
+from odscen.base.checksums import digest, sums_of, write_sums
+from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
+from odscen.base.folder_locks import locked
 from odscen.base.shown import printable
-from odscen.convert.lane_table.table_json import table_from_json
+from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.workspace.asset_catalogue import assets_in
+from odscen.workspace.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.workspace.map_files import read_map_file
 
 if TYPE_CHECKING:
-    import networkx as nx
+    from contextlib import AbstractContextManager
 
-    from odscen.convert.lane_table.table import LaneTable
-    from odscen.convert.model.conversion_settings import ConverterName
-    from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.drawing.map_drawing import MapDrawing
-    from odscen.lanegraph.graphs import MapGraph
-    from odscen.lanegraph.map_statistics import MapStatistics
     from odscen.workspace.asset_catalogue import Assets
     from odscen.workspace.converters import GivenNetwork
 
@@ -41,6 +35,9 @@ BUILDER = "7"
 """Raised whenever what a map folder contains changes; older folders are then rebuilt."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
+
+PATIENCE = 600.0
+"""Wall seconds to wait for another process that builds the same map."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
@@ -67,117 +64,6 @@ def name_from_file(path: Path) -> str:
 def plain_name(text: str) -> str:
     """Text as it can name a folder everywhere, perhaps empty: the unusual replaced by ``_``."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MapEntry:
-    """One map of the catalogue: its folder, and lazy access to what was built.
-
-    Attributes
-    ----------
-    name
-        In the catalogue.
-    folder
-        With all files.
-    info
-        As in ``map.json``: hash, settings, statistics, names of the files, import report.
-    """
-
-    name: str
-    folder: Path
-    info: dict[str, Any]
-
-    def __eq__(self, other: object) -> bool:
-        """Equal if it is the same build of the same map."""
-        return isinstance(other, MapEntry) and self._key == other._key
-
-    def __hash__(self) -> int:
-        """Hash of the same."""
-        return hash(self._key)
-
-    @property
-    def _key(self) -> tuple[Path, str, float, str, str]:
-        return self.folder, self.sha256, self.info["spacing"], self.info["builder"], self.net_sha256
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the .xodr, hexadecimal."""
-        return str(self.info["sha256"])
-
-    @property
-    def conversion(self) -> ConversionSettings:
-        """How it was converted."""
-        return ConversionSettings(spacing=float(self.info["spacing"]), converter=self.converter)
-
-    @property
-    def converter(self) -> ConverterName:
-        """Who wrote its SUMO network."""
-        name: ConverterName = self.info.get("network", {}).get("converter", "odscen")
-        return name
-
-    @property
-    def net_sha256(self) -> str:
-        """SHA-256 of its SUMO network, hexadecimal."""
-        return str(self.info.get("network", {}).get("sha256", ""))
-
-    def path(self, key: str) -> Path:
-        """Absolute path of one of the files named in ``map.json``, for example ``"net"``."""
-        return self.folder / str(self.info["files"][key])
-
-    def graph(self) -> MapGraph:
-        """Lane graph, segments and pedestrian graph."""
-        from odscen.lanegraph.graph_files import from_npz_bytes
-
-        return from_npz_bytes(self.path("graph_npz").read_bytes())
-
-    def networkx(self) -> tuple[nx.MultiDiGraph, nx.Graph]:
-        """Lane graph and pedestrian graph, see :func:`odscen.lanegraph.networkx_form.to_networkx`.
-
-        Returns
-        -------
-        tuple
-            The lane graph: nodes are named ``road.section.lane.index`` and have ``x``, ``y``,
-            ``z`` (m, OpenDRIVE frame), ``hdg`` (rad), ``width`` (m), ``speed_limit`` (m/s),
-            ``segment``; edges have ``relation`` (successor, left, right) and ``length`` (m). Then
-            the pedestrian graph, undirected.
-        """
-        from odscen.lanegraph.networkx_form import to_networkx
-
-        return to_networkx(self.graph())
-
-    def given(self) -> GivenNetwork:
-        """Its SUMO network, as it can be given to another build of the map."""
-        from odscen.workspace.converters import GivenNetwork
-
-        return GivenNetwork(self.path("net").read_bytes(), str(self.info["network"]["source"]))
-
-    def lane_table(self) -> LaneTable:
-        """The table between OpenDRIVE lanes and SUMO lanes."""
-        return table_from_json(self.path("lane_table").read_bytes())
-
-    def drawing(self) -> MapDrawing:
-        """What is drawn of the map."""
-        from odscen.drawing.map_drawing import MapDrawing
-
-        return MapDrawing.from_json(self.path("drawing").read_bytes())
-
-    def fidelity(self) -> Fidelity:
-        """How faithfully the SUMO network follows the map, measured from both files anew."""
-        from odscen.convert.verify.fidelity import verify
-        from odscen.opendrive.lanes import RoadTable
-        from odscen.opendrive.parse import parse
-
-        xodr = self.path("xodr")
-        odr = parse(xodr.read_bytes(), file=xodr.name)
-        with in_file(self.path("net").name):
-            return verify(self.path("net").read_bytes(), odr, RoadTable.of(odr))
-
-    def statistics(self) -> MapStatistics:
-        """Figures of the map."""
-        from odscen.lanegraph.map_statistics import MapStatistics
-
-        values = self.info["statistics"]
-        return MapStatistics(**{**values, "bounds": tuple(values["bounds"])})
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,6 +104,8 @@ class Workspace:
         root = root.expanduser().absolute()
         with _workspace_errors(root):
             (root / "maps").mkdir(parents=True, exist_ok=True)
+        for folder in (root / "maps", root / "runs"):
+            clear_leftovers(folder)
         return cls(root)
 
     @property
@@ -240,16 +128,27 @@ class Workspace:
         return self.root / "runs"
 
     def map_names(self) -> list[str]:
-        """Names of all complete maps, sorted."""
+        """Names of all maps, sorted; some may be broken, see :meth:`catalogue`."""
         return sorted(
             folder.name
             for folder in (self.root / "maps").iterdir()
-            if _NAME.fullmatch(folder.name) and (folder / "map.json").is_file()
+            if _NAME.fullmatch(folder.name)
+            and any((folder / name).is_file() for name in (INFO_FILE, XODR_FILE))
         )
 
     def maps(self) -> list[MapEntry]:
-        """All maps, sorted by name."""
-        return [self.map(name) for name in self.map_names()]
+        """All maps that can be used, sorted by name."""
+        return self.catalogue()[0]
+
+    def catalogue(self) -> tuple[list[MapEntry], list[BrokenMap]]:
+        """All maps, sorted by name: those that can be used, and those that cannot, with why."""
+        entries, broken = [], []
+        for name in self.map_names():
+            try:
+                entries.append(self.map(name))
+            except OdscenError as error:
+                broken.append(BrokenMap(name, str(error)))
+        return entries, broken
 
     def map(self, name: str) -> MapEntry:
         """One map by name; rebuilt first if an older odscen has built it.
@@ -258,14 +157,15 @@ class Workspace:
         ------
         NotFoundError
             If there is no such map.
+        DamagedError
+            If it is broken.
         """
         names = self.map_names()
         if name not in names:
             raise NotFoundError("map", name, names)
-        folder = self.root / "maps" / name
-        entry = _read_entry(folder)
-        if entry.info.get("builder") != BUILDER:
-            return self.add_map(folder / "map.xodr", name=name, settings=entry.conversion)
+        entry = read_entry(self.root / "maps" / name)
+        if entry.info["builder"] != BUILDER:
+            return self.add_map(entry.checked("xodr"), name=name, settings=entry.conversion)
         return entry
 
     def map_for(self, name: str, sha256: str) -> MapEntry:
@@ -278,13 +178,20 @@ class Workspace:
         InputError
             If the map of that name has other content.
         """
+        broken: OdscenError | None = None
         if name in self.map_names():
-            entry = self.map(name)
-            if entry.sha256 == sha256:
-                return entry
+            try:
+                entry = self.map(name)
+            except DamagedError as error:
+                broken = error
+            else:
+                if entry.sha256 == sha256:
+                    return entry
         for other in self.maps():
             if other.sha256 == sha256:
                 return other
+        if broken is not None:
+            raise broken
         if name not in self.map_names():
             raise NotFoundError("map", name, self.map_names())
         msg = (
@@ -329,16 +236,16 @@ class Workspace:
         name = check_name(name_from_file(source) if name is None else name)
         content, file = read_map_file(source), printable(source.name)
         final = self.root / "maps" / name
-        sha256 = hashlib.sha256(content).hexdigest()
-        built = _read_entry(final) if (final / "map.json").is_file() else None
-        same = built if built and built.sha256 == sha256 else None
-        if settings.converter is None:
-            settings = replace(settings, converter=same.converter if same else "odscen")
-        if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
-            return same
-        kept = same is not None and same.converter == settings.converter == "file"
-        given = same.given() if same and kept else None
-        return self._built(name, content, file, settings, given, progress)
+        with _workspace_errors(self.root), self._lock(name):
+            built = _whole(final)
+            same = built if built and built.sha256 == digest(content) else None
+            if settings.converter is None:
+                settings = replace(settings, converter=same.converter if same else "odscen")
+            if same and (same.conversion, same.info["builder"]) == (settings, BUILDER):
+                return same
+            kept = same is not None and same.converter == settings.converter == "file"
+            given = same.given() if same and kept else None
+            return self._built(name, content, file, settings, given, progress)
 
     def set_network(
         self, name: str, source: Path, *, progress: ProgressCallback | None = None
@@ -369,8 +276,13 @@ class Workspace:
         except OSError as error:
             raise InputError(error.strerror or str(error), file=str(source)) from error
         settings = replace(entry.conversion, converter="file")
-        content = entry.path("xodr").read_bytes()
-        return self._built(name, content, str(entry.info["source"]), settings, given, progress)
+        content, file = entry.read("xodr"), str(entry.info["source"])
+        with _workspace_errors(self.root), self._lock(name):
+            return self._built(name, content, file, settings, given, progress)
+
+    def _lock(self, name: str) -> AbstractContextManager[int]:
+        """Hold the lock of a map; another process that builds it is waited for."""
+        return locked(self.root / "maps" / name, what=f"map {name!r}", patience=PATIENCE)
 
     def _built(
         self,
@@ -383,21 +295,21 @@ class Workspace:
     ) -> MapEntry:
         from odscen.workspace.map_build import build_map
 
-        final = self.root / "maps" / name
-        with _workspace_errors(self.root), in_file(file), new_folder(final) as folder:
+        final, sha256 = self.root / "maps" / name, digest(content)
+        with in_file(file), new_folder(final) as folder:
             build_map(
                 content,
                 folder,
                 name=name,
                 file=file,
-                sha256=hashlib.sha256(content).hexdigest(),
+                sha256=sha256,
                 settings=settings,
                 builder=BUILDER,
                 given=given,
                 progress=progress or (lambda _what, _share: None),
             )
-            # Read here: another process that adds the same map may replace ours at any time.
-            info = _read_entry(folder).info
+            write_sums(folder, sums_of(folder, known={XODR_FILE: sha256}))
+            info = read_entry(folder).info
         return MapEntry(name, final, info)
 
     def remove_map(self, name: str) -> None:
@@ -407,29 +319,29 @@ class Workspace:
         ------
         NotFoundError
             If there is no such map.
+        ConflictError
+            If another process is building it.
         WorkspaceError
             If its folder cannot be removed.
         """
         names = self.map_names()
         if name not in names:
             raise NotFoundError("map", name, names)
-        with _workspace_errors(self.root):
+        with (
+            _workspace_errors(self.root),
+            locked(self.root / "maps" / name, what=f"map {name!r}"),
+        ):
             discard(self.root / "maps" / name)
 
 
-def _read_entry(folder: Path) -> MapEntry:
+def _whole(folder: Path) -> MapEntry | None:
+    """A map that is there with all of its files as they were written, else ``None``."""
     try:
-        info = json.loads((folder / "map.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        msg = f"{folder / 'map.json'} cannot be read ({error}); add the map again"
-        raise WorkspaceError(msg) from error
-    return MapEntry(folder.name, folder, info)
+        entry = read_entry(folder)
+    except DamagedError:
+        return None
+    return None if entry.damaged() else entry
 
 
-@contextmanager
-def _workspace_errors(root: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        msg = f"workspace {root}: {error.strerror or error} ({error.filename or ''})"
-        raise WorkspaceError(msg) from error
+def _workspace_errors(root: Path) -> AbstractContextManager[None]:
+    return disk_errors(f"workspace {root}")

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,12 @@ from odscen.sumo.folder import checkpoint, layout, run_status
 from odscen.sumo.folder.layout import RECORDED
 from odscen.sumo.folder.parts import check_room
 from odscen.sumo.folder.recorded import read_trajectories, recorded_files, trajectory_files
+from odscen.sumo.folder.run_sums import seal_start
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner import forecast, worker_process
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.runner.live_run import Live
-from odscen.sumo.runner.long_runs import resume
+from odscen.sumo.runner.long_runs import resume, run_lock
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from odscen.sumo.worker.protocol import Command, Pace, Progress
 from tests.sumo.conftest import SLICE, TYPES, UNTIL
@@ -62,8 +64,8 @@ def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]
     left = {path.name for path in result.folder.iterdir()}
     assert left == {
-        "actors.json", "events.json", "lanes", "plan.json", "scenario.json", "summary.json", "sumo",
-        "sumo.log", "trajectories", "trips",
+        "SHA256SUMS", "actors.json", "events.json", "lanes", "plan.json", "scenario.json",
+        "summary.json", "sumo", "sumo.log", "trajectories", "trips",
     }  # fmt: skip
     assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
 
@@ -165,7 +167,9 @@ def test_a_damaged_last_slice_is_named_and_the_one_before_is_gone_on_from(
     state.write_bytes(content)
     told: list[str] = []
     resume(run, tell=told.append)
-    assert told[0] == f"slice {last} is damaged: state.xml.gz is not as it was written"
+    assert told[0].startswith(
+        f"slice {last} is damaged: slices/000{last}/state.xml.gz: expected sha256 "
+    )
     assert told[1] == f"resumes at {(last - 1) * SLICE:g} s, after slice {last - 1}"
     assert results(run) == whole
 
@@ -182,6 +186,36 @@ def test_a_full_disk_ends_in_a_clear_message_and_a_run_that_resumes(
     assert "What happened up to 60 s is kept" in error
     assert list(map(str, trajectory_files(run))) == [str(run / "trajectories/part-0001.parquet")]
     resume(run)
+    assert results(run) == whole
+
+
+def test_too_little_memory_is_named_with_what_to_do_and_the_run_resumes(
+    long: PreparedRun, whole: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The simulation gets 20 MB, less than SUMO needs; with glibc's allocator it says so."""
+    run = tmp_path / "run"
+    monkeypatch.setenv("LD_PRELOAD", "")
+    error = killed(long, run, monkeypatch, MEMORY_LEFT=20_000_000)
+    assert error.startswith("the memory is used up; end other programs, or run less at a time")
+    resume(run)
+    assert results(run) == whole
+
+
+@pytest.mark.parametrize("change", [1, 5, 9])
+def test_killed_while_it_is_resumed_a_run_still_ends_with_the_same_bytes(
+    long: PreparedRun,
+    whole: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    change: int,
+) -> None:
+    run = tmp_path / "run"
+    killed(long, run, monkeypatch, KILL_AT=6)
+    with monkeypatch.context() as patch:
+        patch.setattr(worker_process, "WORKER", "tests.sumo.killed_worker")
+        patch.setenv("KILL_BOTH_AT", str(change))
+        assert resume(run).status == "failed"
+    assert resume(run).status == "completed"
     assert results(run) == whole
 
 
@@ -210,10 +244,9 @@ def test_a_run_that_goes_on_is_neither_resumed_nor_replaced(
     run = tmp_path / "run"
     killed(long, run, monkeypatch, KILL_AT=9)
     assert run_status.going(run) == "interrupted"
-    monkeypatch.setattr(run_status, "PATIENCE", 0.1)
-    with run_status.locked(run):
+    with run_lock(run):
         assert run_status.going(run) == "running"
-        with pytest.raises(ConflictError, match="running in another process"):
+        with pytest.raises(ConflictError, match=rf"process {os.getpid()} since 20..-"):
             resume(run)
     with pytest.raises(ConflictError, match=r"odscen resume .*run resumes it"):
         run_prepared(long, run)
@@ -321,6 +354,7 @@ def test_whoever_does_not_come_back_with_a_saved_state_is_told(
     config = run / "sumo" / "scenario.sumocfg"
     forget = f'<processing>\n<load-state.remove-vehicles value="{car}"/>'
     config.write_text(config.read_text().replace("<processing>", forget))
+    seal_start(run)
     resume(run)
     events = events_from_json((run / "events.json").read_text())
     lost = [event for event in events if event.kind is EventKind.LOST]

@@ -179,7 +179,7 @@ def read_network(content: bytes) -> ImportedNet:
     try:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
-        msg = f"the SUMO network is not XML: {error}"
+        msg = f"the SUMO network is not XML: {error.msg}"
         raise InputError(msg) from error
     if root.tag != "net":
         msg = f"the SUMO network cannot be read: its first element is <{root.tag}>, not <net>"

@@ -98,7 +98,7 @@ def with_lane_limits(xodr: bytes) -> tuple[bytes, tuple[ReportEntry, ...]]:
     try:
         root = etree.fromstring(xodr, parser)
     except etree.XMLSyntaxError as error:
-        msg = f"not XML: {error}"
+        msg = f"not XML: {error.msg}"
         raise OpenDriveError(msg) from error
     entries: list[ReportEntry] = []
     count = sum(_limit_lanes(road, entries) for road in root.iter("{*}road"))

@@ -133,7 +133,8 @@ def read_net(content: bytes) -> NetFile:
             ),
         )
     except (etree.XMLSyntaxError, LookupError, ValueError) as error:
-        msg = f"the SUMO network cannot be read: {type(error).__name__}: {error}"
+        words = getattr(error, "msg", error)
+        msg = f"the SUMO network cannot be read: {type(error).__name__}: {words}"
         raise InputError(msg) from error
 
 

@@ -111,7 +111,7 @@ def _parse(text: str) -> etree._Element:
     try:
         root = etree.fromstring(text.encode(), parser)
     except (etree.XMLSyntaxError, UnicodeEncodeError) as error:
-        msg = f"not GraphML: {error}"
+        msg = f"not GraphML: {getattr(error, 'msg', error)}"
         raise ScenarioError(msg) from error
     if root.getroottree().docinfo.internalDTD is not None:
         msg = "not GraphML: a document type declaration is not accepted"

@@ -2,20 +2,20 @@
 
 A slice is complete when its folder ``slices/NNNN`` is there: everything in it was written, checked
 and brought to the disk under another name before, and renaming is one step. What is recorded lies
-under checksums in ``checkpoint.json``, as disks and people damage files.
+under checksums in ``checkpoint.json``, which has its own, as disks and people damage files.
 """
 
 from __future__ import annotations
 
 import gzip
-import json
-import os
 import shutil
 import zlib
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import SimulationError
+from odscen.base.checksums import MISSING, file_digest, seal, unsealed
+from odscen.base.errors import DamagedError, DamagedFile, SimulationError
+from odscen.base.to_disk import to_disk
 from odscen.sumo.folder.layout import RECORDED, SLICES_FOLDER
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ CHECKPOINT_FILE = "checkpoint.json"
 STATE_FILE = "state.xml.gz"
 EVENTS_LINES = "events.jsonl"
 FORMAT = "odscen-slice"
-VERSION = 1
+VERSION = 2
+"""1 had no checksums that are checked today."""
 
 _BLOCK = 1 << 20
 _PART = ".part-"
@@ -60,7 +61,7 @@ class Checkpoint:
     recorder
         What it remembers, see :meth:`odscen.sumo.worker.recorder.Recorder.state`.
     files
-        Size and CRC-32 by name.
+        SHA-256 by name.
     """
 
     number: int
@@ -74,7 +75,7 @@ class Checkpoint:
     running: int
     present: list[str]
     recorder: dict[str, Any]
-    files: dict[str, list[int]]
+    files: dict[str, str]
     lanes: dict[str, int] = field(default_factory=dict)
 
 
@@ -105,9 +106,11 @@ def slice_size(run: Path, number: int) -> int:
 
 
 def clear_parts(run: Path) -> None:
-    """Remove what is left of slices that were not completed."""
+    """Remove what is left of slices, and of small files, that were not completed."""
     for folder in (run / SLICES_FOLDER).glob(f"{_PART}*"):
         shutil.rmtree(folder, ignore_errors=True)
+    for file in run.glob(".*.part"):
+        file.unlink(missing_ok=True)
 
 
 def recorded_part(run: Path, file: str, number: int) -> Path:
@@ -125,14 +128,14 @@ def complete(run: Path, part: Path, checkpoint: Checkpoint) -> None:
     """
     path = part / CHECKPOINT_FILE
     head = {"format": FORMAT, "version": VERSION}
-    path.write_text(json.dumps({**head, **asdict(checkpoint)}), encoding="utf-8")
+    path.write_text(seal({**head, **asdict(checkpoint)}), encoding="utf-8")
     for name in (*checkpoint.files, CHECKPOINT_FILE):
-        _to_disk(part / name)
-    _to_disk(part)
+        to_disk(part / name)
+    to_disk(part)
     final = slice_folder(run, checkpoint.number)
     shutil.rmtree(final, ignore_errors=True)
     part.rename(final)
-    _to_disk(final.parent)
+    to_disk(final.parent)
     settle(run, checkpoint.number)
 
 
@@ -144,7 +147,7 @@ def settle(run: Path, number: int) -> None:
             target = recorded_part(run, file, number)
             target.parent.mkdir(exist_ok=True)
             inside.replace(target)
-            _to_disk(target.parent)
+            to_disk(target.parent)
 
 
 def read_checkpoint(run: Path, number: int) -> Checkpoint:
@@ -157,13 +160,19 @@ def read_checkpoint(run: Path, number: int) -> Checkpoint:
     """
     path = slice_folder(run, number) / CHECKPOINT_FILE
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        if (data.pop("format"), data.pop("version")) != (FORMAT, VERSION):
+        data = unsealed(path)
+        head = data.pop("format"), data.pop("version")
+        if head not in ((FORMAT, 1), (FORMAT, VERSION)):
             msg = f"{path.name} is of another version"
             raise SimulationError(msg)
+        if head[1] == 1:
+            data["files"] = {}
         return Checkpoint(**data)
+    except DamagedError as error:
+        wrong = error.files[0]._replace(file=path.relative_to(run).as_posix())
+        raise SimulationError(str(wrong)) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        msg = f"{path.name} cannot be read ({error})"
+        msg = f"{path.relative_to(run).as_posix()} cannot be read ({error})"
         raise SimulationError(msg) from error
 
 
@@ -207,25 +216,29 @@ def check(run: Path, checkpoint: Checkpoint) -> None:
     SimulationError
         If one is not as it was written.
     """
-    for name, (size, crc) in checkpoint.files.items():
-        number = checkpoint.number
+    number = checkpoint.number
+    for name, expected in checkpoint.files.items():
         inside = slice_folder(run, number) / name
         path = recorded_part(run, name, number) if name in RECORDED else inside
-        if not path.is_file():
-            msg = f"{path.name} is missing"
-            raise SimulationError(msg)
-        if path.stat().st_size != size or _crc(path) != crc:
-            msg = f"{path.name} is not as it was written"
-            raise SimulationError(msg)
+        found = file_digest(path) if path.is_file() else MISSING
+        if found != expected:
+            wrong = DamagedFile(path.relative_to(run).as_posix(), expected, found)
+            raise SimulationError(str(wrong))
 
 
-def fingerprints(part: Path, names: tuple[str, ...]) -> dict[str, list[int]]:
-    """Size and CRC-32 of files in a folder, of those that are there."""
-    return {
-        name: [(part / name).stat().st_size, _crc(part / name)]
-        for name in names
-        if (part / name).is_file()
-    }
+def part_sums(run: Path) -> dict[str, str]:
+    """SHA-256 of what complete slices have recorded, as it was written, by path in the run."""
+    sums = {}
+    for number in range(1, last_number(run) + 1):
+        for name, known in read_checkpoint(run, number).files.items():
+            if name in RECORDED:
+                sums[recorded_part(run, name, number).relative_to(run).as_posix()] = known
+    return sums
+
+
+def fingerprints(part: Path, names: tuple[str, ...]) -> dict[str, str]:
+    """SHA-256 of files in a folder, of those that are there."""
+    return {name: file_digest(part / name) for name in names if (part / name).is_file()}
 
 
 def check_state(path: Path) -> None:
@@ -247,27 +260,3 @@ def check_state(path: Path) -> None:
     if b"</snapshot>" not in tail:
         msg = "SUMO has not saved its state to the end; the disk may be full"
         raise SimulationError(msg)
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Replace a small file in one step, brought to the disk."""
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    _to_disk(part)
-    part.replace(path)
-
-
-def _crc(path: Path) -> int:
-    crc = 0
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            crc = zlib.crc32(block, crc)
-    return crc
-
-
-def _to_disk(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

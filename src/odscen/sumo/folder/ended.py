@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
 from odscen.sumo.folder.layout import SUMMARY_FILE
+from odscen.sumo.folder.run_status import unfinished_words
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,9 +19,12 @@ def read_summary(run: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If there is none, or it is something else.
+        If there is none, or it is something else; of an interrupted run it says how to resume it.
     """
     file = run / SUMMARY_FILE
+    words = unfinished_words(run)
+    if words is not None:
+        raise InputError(words)
     if not file.is_file():
         msg = f"no finished run here: there is no {SUMMARY_FILE}"
         raise InputError(msg, file=str(run))

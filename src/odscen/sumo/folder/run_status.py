@@ -1,34 +1,28 @@
-"""Whether a run in slices is going on, and how far it is: ``status.json`` and a lock beside it.
+"""Whether a run in slices is going on, and how far it is: ``status.json``, and a lock beside it.
 
-The lock is the system's own: it ends with the processes that hold it, however they end, so that a
-run whose processes are gone is known to be interrupted.
+The lock ends with the processes that hold it, see :mod:`odscen.base.folder_locks`, so that a run
+whose processes are gone is known to be interrupted.
 """
 
 from __future__ import annotations
 
-import fcntl
-import json
-import os
-import time
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal
 
-from odscen.base.errors import ConflictError
+from odscen.base.checksums import seal, unsealed
+from odscen.base.durations import clock
+from odscen.base.errors import DamagedError
+from odscen.base.folder_locks import is_locked
+from odscen.base.to_disk import write_whole
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.checkpoint import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from odscen.results.records.run_records import Plan
     from odscen.sumo.folder.checkpoint import Checkpoint
 
 FORMAT = "odscen-status"
-VERSION = 1
-PATIENCE = 10.0
-"""Wall seconds to wait for a worker that is about to notice that its runner is gone, and for the
-slice that is being completed then."""
+VERSION = 2
 
 
 def write_status(run: Path, plan: Plan, done: Checkpoint | None) -> None:
@@ -47,57 +41,40 @@ def write_status(run: Path, plan: Plan, done: Checkpoint | None) -> None:
         "planned": len(plan.actors),
         "wall_seconds": round(done.wall_seconds, 3) if done else 0.0,
     }
-    write_whole(run / layout.STATUS_FILE, json.dumps(status, indent=2) + "\n")
+    write_whole(run / layout.STATUS_FILE, seal(status, indent=2))
 
 
 def read_status(run: Path) -> dict[str, Any] | None:
-    """What was last said; ``None`` if the folder is not of a run in slices that has not ended."""
-    try:
-        status: dict[str, Any] = json.loads((run / layout.STATUS_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    """What was last said; ``None`` if the folder is not of a run in slices that has not ended.
+
+    Empty if it cannot be believed: such a run has not ended, either.
+    """
+    if not unfinished(run):
         return None
-    return status if isinstance(status, dict) and status.get("format") == FORMAT else None
+    try:
+        return unsealed(run / layout.STATUS_FILE)
+    except (OSError, ValueError, DamagedError):
+        return {}
+
+
+def unfinished(run: Path) -> bool:
+    """Whether a folder is of a run in slices that has not ended."""
+    return (run / layout.STATUS_FILE).is_file()
 
 
 def going(run: Path) -> Literal["running", "interrupted"] | None:
     """Whether processes work on a run that has not ended; ``None`` if there is none here."""
-    if read_status(run) is None:
+    if not unfinished(run):
         return None
-    try:
-        with locked(run, patience=0.0):
-            return "interrupted"
-    except ConflictError:
-        return "running"
-    except OSError:  # a folder that we may not write in
-        return "interrupted"
+    return "running" if is_locked(run) else "interrupted"
 
 
-@contextmanager
-def locked(run: Path, *, patience: float = PATIENCE) -> Iterator[int]:
-    """Hold the lock of a run; yields its file descriptor, which the worker is to inherit.
-
-    Raises
-    ------
-    ConflictError
-        If another process holds it.
-    """
-    descriptor = os.open(run / layout.LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        _take(descriptor, run, patience)
-        yield descriptor
-    finally:
-        os.close(descriptor)
-
-
-def _take(descriptor: int, run: Path, patience: float) -> None:
-    end = time.monotonic() + patience
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= end:
-                msg = f"run {run.name!r} is running in another process"
-                raise ConflictError(msg) from None
-            time.sleep(0.05)
-        else:
-            return
+def unfinished_words(run: Path) -> str | None:
+    """What a run in slices that has not ended is, and how to resume it; ``None`` for others."""
+    state, status = going(run), read_status(run)
+    if state is None or status is None:
+        return None
+    at = f" at {clock(status['time'])} of {clock(status['until'])} h" if status else ""
+    if state == "running":
+        return f"run {run.name!r} has not ended: it is running{at}"
+    return f"run {run.name!r} is interrupted{at}; odscen resume {run} resumes it"

@@ -122,9 +122,7 @@ def realize(
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map)))
     if settings.seed is not None:
         scenario = scenario.model_copy(update={"seed": settings.seed})
-    own, recording = scenario.simulation, settings.recorded
-    until = own.duration if settings.until is None else settings.until
-    step_length = own.step_length if settings.step_length is None else settings.step_length
+    recording, (until, step_length) = settings.recorded, settings.times(scenario)
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
@@ -146,7 +144,10 @@ def realize(
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
     lights = realized_lights(scenario, sumo_map, until=until)
     signals = signals_xml(lights, buses=demand.types_of(Category.BUS))
-    files = {ROUTES_FILE: demand.to_xml(), **_run_files(plan, settings, own, signals, lights)}
+    files = {
+        ROUTES_FILE: demand.to_xml(),
+        **_run_files(plan, settings, scenario.simulation, signals, lights),
+    }
     return Realization(
         files,
         plan,

@@ -13,6 +13,8 @@ from odscen.sumo.realize.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.scenario.document.scenario_document import Scenario
+
 SliceLength = float | Literal["auto"] | None
 """Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
 
@@ -89,6 +91,24 @@ class RunSettings:
     def recorded(self) -> Recording:
         """What is recorded: criticality too where an expectation asks for it."""
         return self.recording.with_criticality(needs_criticality(self.expectations))
+
+    def times(self, scenario: Scenario) -> tuple[float, float]:
+        """End of a run of a scenario and length of its steps, seconds.
+
+        Raises
+        ------
+        InputError
+            If it would end before its first step is over.
+        """
+        own = scenario.simulation
+        until = own.duration if self.until is None else self.until
+        step_length = own.step_length if self.step_length is None else self.step_length
+        if until < step_length:
+            msg = (
+                f"until is {until:g} s: the run would end before its first step ({step_length:g} s)"
+            )
+            raise InputError(msg)
+        return until, step_length
 
     def to_dict(self) -> dict[str, Any]:
         """As values that JSON can hold."""

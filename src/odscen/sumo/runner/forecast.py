@@ -10,7 +10,7 @@ import shutil
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import WorkspaceError
+from odscen.base.errors import ResourceError
 from odscen.sumo.realize.measure_files import interval_of
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def refuse_without_room(expected: Forecast, folder: Path) -> None:
 
     Raises
     ------
-    WorkspaceError
+    ResourceError
         With what is needed, what is free, and what to do.
     """
     there = next(path for path in (folder, *folder.parents) if path.exists())
@@ -115,7 +115,7 @@ def refuse_without_room(expected: Forecast, folder: Path) -> None:
             f"{folder}: the run needs about {size(expected.disk)} of disk, {size(free)} are free; "
             f"record less (--trajectories every=10s, or none) or free some"
         )
-        raise WorkspaceError(msg)
+        raise ResourceError(msg)
 
 
 def size(count: float) -> str:

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import json
 import shutil
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.atomic_folders import new_folder
-from odscen.base.errors import ConflictError, InputError, NotFoundError, WorkspaceError
+from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.checksums import unsealed
+from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.base.folder_locks import locked
+from odscen.base.system_errors import disk_errors
+from odscen.base.to_disk import write_whole
 from odscen.results.measures.expectations import parse_expectation
 from odscen.results.measures.summary import summary_to_json
 from odscen.results.records.run_records import Plan
@@ -23,10 +26,21 @@ from odscen.sumo.folder.checkpoint import (
     last_number,
     read_checkpoint,
     survey,
-    write_whole,
 )
 from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.run_status import locked, read_status, write_status
+from odscen.sumo.folder.run_status import (
+    going,
+    read_status,
+    unfinished,
+    write_status,
+)
+from odscen.sumo.folder.run_sums import (
+    check_run_files,
+    seal_interrupted,
+    seal_run,
+    seal_start,
+    unseal_interrupted,
+)
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
@@ -37,7 +51,8 @@ from odscen.sumo.runner.run_folder import (
 from odscen.sumo.runner.worker_process import run_worker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from odscen.sumo.runner.run_folder import Finish
@@ -51,6 +66,7 @@ VERSION = 1
 def run_long(
     prepared: PreparedRun,
     out: Path,
+    lock: int,
     *,
     progress: OnProgress | None = None,
     finish: Finish | None = None,
@@ -58,20 +74,19 @@ def run_long(
 ) -> Run:
     """Run in slices in a new folder ``out``, which is there while it goes on.
 
-    Parameters as in :func:`odscen.sumo.runner.run_jobs.run_prepared`.
+    Parameters as in :func:`odscen.sumo.runner.run_jobs.run_prepared`; ``lock`` is that of ``out``.
 
     Raises
     ------
     WorkspaceError
         If the folder cannot be written.
     """
-    with _disk_errors(out):
-        with new_folder(out) as folder:
-            write_run_folder(prepared, folder)
-            _write_settings(prepared, folder)
-            write_status(folder, prepared.plan, None)
-        with locked(out) as lock:
-            return _resume_from(prepared, out, lock, progress, finish, live)
+    with new_folder(out) as folder:
+        write_run_folder(prepared, folder)
+        _write_settings(prepared, folder)
+        write_status(folder, prepared.plan, None)
+        seal_start(folder)
+    return _resume_from(prepared, out, lock, progress, finish, live)
 
 
 def resume(
@@ -84,6 +99,8 @@ def resume(
     live: Companion | None = None,
 ) -> Run:
     """Go on with an interrupted run from its last complete slice.
+
+    All that it goes on from is compared with its checksums first.
 
     Parameters
     ----------
@@ -98,14 +115,16 @@ def resume(
         If there is no run here.
     ConflictError
         If it has ended already, or is going on.
+    DamagedError
+        If what it starts from is not as it was written.
     """
-    if read_status(folder) is None:
-        if (folder / layout.SUMMARY_FILE).is_file():
-            msg = f"run {folder.name!r} has ended; there is nothing to resume"
-            raise ConflictError(msg)
-        what = "interrupted run"
-        raise NotFoundError(what, folder.name, interrupted(folder.parent))
-    with _disk_errors(folder), locked(folder) as lock:
+    _refuse_absent(folder)
+    again = f"then: odscen resume {folder}"
+    with disk_errors(f"run folder {folder}", advice=again), run_lock(folder) as lock:
+        _refuse_absent(folder)
+        clear_leftovers(folder.parent)
+        check_run_files(folder)
+        unsealed(folder / layout.STATUS_FILE)
         prepared = _restore(folder, time_limit)
         number, problems = survey(folder)
         if tell is not None:
@@ -113,8 +132,20 @@ def resume(
                 tell(problem)
             begin = read_checkpoint(folder, number).time if number else 0.0
             tell(f"resumes at {begin:g} s, after slice {number}" if number else "begins anew")
+        unseal_interrupted(folder)  # first: it may be killed in between
         (folder / layout.SUMMARY_FILE).unlink(missing_ok=True)
         return _resume_from(prepared, folder, lock, progress, finish, live)
+
+
+def run_lock(folder: Path) -> AbstractContextManager[int]:
+    """Hold the lock of a run folder, which need not be there.
+
+    Raises
+    ------
+    ConflictError
+        If another process works on it; says which, and since when.
+    """
+    return locked(folder, what=f"run {folder.name!r}")
 
 
 def refuse_interrupted(out: Path) -> None:
@@ -127,18 +158,19 @@ def refuse_interrupted(out: Path) -> None:
     """
     status = read_status(out)
     if status is not None:
+        at = f"it is at {status['time']:g} s" if status else "its status.json is damaged"
         msg = (
-            f"run {out.name!r} has not ended (it is at {status.get('time', 0):g} s); "
+            f"run {out.name!r} has not ended ({at}); "
             f"odscen resume {out} resumes it; delete the folder to begin anew"
         )
         raise ConflictError(msg)
 
 
 def interrupted(runs: Path) -> list[str]:
-    """Names of the runs in a folder that have not ended, sorted."""
+    """Names of the runs in a folder that are interrupted, sorted."""
     if not runs.is_dir():
         return []
-    return sorted(path.name for path in runs.iterdir() if read_status(path) is not None)
+    return sorted(path.name for path in runs.iterdir() if going(path) == "interrupted")
 
 
 def about(folder: Path) -> dict[str, Any]:
@@ -173,9 +205,23 @@ def _resume_from(
         finish(folder, summary)
     summary["files"] = found_files(folder)
     write_whole(folder / layout.SUMMARY_FILE, summary_to_json(summary))
-    if ended.done is not None:
+    if ended.done is None:
+        seal_interrupted(folder)
+    else:
+        seal_run(folder)
         _clear(folder)
     return Run(folder, summary)
+
+
+def _refuse_absent(folder: Path) -> None:
+    """Refuse what cannot be resumed, as it has ended or is not there."""
+    if unfinished(folder):
+        return
+    if (folder / layout.SUMMARY_FILE).is_file():
+        msg = f"run {folder.name!r} has ended; there is nothing to resume"
+        raise ConflictError(msg)
+    what = "interrupted run"
+    raise NotFoundError(what, folder.name, interrupted(folder.parent))
 
 
 def _slices(folder: Path) -> dict[str, Any]:
@@ -201,7 +247,6 @@ def _clear(folder: Path) -> None:
     (folder / layout.STATUS_FILE).unlink(missing_ok=True)
     (folder / layout.SETTINGS_FILE).unlink(missing_ok=True)
     shutil.rmtree(folder / layout.SLICES_FOLDER, ignore_errors=True)
-    (folder / layout.LOCK_FILE).unlink(missing_ok=True)
 
 
 def _write_settings(prepared: PreparedRun, folder: Path) -> None:
@@ -238,12 +283,3 @@ def _restore(folder: Path, time_limit: float | None) -> PreparedRun:
     except (OSError, KeyError, TypeError, ValueError) as error:
         msg = f"cannot be resumed: {error!r}"
         raise InputError(msg, file=str(path)) from error
-
-
-@contextmanager
-def _disk_errors(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        msg = f"run folder {folder}: {error.strerror or error} ({error.filename or ''})"
-        raise WorkspaceError(msg) from error

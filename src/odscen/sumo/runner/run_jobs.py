@@ -12,13 +12,15 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from odscen.base.atomic_folders import new_folder
-from odscen.base.errors import InputError, WorkspaceError
+from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.errors import InputError
+from odscen.base.system_errors import disk_errors
 from odscen.results.measures.summary import summary_to_json
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.folder.run_sums import seal_run
 from odscen.sumo.runner.forecast import refuse_without_room
-from odscen.sumo.runner.long_runs import refuse_interrupted, run_long
+from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
     drop_torn_records,
@@ -74,21 +76,24 @@ def run_prepared(
     WorkspaceError
         If the folder cannot be written, or the disk cannot hold the run.
     ConflictError
-        If a run that has not ended is in ``out``.
+        If a run that has not ended is in ``out``, or another process works there.
     """
-    refuse_interrupted(out)
-    if prepared.expected is not None:
-        refuse_without_room(prepared.expected, out)
-    if prepared.plan.slice_length is not None:
-        if tell is not None and prepared.expected is not None:
-            tell(f"{out.name}: {prepared.expected}")
-        return run_long(prepared, out, progress=progress, finish=finish, live=live)
-    try:
+    with disk_errors(f"run folder {out}"), run_lock(out) as lock:
+        refuse_interrupted(out)
+        clear_leftovers(out.parent)
+        if prepared.expected is not None:
+            refuse_without_room(prepared.expected, out)
+        if prepared.plan.slice_length is not None:
+            if tell is not None and prepared.expected is not None:
+                tell(f"{out.name}: {prepared.expected}")
+            return run_long(prepared, out, lock, progress=progress, finish=finish, live=live)
         with new_folder(out) as folder:
             write_run_folder(prepared, folder)
             if simulate is None:
                 limit = prepared.settings.time_limit
-                ended = run_worker(folder, progress=progress, time_limit=limit, live=live)
+                ended = run_worker(
+                    folder, progress=progress, time_limit=limit, live=live, keep=(lock,)
+                )
             else:
                 ended = simulate(folder)
             if ended.done is None:
@@ -98,10 +103,8 @@ def run_prepared(
                 finish(folder, summary)
                 summary["files"] = found_files(folder)
             (folder / layout.SUMMARY_FILE).write_text(summary_to_json(summary), encoding="utf-8")
-    except OSError as error:
-        msg = f"run folder {out}: {error.strerror or error} ({error.filename or ''})"
-        raise WorkspaceError(msg) from error
-    return Run(out, summary)
+            seal_run(folder)
+        return Run(out, summary)
 
 
 _LISTEN = 0.2

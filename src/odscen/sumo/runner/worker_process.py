@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from odscen.base.system_errors import ADVICE
 from odscen.sumo.folder.layout import LOG_FILE, PLAN_FILE
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.worker.protocol import (
@@ -137,8 +140,9 @@ def run_worker(
         return Ended(last, seconds, None)
     if late.is_set():
         return Ended(None, seconds, f"stopped after the time limit of {time_limit:g} s")
-    reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
+    said = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
     words = sumo_words(folder)
+    reason = _with_lack(folder, said, words)
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
 
 
@@ -214,7 +218,38 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
+def _with_lack(folder: Path, said: str, words: str) -> str:
+    """Why a worker has failed; first what the machine had no more of, if that can be told."""
+    lack = None
+    with suppress(OSError):
+        if shutil.disk_usage(folder).free < _NO_ROOM:
+            lack = ADVICE[errno.ENOSPC]
+    for sign, number in _SIGNS.items():
+        if lack is None and (sign in said or sign in words):
+            lack = ADVICE[number]
+    return said if lack is None or lack in said else f"{lack}\n{said}"
+
+
+_NO_ROOM = 1 << 16
+"""Bytes; with less left on the disk, what has just failed has failed for that."""
+_SIGNS = {
+    "No space left on device": errno.ENOSPC,
+    "Read-only file system": errno.EROFS,
+    "Permission denied": errno.EACCES,
+    "Too many open files": errno.EMFILE,
+    "bad_alloc": errno.ENOMEM,
+    "MemoryError": errno.ENOMEM,
+    "Cannot allocate memory": errno.ENOMEM,
+}
+"""What SUMO, Python and the libraries of both say where the machine lacks something."""
+
+
 def _exit_words(code: int) -> str:
+    if code == -signal.SIGKILL:
+        return (
+            "SUMO's process was ended by signal SIGKILL; "
+            "if you have not sent it, the memory was used up: run less at a time"
+        )
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         return f"SUMO crashed: its process was ended by signal {name}"

@@ -95,7 +95,7 @@ def main() -> int:
         outcomes.settle()  # while the worker simulates
         try:
             written: Written | None = connection.recv()
-        except EOFError:  # the worker is gone; what it has asked for is done
+        except (EOFError, ConnectionError):  # the worker is gone; what it asked for is done
             return 1
         try:
             if written is None:

@@ -18,7 +18,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from odscen.base.atomic_folders import in_use
 from odscen.base.errors import OdscenError
+from odscen.base.system_errors import NO_MEMORY, system_words
 from odscen.results.measures.summary import Outcomes
 from odscen.results.records.run_records import Plan, event_line
 from odscen.sumo.folder.layout import (
@@ -49,7 +51,7 @@ def main() -> int:
     """Run the plan named on the command line; 0 when the simulation ended by itself."""
     plan_file = Path(sys.argv[1])
     folder = plan_file.parent
-    with captured_output(folder / LOG_FILE) as stdout:
+    with in_use(folder), captured_output(folder / LOG_FILE) as stdout:
 
         def send(message: Message, payload: bytes = b"") -> None:
             stdout.buffer.write(encode(message).encode() + payload)
@@ -60,8 +62,14 @@ def main() -> int:
             gc.freeze()  # the plan stays, and need not be gone through again and again
             watch = _watch(plan, sys.argv[2], send) if len(sys.argv) > 2 else None
             send(simulate(plan, folder, send, watch))
-        except (OdscenError, OSError) as error:
+        except OdscenError as error:
             send(Failed(str(error)))
+            return 3
+        except OSError as error:
+            send(Failed(system_words(error)))
+            return 3
+        except MemoryError:
+            send(Failed(NO_MEMORY))
             return 3
     return 0
 

@@ -74,6 +74,13 @@ class MapInfo(Answer):
     preview: str
 
 
+class BrokenMapInfo(Answer):
+    """A map of the catalogue that cannot be used, and why."""
+
+    name: str
+    problem: str
+
+
 class CrosswalkInfo(Answer):
     """A crosswalk: its outline, and the line along which people walk; metres."""
 

@@ -1,11 +1,12 @@
-"""A long run killed with signal 9 again and again, against the same run left alone.
+"""A long run killed again and again, against the same run left alone.
 
-``python -m bench.interruptions [MAP.xodr] [--hours H] [--weekday TRIPS] [--kills N] [--meso]``:
-traffic on a map (the shipped town, 2 hours, if not given) in slices of 10 minutes; with
-``--weekday`` the hours from 7:00 on of a weekday with so many trips. The command line
-is killed at 20 random moments, half of the time with all of its processes, and resumed each time,
-the last time to its end. The results must be the same bytes, and nothing that was there before a
-kill may be gone or different after it.
+``python -m bench.kills [MAP.xodr] [--hours H] [--slice S] [--weekday TRIPS] [--kills N] [--seed N]
+[--meso]``: traffic on a map (the shipped town, half an hour, if not given) in slices of 2 minutes;
+with ``--weekday`` the hours from 7:00 on of a weekday with so many trips. The command line is
+killed at 100 random moments, of the run or of one that was resumed, by signal 9 alone or together
+with all of its processes, or by SIGTERM, and resumed each time, the last time to its end. The
+results must be the same bytes, nothing that was there before a kill may be gone or different after
+it, and nothing else may be left at the end.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
 from odscen.app import demands
 from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
+from odscen.base.atomic_folders import clear_leftovers
 from odscen.scenario.demand.day_profiles import DAY, curve
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import Flow
@@ -34,23 +37,25 @@ from odscen.sumo.folder.recorded import recorded_files
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 
-SLICE = 600.0
 FLOWS = 40
 PER_HOUR = 900.0
+HOW = ("SIGKILL", "SIGKILL to all", "SIGTERM")
 LONGEST = 0.7
 """Wall seconds until a kill at most, as a share of what the run alone takes."""
 
 
 def main(
     given: Path | None = None,
-    hours: float = 2.0,
+    hours: float = 0.5,
     trips: float | None = None,
-    kills: int = 20,
+    kills: int = 100,
     *,
     meso: bool = False,
+    slice_length: float = 120.0,
+    seed: int = 1,
 ) -> None:
     path = given or next(p for p in shipped_maps() if p.stem == "town_5x5")
-    chance = random.Random(1)
+    chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         workspace = Workspace.open(folder / "workspace")
@@ -61,7 +66,7 @@ def main(
             scenario = morning(workspace, entry.name, hours, trips)
         cli = [sys.executable, "-m", "odscen"]
         options = ["--workspace", str(workspace.root)]
-        run = [*cli, "run", str(scenario), *options, "--slice", f"{SLICE:g}"]
+        run = [*cli, "run", str(scenario), *options, "--slice", f"{slice_length:g}"]
         run += ["--meso"] if meso else []
         start = time.perf_counter()
         subprocess.run([*run, "--out", str(folder / "alone")], check=True, capture_output=True)
@@ -70,26 +75,39 @@ def main(
         command = run = [*run, "--out", str(target.parent)]
         resume = [*cli, "resume", str(target), *options]
         expected = results(folder / "alone" / target.name)
-        moments = lost = compared = differing = 0
+        lost = compared = differing = refused = resumed = 0
+        moments: Counter[str] = Counter()
         ended = False
         while not ended:
             before = recorded(target)
-            patience = chance.uniform(0.2, LONGEST * alone) if moments < kills else None
-            if kill(command, patience, worker=chance.random() < 0.5):
-                compared += 1
-                differing += results(target) != expected
-                shutil.rmtree(target)
+            patience = chance.uniform(0.2, LONGEST * alone) if moments.total() < kills else None
+            how = chance.choice(HOW)
+            code = kill(command, patience, how=how)
+            if code is None and whole(target):
+                code = 0  # its end was on the disk, and only telling it was cut short
+            if code is not None:
+                if code:
+                    refused += 1
+                else:
+                    compared += 1
+                    differing += results(target) != expected
+                shutil.rmtree(target, ignore_errors=True)
                 command, ended = run, patience is None
                 continue
-            moments += 1
+            moments[how] += 1
+            resumed += command is resume
             after = recorded(target)
             lost += sum(after.get(file) != content for file, content in before.items())
             command = resume if (target / "status.json").is_file() else run
+        clear_leftovers(target.parent)
+        left = [path.name for path in target.parent.iterdir()]
+    ways = ", ".join(f"{moments[how]} by {how}" for how in HOW)
     print(
-        f"{path.stem}{', meso' if meso else ''}, {hours:g} h in slices of {SLICE:g} s, "
-        f"{alone:.0f} s of wall time alone: "
-        f"killed {moments} times; {lost} files lost or changed by a kill; "
-        f"{compared} runs came to their end, {differing} with other results"
+        f"{path.stem}{', meso' if meso else ''}, {hours:g} h in slices of {slice_length:g} s, "
+        f"{alone:.0f} s of wall time alone: killed {moments.total()} times ({ways}), {resumed} of "
+        f"them a run that was resumed; {lost} files lost or changed by a kill; {compared} runs "
+        f"came to their end, {differing} with other results; {refused} ended otherwise; "
+        f"left behind: {', '.join(left) or 'nothing'}"
     )
 
 
@@ -129,19 +147,26 @@ def morning(workspace: Workspace, name: str, hours: float, trips: float) -> Path
     return write_scenario(scenario, path)
 
 
-def kill(command: list[str], seconds: float | None, *, worker: bool) -> bool:
-    """Start a command and kill it after so many seconds; whether it had ended by then."""
+def kill(command: list[str], seconds: float | None, *, how: str) -> int | None:
+    """Start a command and kill it after so many seconds; its exit code if it had ended by then."""
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
             process.wait(seconds)
         except subprocess.TimeoutExpired:
             children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-            process.send_signal(signal.SIGKILL)
-            for child in children if worker else []:  # it leads a session, with what it started
+            process.send_signal(signal.SIGTERM if how == "SIGTERM" else signal.SIGKILL)
+            # The worker leads a session, with what it has started.
+            for child in children if how == "SIGKILL to all" else []:
                 with suppress(ProcessLookupError):
                     os.killpg(int(child), signal.SIGKILL)
-            return False
-    return True
+            process.wait()
+            return None
+        return process.returncode
+
+
+def whole(run: Path) -> bool:
+    """Whether a run has ended: not the summary of one that was interrupted."""
+    return (run / "summary.json").is_file() and not (run / "status.json").is_file()
 
 
 def recorded(run: Path) -> dict[str, bytes]:
@@ -157,9 +182,14 @@ def results(run: Path) -> dict[str, bytes]:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("map", nargs="?", type=Path)
-    parser.add_argument("--hours", type=float, default=2.0)
+    parser.add_argument("--hours", type=float, default=0.5)
+    parser.add_argument("--slice", type=float, default=120.0)
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--weekday", type=float, metavar="TRIPS")
-    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--meso", action="store_true")
     asked = parser.parse_args()
-    main(asked.map, asked.hours, asked.weekday, asked.kills, meso=asked.meso)
+    main(
+        asked.map, asked.hours, asked.weekday, asked.kills,
+        meso=asked.meso, slice_length=asked.slice, seed=asked.seed,
+    )  # fmt: skip

@@ -1,0 +1,71 @@
+"""An interrupted run goes on, and gets its report."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from odscen.app.maps import load_map
+from odscen.app.reports import write_report
+from odscen.base.errors import InputError
+from odscen.sumo.runner import long_runs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.runner.worker_process import Companion
+    from odscen.sumo.worker.protocol import OnProgress
+    from odscen.workspace.store import Workspace
+
+
+def resume(
+    workspace: Workspace,
+    run: Path,
+    *,
+    time_limit: float | None = None,
+    progress: OnProgress | None = None,
+    tell: Callable[[str], None] | None = None,
+    live: Companion | None = None,
+) -> Run:
+    """Resume an interrupted run and write its report.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    run
+        Its folder, or its name in the workspace.
+    time_limit
+        Wall seconds after which it is interrupted again.
+    progress
+        Called in this thread, a few times a second.
+    tell
+        Called with where it goes on, and what is damaged.
+    live
+        Makes it a run that can be watched and steered.
+
+    Returns
+    -------
+    Run
+        With the same results as if it had not been interrupted.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    ConflictError
+        If it has ended, or is going on.
+    """
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        loaded = None
+        with suppress(InputError):  # the map has been removed meanwhile
+            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+        write_report(folder, summary, loaded=loaded)
+
+    folder = run if run.is_dir() else workspace.runs / run
+    return long_runs.resume(
+        folder, progress=progress, tell=tell, time_limit=time_limit, finish=finish, live=live
+    )

@@ -1,0 +1,195 @@
+"""Damaged runs of a workspace: rebuilt from their records and their map, or set aside.
+
+Part of :mod:`odscen.app.doctor`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from odscen.app.map_repairs import NO_SUMS, RepairStep, listed, set_aside
+from odscen.app.maps import load_map
+from odscen.app.reports import write_report
+from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
+from odscen.base.errors import DamagedFile, InputError, OdscenError
+from odscen.base.folder_locks import is_locked
+from odscen.results.measures.summary import actors_from_json
+from odscen.results.records.run_records import Plan
+from odscen.sumo.folder import layout
+from odscen.sumo.folder.checkpoint import last_number, read_checkpoint
+from odscen.sumo.folder.ended import read_summary
+from odscen.sumo.folder.run_status import read_status, unfinished, write_status
+from odscen.sumo.folder.run_sums import damaged_in, seal_again, seal_run, seal_start, without_sums
+from odscen.sumo.outputs.measured import read_run_data, write_figures
+from odscen.sumo.runner.long_runs import about, run_lock
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from odscen.workspace.store import Workspace
+
+_NET = f"{layout.SUMO_FOLDER}/{layout.NET_FILE}"
+_STATUS = DamagedFile(layout.STATUS_FILE, "its own checksum", "another one")
+_LINE = re.compile(rb"([0-9a-f]{64})  (.+)")
+
+
+def see_to_run(workspace: Workspace, run: Path, *, repair: bool) -> Iterator[RepairStep]:
+    """Yield a step if a run is damaged, or has no checksums; none for one that is going on."""
+    if is_locked(run) or not _is_run(run):
+        return
+    damaged = _damage(run)
+    step = RepairStep("run", run.name, "found", listed(damaged))
+    if damaged:
+        yield _repaired(workspace, run, damaged, step) if repair else step
+    elif without_sums(run):
+        if repair:
+            with run_lock(run):
+                (seal_start if unfinished(run) else seal_run)(run)
+        yield replace(step, action="sealed" if repair else "found", words=NO_SUMS)
+
+
+def _is_run(run: Path) -> bool:
+    names = (layout.SUMMARY_FILE, layout.STATUS_FILE, SUMS_FILE)
+    return any((run / name).is_file() for name in names)
+
+
+def _damage(run: Path) -> list[DamagedFile]:
+    damaged = damaged_in(run)
+    return [*damaged, _STATUS] if read_status(run) == {} else damaged
+
+
+def _repaired(
+    workspace: Workspace, run: Path, damaged: Sequence[DamagedFile], step: RepairStep
+) -> RepairStep:
+    with run_lock(run):
+        try:
+            done = [_rebuild(workspace, run, one) for one in _in_order(damaged)]
+            if left := _damage(run):
+                msg = f"still: {listed(left)}"
+                raise InputError(msg)
+        except (OdscenError, ValueError, KeyError) as error:
+            root = workspace.root if run.parent == workspace.runs else run.parent
+            place = set_aside(run, root)
+            words = f"{step.words}; cannot be rebuilt: {error}"
+            return replace(step, action="set aside", words=words, place=str(place))
+    return replace(step, action="rebuilt", words=f"{step.words}; {'; '.join(done)}")
+
+
+def _in_order(damaged: Sequence[DamagedFile]) -> list[DamagedFile]:
+    """The list of checksums first, as others are compared with it; the report last."""
+    if any(one.file == SUMS_FILE for one in damaged):
+        return [one for one in damaged if one.file == SUMS_FILE]
+    figures = [one for one in damaged if _is_figures(one.file)][:1]  # all are written at once
+    others = [one for one in damaged if not _is_figures(one.file)]
+    return sorted([*others, *figures], key=lambda one: one.file == layout.REPORT_FILE)
+
+
+def _rebuild(workspace: Workspace, run: Path, one: DamagedFile) -> str:
+    """Rebuild a file of a run; what was done, in words.
+
+    Raises
+    ------
+    InputError
+        If it cannot be rebuilt.
+    """
+    if one.file == SUMS_FILE:
+        return _list_again(run)
+    if one.file == _NET:
+        return _net_again(workspace, run, one)
+    if one.file == layout.STATUS_FILE:
+        return _status_again(run)
+    if _is_figures(one.file):
+        return _figures_again(run)
+    if one.file == layout.REPORT_FILE:
+        return _report_again(workspace, run)
+    if one.file == layout.LOG_FILE or (one.file == layout.SUMMARY_FILE and unfinished(run)):
+        return _without(run, one.file)
+    msg = f"nothing else says what was in {one.file}"
+    raise InputError(msg)
+
+
+def _is_figures(name: str) -> bool:
+    return name == layout.FIGURES_FILE or name.startswith(f"{layout.FIGURES_FOLDER}/")
+
+
+def _list_again(run: Path) -> str:
+    """Write the list anew if its lines, but perhaps the one that is damaged, are true."""
+    lines = (run / SUMS_FILE).read_bytes().splitlines()
+    found = [_LINE.fullmatch(line) for line in lines[:-1]]
+    names = [match[2].decode("utf-8", "replace") for match in found if match]
+    wrong = [match for match in found if match is None or not _true(run, match)]
+    if len(wrong) > 1:
+        msg = f"{len(wrong)} of its lines are not true"
+        raise InputError(msg)
+    whole = {name: file_digest(run / name) for name in names if (run / name).is_file()}
+    if wrong:  # the damage is in this line, so that its file is looked for among the others
+        (seal_start if unfinished(run) else _seal_all)(run)
+    else:
+        write_sums(run, whole)
+    return f"wrote {SUMS_FILE} anew"
+
+
+def _seal_all(run: Path) -> None:
+    (run / SUMS_FILE).unlink()
+    seal_run(run)
+
+
+def _true(run: Path, match: re.Match[bytes]) -> bool:
+    with suppress(OSError, ValueError):
+        return file_digest(run / match[2].decode()) == match[1].decode()
+    return False
+
+
+def _net_again(workspace: Workspace, run: Path, one: DamagedFile) -> str:
+    """Take the network of the run's map, if it is the same."""
+    known = about(run) if unfinished(run) else read_summary(run)
+    entry = workspace.map_for(str(known.get("map")), str(known.get("map_sha256")))
+    net = entry.checked("net")
+    if file_digest(net) != one.expected:
+        msg = f"map {entry.name!r} has another network today"
+        raise InputError(msg)
+    target = run / one.file
+    target.unlink(missing_ok=True)
+    try:
+        os.link(net, target)
+    except OSError:
+        shutil.copyfile(net, target)
+    return f"took the network of map {entry.name!r}"
+
+
+def _status_again(run: Path) -> str:
+    plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8"))
+    number = last_number(run)
+    write_status(run, plan, read_checkpoint(run, number) if number else None)
+    return f"wrote {layout.STATUS_FILE} anew"
+
+
+def _figures_again(run: Path) -> str:
+    summary = read_summary(run)
+    outcomes = actors_from_json((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))
+    end, meso = float(summary["sim_seconds"]), bool(summary.get("meso"))
+    write_figures(run, read_run_data(run, outcomes, end=end, meso=meso))
+    return "computed the figures anew"
+
+
+def _report_again(workspace: Workspace, run: Path) -> str:
+    summary, loaded = read_summary(run), None
+    with suppress(InputError):  # the map is not there any more
+        loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+    write_report(run, summary, loaded=loaded)
+    seal_again(run, layout.REPORT_FILE)
+    return "wrote the report anew" if loaded else "wrote the report anew, without the map"
+
+
+def _without(run: Path, name: str) -> str:
+    """Set a file aside that nothing is computed from."""
+    place = set_aside(run / name, run.parent)
+    sums = read_sums(run) or {}
+    write_sums(run, {key: one for key, one in sums.items() if key != name})
+    return f"set {name} aside: {place}"

@@ -1,0 +1,185 @@
+"""Checksums of stored files: ``SHA256SUMS`` in a folder, as ``sha256sum -c`` reads it.
+
+Whatever is read again later has its SHA-256 written down beside it, and is compared before anything
+is computed from it: disks, copies and people change files. The last line is a comment with the
+SHA-256 of the lines above it, so that the list itself is checked, too.
+
+Small files that change while work goes on carry their own: :func:`seal` and :func:`unsealed`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import DamagedError, DamagedFile
+from odscen.base.to_disk import write_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+    from pathlib import Path
+
+SUMS_FILE = "SHA256SUMS"
+
+MISSING = "no such file"
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_SEAL = '"sha256": "'
+
+
+def digest(content: bytes) -> str:
+    """SHA-256, hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file of any size, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sums_of(
+    folder: Path, *, leave: Collection[str] = (), known: Mapping[str, str] | None = None
+) -> dict[str, str]:
+    """SHA-256 of every file in a folder and below, by its path in it, sorted.
+
+    Parameters
+    ----------
+    leave
+        Paths that are left out: files that change later.
+    known
+        What has been computed already; such files are not read.
+    """
+    known = known or {}
+    names = sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
+    )
+    return {
+        name: known.get(name) or file_digest(folder / name)
+        for name in names
+        if name != SUMS_FILE and name not in leave
+    }
+
+
+def write_sums(folder: Path, sums: Mapping[str, str]) -> None:
+    """Write the list of a folder in one step."""
+    lines = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
+    write_whole(folder / SUMS_FILE, f"{lines}# {digest(lines.encode())}\n")
+
+
+def read_sums(folder: Path) -> dict[str, str] | None:
+    """Read the list of a folder; ``None`` if it has none, as those of earlier versions.
+
+    Raises
+    ------
+    DamagedError
+        If the list itself is not as it was written.
+    """
+    try:
+        content = (folder / SUMS_FILE).read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise _damaged_list(folder, "a list that can be read", str(error)) from error
+    lines, mark, own = content.rpartition(b"# ")
+    if not mark or own != f"{digest(lines)}\n".encode():
+        raise _damaged_list(folder, own.decode("ascii", "replace").strip(), digest(lines))
+    found = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
+    return {line[2]: line[1] for line in found if line}
+
+
+def damaged_files(
+    folder: Path, sums: Mapping[str, str], *, may_miss: Collection[str] = ()
+) -> list[DamagedFile]:
+    """Files that are not as the list says; those in ``may_miss`` may have been deleted."""
+    found = []
+    for name, expected in sums.items():
+        try:
+            now = file_digest(folder / name)
+        except FileNotFoundError:
+            if name in may_miss:
+                continue
+            now = MISSING
+        except OSError as error:
+            now = error.strerror or str(error)
+        if now != expected:
+            found.append(DamagedFile(name, expected, now))
+    return found
+
+
+@cache
+def say_unchecked(folder: Path) -> None:
+    """Say once that a folder was written by a version that kept no checksums."""
+    words = "%s has no %s, as of earlier versions: its files are not checked"
+    logging.getLogger("odscen").warning(words, folder, SUMS_FILE)
+
+
+def read_checked(folder: Path, name: str, sums: Mapping[str, str] | None) -> bytes:
+    """Content of a file, compared with the list of its folder, if it has one.
+
+    Raises
+    ------
+    DamagedError
+        If it is not as it was written, or is missing.
+    """
+    expected = None if sums is None else sums.get(name)
+    try:
+        content = (folder / name).read_bytes()
+    except OSError as error:
+        words = MISSING if isinstance(error, FileNotFoundError) else error.strerror or str(error)
+        wrong = DamagedFile(name, expected or "a file", words)
+        raise DamagedError(str(folder), [wrong]) from error
+    if expected is not None and (found := digest(content)) != expected:
+        raise DamagedError(str(folder), [DamagedFile(name, expected, found)])
+    return content
+
+
+def refuse_damaged(folder: Path, sums: Mapping[str, str]) -> None:
+    """Compare files of a folder with their checksums.
+
+    Raises
+    ------
+    DamagedError
+        With each that is not as it was written.
+    """
+    wrong = damaged_files(folder, sums)
+    if wrong:
+        raise DamagedError(str(folder), wrong)
+
+
+def seal(data: Mapping[str, Any], *, indent: int | None = None) -> str:
+    """JSON of an object with its own SHA-256 as its last field."""
+    head = json.dumps(data, indent=indent, ensure_ascii=False).removesuffix("}").rstrip("\n")
+    head += f",\n{' ' * (indent or 0)}{_SEAL}"
+    return f'{head}{digest(head.encode())}"\n}}\n'
+
+
+def unsealed(path: Path) -> dict[str, Any]:
+    """Read what :func:`seal` has made; what earlier versions wrote has no seal and is believed.
+
+    Raises
+    ------
+    DamagedError
+        If it is not as it was written.
+    ValueError, OSError
+        If it cannot be read as an object of JSON.
+    """
+    content = path.read_bytes()
+    head, mark, own = content.rpartition(_SEAL.encode())
+    found = digest(head + mark)
+    if mark and own != f'{found}"\n}}\n'.encode():
+        wrong = DamagedFile(path.name, own.decode("ascii", "replace")[:64], found)
+        raise DamagedError(str(path.parent), [wrong])
+    data = json.loads(content)
+    if not isinstance(data, dict) or (not mark and data.get("version") != 1):
+        msg = f"{path.name} has lost its checksum"
+        raise ValueError(msg)
+    data.pop("sha256", None)
+    return data
+
+
+def _damaged_list(folder: Path, expected: str, found: str) -> DamagedError:
+    return DamagedError(str(folder), [DamagedFile(SUMS_FILE, expected, found)])
