@@ -44,8 +44,9 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.recording import Recording
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.runner.in_step import Step
+    from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.shipped import shipped_maps
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.store import Workspace
 
 _HOMES = {
     "Workspace": "odscen.workspace.store",

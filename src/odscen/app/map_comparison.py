@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.sumo.folder.finished_run import Run
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 PER_FLOW = 60.0
 """Vehicles per hour from one place: far below what a lane takes in from standstill."""

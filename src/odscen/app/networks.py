@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.convert.imported.network_changes import NetworkChange
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
 
 
 class BroughtIn(NamedTuple):

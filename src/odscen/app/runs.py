@@ -42,7 +42,8 @@ if TYPE_CHECKING:
     from odscen.sumo.runner.worker_process import Companion, Ended
     from odscen.sumo.worker.protocol import OnProgress, Progress
     from odscen.workspace.asset_catalogue import Assets
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

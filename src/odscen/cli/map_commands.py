@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 UNITS = dict.fromkeys(
     ("bounds", "road_length", "connecting_road_length", "driving_lane_length", "spacing"), ", m"

@@ -44,7 +44,8 @@ if TYPE_CHECKING:
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
-    from odscen.workspace.store import MapEntry, Workspace
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
 
 
 class CaseStatus(StrEnum):

@@ -44,7 +44,8 @@ from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
-    from odscen.workspace.store import MapEntry, ProgressCallback
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import ProgressCallback
 
 router = APIRouter(prefix="/api")
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.convert.verify.fidelity_result import Fidelity
-    from odscen.workspace.store import MapEntry
+    from odscen.workspace.map_entry import MapEntry
 
 
 class _Placed(Protocol):
