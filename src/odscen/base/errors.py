@@ -6,7 +6,8 @@
     |   |-- GraphFormatError        a GraphML or npz file that is not one of ours
     |   |-- ScenarioError           a scenario document or its graph form; carries all problems
     |   |-- NotFoundError           a name that is not in the catalogue, with close names
-    |   `-- ConflictError           it is taken, in use, or has changed meanwhile
+    |   |-- ConflictError           it is taken, in use, or has changed meanwhile
+    |   `-- LimitError (3)          it needs more memory, time or disk than it may have
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
     `-- ToolError (3)               a program or library that we call failed, in its own words
@@ -119,6 +120,12 @@ class ConflictError(InputError):
     def __init__(self, problem: str, *, current: int | None = None) -> None:
         self.current = current
         super().__init__(problem)
+
+
+class LimitError(InputError):
+    """What was given needs more memory, time or disk than it may have."""
+
+    exit_code = 3
 
 
 class WorkspaceError(OdscenError):

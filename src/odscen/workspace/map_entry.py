@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import in_file
-from odscen.convert.lane_table.table_json import table_from_json
 from odscen.convert.model.conversion_settings import ConversionSettings
 
 if TYPE_CHECKING:
@@ -107,6 +106,8 @@ class MapEntry:
 
     def lane_table(self) -> LaneTable:
         """The table between OpenDRIVE lanes and SUMO lanes."""
+        from odscen.convert.lane_table.table_json import table_from_json
+
         return table_from_json(self.path("lane_table").read_bytes())
 
     def drawing(self) -> MapDrawing:
