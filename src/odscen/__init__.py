@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from odscen.base.errors import (
         ConflictError,
         InputError,
+        LimitError,
         NotFoundError,
         OdscenError,
         ScenarioError,
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Workspace": "odscen.workspace.store",
-    "MapEntry": "odscen.workspace.store",
+    "MapEntry": "odscen.workspace.map_entry",
     "shipped_maps": "odscen.workspace.shipped",
     "ConversionSettings": "odscen.convert.model.conversion_settings",
     "Scenario": "odscen.scenario.document.scenario_document",
@@ -79,6 +80,7 @@ _HOMES = {
     "ScenarioError": "odscen.base.errors",
     "NotFoundError": "odscen.base.errors",
     "ConflictError": "odscen.base.errors",
+    "LimitError": "odscen.base.errors",
     "WorkspaceError": "odscen.base.errors",
     "ToolError": "odscen.base.errors",
 }
@@ -92,6 +94,7 @@ __all__ = [
     "ConversionSettings",
     "GenerationSettings",
     "InputError",
+    "LimitError",
     "MapEntry",
     "NotFoundError",
     "OdscenError",

@@ -170,7 +170,7 @@ def show_job(job: str, shared: Shared) -> JobInfo:
 
 @router.delete("/jobs/{job}", status_code=202)
 def cancel_job(job: str, shared: Shared) -> JobInfo:
-    """Cancel a job: within a second its state is ``cancelled``, and nothing is left of it."""
+    """Cancel a job: within a second its state is ``cancelled``, and nothing unfinished is left."""
     return shared.jobs.cancel(job)
 
 

@@ -11,14 +11,16 @@ from odscen.base.errors import InputError, LimitError
 MEMORY_VARIABLE = "ODSCEN_BUILD_MEMORY"
 MINUTES_VARIABLE = "ODSCEN_BUILD_MINUTES"
 
-MAP_MEMORY = 512 << 20
-MAP_MEMORY_PER_BYTE = 96
+MAP_MEMORY = 1_200_000_000
+MAP_MEMORY_PER_BYTE = 32
 NODE_MEMORY_PER_BYTE = 32
-"""Bytes of memory for a map, for each byte of it, and for each byte at a spacing of 2 m. A town of
-3.4 MB needs 245 MB of what it may have, 0.99 GB."""
-MAP_SECONDS = 10.0
+MOST_MEMORY = 1_450_000_000
+"""Bytes of memory for a map, for each byte of it, for each byte at a spacing of 2 m, and at most.
+A town of 3.4 MB needs 245 MB; what is known of a map by its size is the least that it needs: a file
+of 10 kB with 200 km of motorway needs 1.2 GB."""
+MAP_SECONDS = 15.0
 MAP_SECONDS_PER_MEGABYTE = 10.0
-"""Computing time for a map, and for each megabyte at 2 m; the same town needs 2.4 s of 44 s."""
+"""Computing time for a map, and for each megabyte at 2 m; the town needs 2.4 s of 49 s."""
 DOCUMENT_MEMORY = 384 << 20
 DOCUMENT_MEMORY_PER_BYTE = 12
 """Bytes of memory for a document, and for each byte of it."""
@@ -71,8 +73,8 @@ class Allowance(NamedTuple):
         """
         problem = {
             "memory": f"{what} needs more than {_gigabytes(self.memory)} GB of memory",
-            "time": f"{what} needs more than {self.seconds:.0f} s of computing time",
-            "wall": f"{what} did not end within {self.wall_seconds:.0f} s",
+            "time": f"{what} needs more than {self.seconds:.3g} s of computing time",
+            "wall": f"{what} did not end within {self.wall_seconds:.3g} s",
             "output": f"{what} makes a file of more than {_gigabytes(self.output)} GB",
         }[limit]
         if not self.raise_it:
@@ -132,7 +134,7 @@ class BuildLimits:
         memory = self.memory or _from_environment(MEMORY_VARIABLE)
         minutes = self.minutes or _from_environment(MINUTES_VARIABLE)
         return Allowance(
-            int(memory * 1e9 if memory else MAP_MEMORY + per_byte * size),
+            int(memory * 1e9 if memory else min(MOST_MEMORY, MAP_MEMORY + per_byte * size)),
             minutes * 60.0
             if minutes
             else MAP_SECONDS + MAP_SECONDS_PER_MEGABYTE * dense * size / 1e6,
@@ -147,7 +149,7 @@ BY_SIZE = BuildLimits()
 def for_document(size: int) -> Allowance:
     """What reading a document of so many bytes may use."""
     return Allowance(
-        DOCUMENT_MEMORY + DOCUMENT_MEMORY_PER_BYTE * size,
+        min(MOST_MEMORY, DOCUMENT_MEMORY + DOCUMENT_MEMORY_PER_BYTE * size),
         DOCUMENT_SECONDS + DOCUMENT_SECONDS_PER_MEGABYTE * size / 1e6,
     )
 

@@ -34,6 +34,9 @@ _MOST_KEPT = 256 << 20
 """Bytes that a child may have needed at most if it is to wait for more work."""
 _WORDS_KEPT = 2000
 
+_OUT_OF_MEMORY = ("bad_alloc", "MemoryError", "memory allocation of")
+"""What C++, Python and Rust say when they end for want of memory."""
+
 _ROOT = str(Path(__file__).parents[2])
 # Neither the folder of the caller nor that of a script may hide modules of Python's.
 _START = (
@@ -259,7 +262,7 @@ def _raise_for_death(code: int, words: str, what: str, allowance: Allowance) -> 
             reason += ", perhaps by the system for want of memory"
     else:
         reason = f"ended with exit code {code}"
-    if "bad_alloc" in words or "MemoryError" in words:
+    if any(sign in words for sign in _OUT_OF_MEMORY):
         raise allowance.passed(what, "memory")
     msg = f"{what} failed: its process {reason}"
     raise ToolError(msg, output=words)

@@ -1,4 +1,6 @@
-"""The process that works on one thing at a time within limits, for :mod:`child_process`.
+"""The process that works on one thing at a time, within limits.
+
+It is started by :mod:`odscen.workspace.child_process`.
 
 A line of JSON on stdin is a job: its name, its limits, and what it is about. What comes of it goes
 to stdout: lines with its progress, and a last one with its result or the reason why there is none.
@@ -158,10 +160,13 @@ def _set_soft(which: int, wish: int) -> None:
 
 def _peak() -> int:
     """Bytes of memory that this process has had at most."""
+    with suppress(OSError, ValueError, IndexError):
+        # What the system says of usage has on Linux what the parent had when it started this.
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        return int(status.split("VmHWM:")[1].split()[0]) * 1024
     import resource
 
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # macOS: bytes
 
 
 if __name__ == "__main__":
