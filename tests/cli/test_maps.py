@@ -205,18 +205,6 @@ def test_map_json_is_valid_json_without_nan(workspace):
     json.loads(text, parse_constant=pytest.fail)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
-def test_a_map_beyond_its_memory_ends_with_exit_code_3_and_says_how_to_allow_more(tmp_path):
-    small = SHIPPED / "t_junction_signs.xodr"
-    done = odscen("maps", "add", small, "--build-memory", "0.05", "--json", "--workspace", tmp_path)
-    (row,) = done.json["maps"]
-    assert (done.code, row["error"]["type"]) == (3, "LimitError")
-    assert "building the map needs more than 0.05 GB of memory" in row["error"]["message"]
-    assert "--build-memory 0.10 (GB), or ODSCEN_BUILD_MEMORY=0.10" in row["error"]["message"]
-    assert "Traceback" not in done.err
-    assert [path.name for path in (tmp_path / "maps").iterdir()] == []
-
-
 @pytest.mark.parametrize("option", ["--build-memory", "--build-minutes"])
 def test_a_limit_of_zero_is_refused(tmp_path, option):
     small = SHIPPED / "t_junction_signs.xodr"
