@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from odscen.base.errors import (
         ConflictError,
         InputError,
+        LimitError,
         NotFoundError,
         OdscenError,
         ScenarioError,
@@ -80,6 +81,7 @@ _HOMES = {
     "ScenarioError": "odscen.base.errors",
     "NotFoundError": "odscen.base.errors",
     "ConflictError": "odscen.base.errors",
+    "LimitError": "odscen.base.errors",
     "WorkspaceError": "odscen.base.errors",
     "ToolError": "odscen.base.errors",
 }
@@ -93,6 +95,7 @@ __all__ = [
     "ConversionSettings",
     "GenerationSettings",
     "InputError",
+    "LimitError",
     "MapEntry",
     "NotFoundError",
     "OdscenError",

@@ -203,3 +203,11 @@ def test_a_missing_command_explains_itself():
 def test_map_json_is_valid_json_without_nan(workspace):
     text = (workspace / "maps" / "signal_crossing" / "map.json").read_text(encoding="utf-8")
     json.loads(text, parse_constant=pytest.fail)
+
+
+@pytest.mark.parametrize("option", ["--build-memory", "--build-minutes"])
+def test_a_limit_of_zero_is_refused(tmp_path, option):
+    small = SHIPPED / "t_junction_signs.xodr"
+    done = odscen("maps", "add", small, option, "0", "--workspace", tmp_path)
+    assert done.code == 2
+    assert f"{option} must be above 0" in done.err

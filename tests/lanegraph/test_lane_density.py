@@ -9,7 +9,7 @@ import pytest
 from odscen.base.errors import OpenDriveError
 from odscen.lanegraph.build_graphs import build_map_graph
 from odscen.lanegraph.graphs import MapGraph
-from odscen.lanegraph.lane_density import MOST_TOGETHER
+from odscen.lanegraph.lane_density import MOST_ENDS, MOST_TOGETHER
 from odscen.opendrive.parse import parse
 from tests.opendrive.snippets import LINE, document, lane, road, section
 
@@ -80,3 +80,19 @@ def test_more_nodes_than_memory_can_hold_are_refused_before_they_are_made() -> N
     long = road(length=3e5, plan=LINE.replace('"100"', '"300000"'), lanes=section(lane(-1)))
     with pytest.raises(OpenDriveError, match=r"3e\+06 nodes at a spacing of 0\.1 m; the limit is"):
         built(document(long), spacing=0.1)
+
+
+def test_a_row_of_lane_sections_of_centimetres_is_refused_with_the_place() -> None:
+    sections = "".join(section(lane(-1), s=k / 10) for k in range(1000))
+    with pytest.raises(OpenDriveError) as caught:
+        built(document(road(lanes=sections)))
+    assert re.fullmatch(
+        r"road 1 > laneSection \d+ > lane -1: \d+ ends of lanes or lane sections with a walk "
+        rf"beside or on them lie within 3 m of \(.*\); the limit is {MOST_ENDS}",
+        str(caught.value),
+    )
+
+
+def test_lane_sections_of_half_a_metre_are_taken() -> None:
+    sections = "".join(section(lane(-1), s=k / 2) for k in range(200))
+    assert len(built(document(road(lanes=sections))).lanes.x) == 200

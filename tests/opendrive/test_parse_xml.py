@@ -11,7 +11,7 @@ from odscen.opendrive.parse import parse
 STARVED = """
 import resource
 from pathlib import Path
-from odscen.base.errors import ToolError
+from odscen.base.errors import LimitError
 from odscen.opendrive.parse import parse
 
 data = b"<OpenDRIVE>" + b"<road a='b'><x/></road>" * 500_000 + b"</OpenDRIVE>"
@@ -19,7 +19,7 @@ used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesi
 resource.setrlimit(resource.RLIMIT_AS, (used + 20 * 2**20,) * 2)
 try:
     parse(data)
-except ToolError as error:
+except LimitError as error:
     print(error.exit_code, error)
 """
 

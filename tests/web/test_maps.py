@@ -12,7 +12,8 @@ from starlette.testclient import TestClient
 from odscen.lanegraph.query import node_ids
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
-from tests.web.conftest import CROSSING, SHIPPED, job
+from tests.opendrive.snippets import document, lane, road, section
+from tests.web.conftest import CROSSING, SHIPPED, job, wait_for
 
 _ENTITIES = "".join(f'<!ENTITY b{i} "{f"&b{i - 1};" * 10}">' for i in range(1, 10))
 BOMB = f'<!DOCTYPE a [<!ENTITY b0 "boom">{_ENTITIES}]><OpenDRIVE>&b9;</OpenDRIVE>'
@@ -173,3 +174,47 @@ def test_a_map_can_be_added_with_a_network_by_netconvert(
     assert rows[CROSSING] == {"converter": "odscen", "source": None}
     assert upload(client, content, "m.xodr", converter="file").status_code == 422
     workspace.remove_map("by_netconvert")
+
+
+def motorway() -> bytes:
+    """200 km of motorway in 10 kB, which take several seconds."""
+    lanes = section(*(lane(-k) for k in (1, 2, 3)))
+    line = '<geometry s="0" x="{}" y="0" hdg="0" length="10000"><line/></geometry>'
+    roads = (
+        road(str(k), length=10_000, plan=line.format(10_000 * k), lanes=lanes) for k in range(20)
+    )
+    return document(*roads).encode()
+
+
+def test_a_map_that_takes_long_does_not_delay_another_and_can_be_cancelled(
+    client: TestClient, workspace: Workspace
+) -> None:
+    slow = upload(client, motorway(), "slow.xodr").json()["job"]
+    again = upload(client, motorway(), "slow.xodr")
+    assert (again.status_code, again.json()["error"]["kind"]) == (409, "ConflictError")
+    assert "map 'slow' is being added" in again.json()["error"]["message"]
+    small = (SHIPPED / "t_junction_signs.xodr").read_bytes()
+    assert job(client, upload(client, small, "small.xodr"))["state"] == "done"
+    assert client.get("/api/health").status_code == 200
+    assert client.get(f"/api/jobs/{slow}").json()["state"] == "running"
+    assert client.delete(f"/api/jobs/{slow}").status_code == 202
+    wait_for(lambda: client.get(f"/api/jobs/{slow}").json()["state"] == "cancelled")
+    assert client.delete(f"/api/jobs/{slow}").status_code == 409
+    assert client.delete("/api/jobs/job-99").status_code == 404
+    assert sorted(path.name for path in (workspace.root / "maps").iterdir()) == [CROSSING, "small"]
+
+
+def test_the_end_of_the_server_ends_what_is_being_added(workspace: Workspace) -> None:
+    with TestClient(create_app(workspace, hosts=None, token=None)) as client:
+        for number in range(4):  # more than are built at once on a machine of two cores
+            assert upload(client, motorway(), f"slow{number}.xodr").status_code == 202
+    assert [path.name for path in (workspace.root / "maps").iterdir()] == [CROSSING]
+
+
+@pytest.mark.parametrize(
+    "content", [b"[" * 100_000, b'{"name": ' + b"9" * 400 + b"}", b"<graphml>" + b"<a>" * 100_000]
+)
+def test_a_scenario_made_to_hurt_is_refused(client: TestClient, content: bytes) -> None:
+    answer = client.post("/api/scenarios/upload", files={"file": ("bad.json", content)})
+    assert (answer.status_code, answer.json()["error"]["kind"]) == (422, "ScenarioError")
+    assert answer.json()["error"]["message"].startswith("bad.json: ")

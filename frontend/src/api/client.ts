@@ -128,6 +128,7 @@ export const api = {
     call("post", "/api/maps", { body: form({ file, converter }) }),
   removeMap: (name: string) => call("delete", "/api/maps/{name}", { path: { name } }),
   job: (job: string) => call("get", "/api/jobs/{job}", { path: { job } }),
+  cancelJob: (job: string) => call("delete", "/api/jobs/{job}", { path: { job } }),
   assets: () => call("get", "/api/assets"),
   scenarios: () => call("get", "/api/scenarios"),
   newScenario: (map: string, name?: string) =>

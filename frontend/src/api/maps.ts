@@ -10,11 +10,15 @@ export const conversionReport = (name: string): Promise<ConversionReport> =>
 /** The maps that come along; the server's job. */
 export const addShipped = () => call("post", "/api/maps/shipped");
 
-/** Waits for the end of a job, telling how far it is; throws the server's reason if it fails. */
-export async function followJob(id: string, onStep: (job: Job) => void): Promise<Job> {
+/**
+ * Waits for the end of a job, telling how far it is; throws the server's reason if it fails, and gives
+ * null if it was cancelled.
+ */
+export async function followJob(id: string, onStep: (job: Job) => void): Promise<Job | null> {
   for (;;) {
     const job = await api.job(id);
     if (job.state === "done") return job;
+    if (job.state === "cancelled") return null;
     if (job.state === "failed") throw new Error(job.error?.message ?? "The map could not be read.");
     onStep(job);
     await new Promise((done) => setTimeout(done, PAUSE));

@@ -14,6 +14,9 @@ interface Work {
   share: number;
   /** Files that wait for their turn. */
   waiting: number;
+  /** Once the server has taken it on, what it is called there. */
+  job?: string;
+  cancelling?: boolean;
 }
 
 interface Refusal {
@@ -47,13 +50,16 @@ export function AddMap({
   ): Promise<Job | null> => {
     setWork({ what, step: "Sending the file", share: 0, waiting: queue.current.length });
     try {
-      return await followJob((await start()).job, (job) => {
-        setWork({
+      const { job: id } = await start();
+      return await followJob(id, (job) => {
+        setWork((old) => ({
           what,
           step: stepWords(job.step ?? "preparing"),
           share: job.share ?? 0,
           waiting: queue.current.length,
-        });
+          job: id,
+          cancelling: old?.job === id && old.cancelling,
+        }));
         onStep(job);
       });
     } catch (error) {
@@ -97,6 +103,13 @@ export function AddMap({
     if (job) tell("The maps are ready.");
     onAdded();
   };
+  /** Cancels the job and drops the files in the queue; the job's state says when that is done. */
+  const cancel = async (id: string): Promise<void> => {
+    queue.current = [];
+    setWork((old) => old && { ...old, waiting: 0, cancelling: true });
+    // Refused only when it has ended meanwhile, which the page learns by itself.
+    await api.cancelJob(id).catch(() => undefined);
+  };
   const onDrop = (event: DragEvent): void => {
     event.preventDefault();
     setOver(false);
@@ -124,7 +137,22 @@ export function AddMap({
             <Text size="sm" c="dimmed">
               {work.step} …
             </Text>
-            <Progress value={Math.max(4, work.share * 100)} animated mt={8} aria-label="Import progress" />
+            <div style={{ display: "flex", gap: 10, alignItems: "center", marginTop: 8 }}>
+              <Progress
+                value={Math.max(4, work.share * 100)}
+                animated
+                aria-label="Import progress"
+                style={{ flex: 1 }}
+              />
+              <Button
+                size="compact-sm"
+                variant="default"
+                disabled={!work.job || work.cancelling}
+                onClick={() => work.job && void cancel(work.job)}
+              >
+                {work.cancelling ? "Cancelling" : "Cancel"}
+              </Button>
+            </div>
           </div>
         ) : (
           <>

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.convert.imported.network_changes import NetworkState, network_changes
+from odscen.workspace.allowances import BY_SIZE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from odscen.convert.imported.network_changes import NetworkChange
+    from odscen.workspace.allowances import BuildLimits
     from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace
 
@@ -27,6 +29,7 @@ def bring_in(
     name: str,
     source: Path,
     *,
+    limits: BuildLimits = BY_SIZE,
     progress: Callable[[str, float], None] | None = None,
 ) -> BroughtIn:
     """Make a SUMO network that was changed elsewhere that of a map.
@@ -37,6 +40,8 @@ def bring_in(
         Of the map.
     source
         The ``.net.xml``.
+    limits
+        What building the map may use.
 
     Raises
     ------
@@ -46,7 +51,7 @@ def bring_in(
         If the file cannot be read, is no network, or none of this map; the map stays as it is.
     """
     before = _state(workspace.map(name))
-    entry = workspace.set_network(name, source, progress=progress)
+    entry = workspace.set_network(name, source, limits=limits, progress=progress)
     return BroughtIn(entry, network_changes(before, _state(entry)))
 
 

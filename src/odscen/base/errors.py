@@ -7,7 +7,8 @@
     |   |-- ScenarioError           a scenario document or its graph form; carries all problems
     |   |-- NotFoundError           a name that is not in the catalogue, with close names
     |   |-- ConflictError           it is taken, in use, or has changed meanwhile
-    |   `-- DamagedError            stored files are not as they were written; names each
+    |   |-- DamagedError            stored files are not as they were written; names each
+    |   `-- LimitError (3)          it needs more memory, time or disk than it may have
     |-- WorkspaceError (2)          a workspace that cannot be read or written
     |   `-- ResourceError (3)       the machine has no more of something; says what to do
     |-- MissingDependencyError (2)  something that is not installed, and how to get it
@@ -162,6 +163,12 @@ class DamagedError(InputError):
         listed = "".join(f"\n  - {one}" for one in files)
         more = f"; {advice}" if advice else ""
         super().__init__(f"{many} not as written{more}{listed}", file=folder)
+
+
+class LimitError(InputError):
+    """What was given needs more memory, time or disk than it may have."""
+
+    exit_code = 3
 
 
 class WorkspaceError(OdscenError):

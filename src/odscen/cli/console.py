@@ -27,6 +27,25 @@ JsonOption = Annotated[
     bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")
 ]
 
+BuildMemoryOption = Annotated[
+    float | None,
+    typer.Option(
+        "--build-memory",
+        help="GB of memory that building a map may use. "
+        "[default: $ODSCEN_BUILD_MEMORY, else by the size of the map]",
+        show_default=False,
+    ),
+]
+BuildMinutesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--build-minutes",
+        help="Minutes of computing time that building a map may use. "
+        "[default: $ODSCEN_BUILD_MINUTES, else by the size of the map]",
+        show_default=False,
+    ),
+]
+
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout; NaN and infinity are refused rather than written."""

@@ -14,6 +14,8 @@ import typer
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.shown import printable
 from odscen.cli.console import (
+    BuildMemoryOption,
+    BuildMinutesOption,
     JsonOption,
     WorkspaceOption,
     error_fields,
@@ -60,20 +62,25 @@ def add(
             help="Who writes the SUMO network. (default: as the map has it, odscen for a new one)"
         ),
     ] = None,
+    memory: BuildMemoryOption = None,
+    minutes: BuildMinutesOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Add maps: build lane graph, SUMO network, statistics and drawing, once.
 
     A map of the same name is replaced if its content differs, and kept as it is otherwise. Files
-    that cannot be used are refused with their reason; the others are added all the same.
+    that cannot be used are refused with their reason; the others are added all the same. One that
+    needs more memory or time than it may have is refused too, with exit code 3.
     """
     from odscen.convert.model.conversion_settings import ConversionSettings
+    from odscen.workspace.allowances import BuildLimits
     from odscen.workspace.store import Workspace
 
     if name is not None and len(files) > 1:
         msg = f"--name takes one file, {len(files)} are given"
         raise InputError(msg)
+    limits = BuildLimits(memory, minutes)
     store = Workspace.open(workspace)
     rows: list[dict[str, Any]] = []
     worst = 0
@@ -86,6 +93,7 @@ def add(
                     settings=ConversionSettings(
                         spacing=spacing, converter=converter.value if converter else None
                     ),
+                    limits=limits,
                     progress=step,
                 )
         except OdscenError as error:

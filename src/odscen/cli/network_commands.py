@@ -10,6 +10,8 @@ import typer
 
 from odscen.base.errors import InputError
 from odscen.cli.console import (
+    BuildMemoryOption,
+    BuildMinutesOption,
     JsonOption,
     WorkspaceOption,
     log,
@@ -36,6 +38,8 @@ def network(
         Path | None,
         typer.Option(help="Write the map's network there.", metavar="FILE.net.xml"),
     ] = None,
+    memory: BuildMemoryOption = None,
+    minutes: BuildMinutesOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -46,6 +50,7 @@ def network(
     """
     from odscen.app.networks import bring_in
     from odscen.base.text_files import write_text
+    from odscen.workspace.allowances import BuildLimits
     from odscen.workspace.store import Workspace
 
     if source is not None and out is not None:
@@ -54,7 +59,8 @@ def network(
     store = Workspace.open(workspace)
     if source is not None:
         with progress(name) as step:
-            done = bring_in(store, name, source, progress=step)
+            limits = BuildLimits(memory, minutes)
+            done = bring_in(store, name, source, limits=limits, progress=step)
         _print_changes(done, as_json=as_json)
         return
     entry = store.map(name)

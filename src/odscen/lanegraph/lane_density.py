@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from odscen.base.errors import OpenDriveError
 from odscen.base.shown import shown_id
@@ -18,6 +19,9 @@ MOST_TOGETHER = 64
 
 CUBE = 1.0
 """Metres."""
+
+MOST_ENDS = 64
+"""Ends of walks that one could be joined with; junctions of towns have 13."""
 
 
 def check_density(table: RoadTable, lane: IntArray, places: FloatArray) -> None:
@@ -56,4 +60,40 @@ def check_density(table: RoadTable, lane: IntArray, places: FloatArray) -> None:
         f"the limit is {MOST_TOGETHER}"
     )
     place = f"road {shown_id(one.road)} > laneSection {one.section} > lane {one.lane}"
+    raise OpenDriveError(problem, element=place)
+
+
+def check_ends(table: RoadTable, rows: IntArray, ends: FloatArray, *, reach: float) -> None:
+    """Refuse a map on which more ends of walks than :data:`MOST_ENDS` are in reach of one.
+
+    Parameters
+    ----------
+    table
+        The roads.
+    rows
+        Shape ``(N,)``: row of the table of each end.
+    ends
+        Shape ``(N, 3)``: x, y, z in metres.
+    reach
+        Metres.
+
+    Raises
+    ------
+    OpenDriveError
+        Naming the lane with the most, and the place.
+    """
+    if len(ends) <= MOST_ENDS:
+        return
+    found = cKDTree(ends).query_ball_point(ends, reach, return_length=True)
+    counts = np.asarray(found, dtype=np.int64)
+    worst = int(np.argmax(counts))
+    if counts[worst] <= MOST_ENDS:
+        return
+    x, y = (float(value) for value in ends[worst, :2])
+    lane = table.lane_keys[int(rows[worst])]
+    problem = (
+        f"{counts[worst]} ends of lanes or lane sections with a walk beside or on them lie within "
+        f"{reach:g} m of ({x:.6g}, {y:.6g}); the limit is {MOST_ENDS}"
+    )
+    place = f"road {shown_id(lane.road)} > laneSection {lane.section} > lane {lane.lane}"
     raise OpenDriveError(problem, element=place)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from odscen.lanegraph.centrelines import CentreLines, node_offsets
 from odscen.lanegraph.graphs import PedestrianGraph, WalkKind
-from odscen.lanegraph.lane_density import check_density
+from odscen.lanegraph.lane_density import check_density, check_ends
 from odscen.lanegraph.lane_nodes import wrapped
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
@@ -131,7 +131,7 @@ def build_pedestrians(
         [
             *_along(walks, nodes),
             *_linked(table, walks, nodes, successors),
-            *_near(nodes, vehicles),
+            *_near(table, walks, nodes, vehicles),
             *_crossings(nodes, crosswalks),
         ]
     )
@@ -264,12 +264,13 @@ def _linked(
     return _joints(nodes, pairs)
 
 
-def _near(nodes: _WalkNodes, vehicles: NodeTable) -> list[_Edge]:
+def _near(table: RoadTable, walks: _Walks, nodes: _WalkNodes, vehicles: NodeTable) -> list[_Edge]:
     """Joints between ends of different walks within reach of each other, not across a lane."""
     ends = nodes.ends.reshape(-1, 3)
     some = np.flatnonzero(np.repeat(np.diff(nodes.first) > 0, 2))  # ends of walks with nodes
     if not len(some):
         return []
+    check_ends(table, walks.rows[some // 2], ends[some], reach=JOINT_DISTANCE)
     pairs = some[cKDTree(ends[some]).query_pairs(JOINT_DISTANCE, output_type="ndarray")]
     pairs = pairs[pairs[:, 0] // 2 != pairs[:, 1] // 2]
     middle = (ends[pairs[:, 0]] + ends[pairs[:, 1]]) / 2

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
 
-from odscen.base.errors import OpenDriveError, ToolError
+from odscen.base.errors import LimitError, OpenDriveError
 from odscen.base.shown import shown, shown_id
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     ------
     OpenDriveError
         For anything that is not well-formed XML of a sensible size.
-    ToolError
+    LimitError
         If there is not enough memory.
     """
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
@@ -100,8 +100,10 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     return root
 
 
-def _out_of_memory(size: int) -> ToolError:
-    return ToolError(f"there is not enough memory to read XML of {size} bytes; free some and retry")
+def _out_of_memory(size: int) -> LimitError:
+    return LimitError(
+        f"there is not enough memory to read XML of {size} bytes; free some and retry"
+    )
 
 
 def _drop_namespaces(root: Element) -> None:

@@ -31,6 +31,7 @@ from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
 from odscen.web.wire.live_messages import LiveMessage
+from odscen.workspace.child_process import keep_ready
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Collection
@@ -82,6 +83,7 @@ def create_app(
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        keep_ready()
         yield
         shared.close()
 

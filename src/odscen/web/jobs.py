@@ -1,13 +1,14 @@
-"""Work in the background that a page asks after."""
+"""Work in the background that a page asks after, and can cancel."""
 
 from __future__ import annotations
 
 import itertools
+import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import NotFoundError, OdscenError
+from odscen.base.errors import ConflictError, NotFoundError, OdscenError
 from odscen.web.error_answers import error_info
 from odscen.web.messages import ErrorInfo, JobInfo
 
@@ -18,22 +19,52 @@ if TYPE_CHECKING:
 
 _KEPT = 200
 """Finished jobs that are remembered."""
+_LIVE = ("queued", "running")
+
+
+class _CancelledJob(Exception):  # noqa: N818 - no error, and never seen outside
+    pass
 
 
 class Jobs:
-    """One job at a time, in the order in which they came."""
+    """Several jobs at a time, as many as the machine has cores, and two at least.
+
+    What costs time and memory is done in processes of its own; the threads here wait for them.
+    """
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="job")
+        workers = max(2, os.cpu_count() or 1)
+        self._pool = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
         self._jobs: dict[str, JobInfo] = {}
+        self._subjects: dict[str, str] = {}
+        self._cancelled: set[str] = set()
 
-    def start(self, work: Callable[[ProgressCallback], str]) -> str:
-        """Take on work that tells its progress and returns the name of what it made."""
-        name = f"job-{next(self._numbers)}"
-        self._set(JobInfo(id=name, state="queued", step="waiting", share=0.0))
-        self._pool.submit(self._run, name, work)
+    def start(self, work: Callable[[ProgressCallback], str], *, subject: str) -> str:
+        """Take on work that tells its progress and returns the name of what it made.
+
+        Parameters
+        ----------
+        work
+            Has to tell its progress first of all, and now and then: that is where it is cancelled.
+        subject
+            What it changes, in words: one job at a time does.
+
+        Raises
+        ------
+        ConflictError
+            If another job about the same is not done.
+        """
+        with self._lock:
+            other = self._subjects.get(subject)
+            if other is not None:
+                msg = f"{subject} is being added (job {other}); wait for its end, or cancel it"
+                raise ConflictError(msg)
+            name = f"job-{next(self._numbers)}"
+            self._subjects[subject] = name
+            self._jobs[name] = JobInfo(id=name, state="queued", step="waiting", share=0.0)
+        self._pool.submit(self._run, name, work, subject)
         return name
 
     def info(self, name: str) -> JobInfo:
@@ -45,38 +76,68 @@ class Jobs:
             If there is no such job, or it was long ago.
         """
         with self._lock:
-            if name not in self._jobs:
-                what = "job"
-                raise NotFoundError(what, name, [])
-            return self._jobs[name]
+            return self._known(name)
+
+    def cancel(self, name: str) -> JobInfo:
+        """Cancel a job; it is over within a second.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such job, or it was long ago.
+        ConflictError
+            If it is over.
+        """
+        with self._lock:
+            job = self._known(name)
+            if job.state not in _LIVE:
+                msg = f"{name} is {job.state}; it cannot be cancelled any more"
+                raise ConflictError(msg)
+            self._cancelled.add(name)
+            return job
 
     def close(self) -> None:
-        """Drop what has not begun."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        """Cancel all that is not done, and wait until nothing is left of it."""
+        with self._lock:
+            self._cancelled |= {name for name, job in self._jobs.items() if job.state in _LIVE}
+        self._pool.shutdown(wait=True)
 
-    def _run(self, name: str, work: Callable[[ProgressCallback], str]) -> None:
+    def _known(self, name: str) -> JobInfo:
+        if name not in self._jobs:
+            what = "job"
+            raise NotFoundError(what, name, [])
+        return self._jobs[name]
+
+    def _run(self, name: str, work: Callable[[ProgressCallback], str], subject: str) -> None:
         def progress(step: str, share: float) -> None:
+            with self._lock:
+                if name in self._cancelled:
+                    raise _CancelledJob
             self._set(JobInfo(id=name, state="running", step=step, share=min(1.0, share)))
 
-        progress("starting", 0.0)
+        ended = JobInfo(id=name, state="failed", step="failed", share=0.0)
         try:
             result = work(progress)
+            ended = JobInfo(id=name, state="done", step="done", share=1.0, result=result)
+        except _CancelledJob:
+            ended = ended.model_copy(update={"state": "cancelled", "step": "cancelled"})
         except OdscenError as error:
-            self._fail(name, error_info(error))
+            ended = ended.model_copy(update={"error": error_info(error)})
         except Exception as error:
-            self._fail(name, ErrorInfo(kind=type(error).__name__, message=str(error)))
+            info = ErrorInfo(kind=type(error).__name__, message=str(error))
+            ended = ended.model_copy(update={"error": info})
             raise
-        else:
-            self._set(JobInfo(id=name, state="done", step="done", share=1.0, result=result))
-
-    def _fail(self, name: str, error: ErrorInfo) -> None:
-        share = self.info(name).share
-        self._set(JobInfo(id=name, state="failed", step="failed", share=share, error=error))
+        finally:
+            with self._lock:
+                del self._subjects[subject]
+                self._cancelled.discard(name)
+            share = ended.share or self.info(name).share
+            self._set(ended.model_copy(update={"share": share}))
 
     def _set(self, info: JobInfo) -> None:
         with self._lock:
             self._jobs[info.id] = info
             if len(self._jobs) > _KEPT:
-                ended = [key for key, one in self._jobs.items() if one.state in ("done", "failed")]
+                ended = [key for key, one in self._jobs.items() if one.state not in _LIVE]
                 for key in ended[: len(self._jobs) - _KEPT]:
                     del self._jobs[key]

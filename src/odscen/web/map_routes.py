@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import IO, TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
@@ -123,26 +123,29 @@ def add_map(
     """Add a map; it is built in the background, with a network by the converter of that name."""
     given = Path(file.filename or "map.xodr")
     name = name_from_file(given) if name is None else check_name(name)
-    folder = Path(tempfile.mkdtemp(prefix="odscen-upload-"))
-    source = folder / f"{name_from_file(given)}.xodr"
+    # Without a name on disk: nothing is left of it, however the server ends.
+    kept = tempfile.TemporaryFile()  # noqa: SIM115 - closed by the work
     try:
-        with source.open("wb") as target:
-            shutil.copyfileobj(file.file, target)
-        _refuse_other(shared, name, source)
+        shutil.copyfileobj(file.file, kept)
+        _refuse_other(shared, name, kept)
+
+        def work(progress: ProgressCallback) -> str:
+            with kept:
+                progress("starting", 0.0)
+                kept.seek(0)
+                settings = ConversionSettings(converter=converter)
+                return shared.workspace.add_map_content(
+                    kept.read(),
+                    file=f"{name_from_file(given)}.xodr",
+                    name=name,
+                    settings=settings,
+                    progress=progress,
+                ).name
+
+        return JobStarted(job=shared.jobs.start(work, subject=f"map {name!r}"))
     except BaseException:
-        shutil.rmtree(folder)
+        kept.close()
         raise
-
-    def work(progress: ProgressCallback) -> str:
-        try:
-            settings = ConversionSettings(converter=converter)
-            return shared.workspace.add_map(
-                source, name=name, settings=settings, progress=progress
-            ).name
-        finally:
-            shutil.rmtree(folder)
-
-    return JobStarted(job=shared.jobs.start(work))
 
 
 @router.post("/maps/shipped", status_code=202)
@@ -150,6 +153,7 @@ def add_shipped_maps(shared: Shared) -> JobStarted:
     """Add the maps that ship with odscen."""
 
     def work(progress: ProgressCallback) -> str:
+        progress("starting", 0.0)
         paths = shipped_maps()
         for number, path in enumerate(paths):
 
@@ -159,7 +163,7 @@ def add_shipped_maps(shared: Shared) -> JobStarted:
             shared.workspace.add_map(path, progress=step)
         return ", ".join(path.stem for path in paths)
 
-    return JobStarted(job=shared.jobs.start(work))
+    return JobStarted(job=shared.jobs.start(work, subject="the set of example maps"))
 
 
 @router.delete("/maps/{name}", status_code=204)
@@ -172,6 +176,12 @@ def remove_map(name: str, shared: Shared) -> None:
 def show_job(job: str, shared: Shared) -> JobInfo:
     """How far a job is."""
     return shared.jobs.info(job)
+
+
+@router.delete("/jobs/{job}", status_code=202)
+def cancel_job(job: str, shared: Shared) -> JobInfo:
+    """Cancel a job: within a second its state is ``cancelled``, and nothing unfinished is left."""
+    return shared.jobs.cancel(job)
 
 
 @router.get("/assets")
@@ -206,7 +216,7 @@ def assets(shared: Shared) -> AssetsInfo:
     )
 
 
-def _refuse_other(shared: Shared, name: str, source: Path) -> None:
+def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
     """Refuse to put another map in the place of one that scenarios may be made on."""
     import hashlib
 
@@ -216,7 +226,8 @@ def _refuse_other(shared: Shared, name: str, source: Path) -> None:
         there = shared.workspace.map(name)
     except DamagedError:
         return  # adding it builds it anew
-    if there.sha256 != hashlib.sha256(source.read_bytes()).hexdigest():
+    content.seek(0)
+    if there.sha256 != hashlib.sha256(content.read()).hexdigest():
         msg = f"there is another map named {name!r}; give this one another name, or remove that one"
         raise ConflictError(msg)
 

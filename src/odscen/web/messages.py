@@ -64,7 +64,7 @@ class JobInfo(Answer):
     """How far a job is; ``share`` from 0 to 1. ``result`` is the name of what was made."""
 
     id: str
-    state: Literal["queued", "running", "done", "failed"]
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
     step: str
     share: float
     error: ErrorInfo | None = None

@@ -19,7 +19,6 @@ from odscen.scenario.document.problems import Problem
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.edits import new_scenario
 from odscen.scenario.edits.roi_edits import eligible_segments, removable_segments
-from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
@@ -41,6 +40,7 @@ from odscen.web.messages import (
 )
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.media_types import Responses
+from odscen.workspace.guarded_build import read_scenario_in_child
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
@@ -85,7 +85,8 @@ def upload(
 ) -> ScenarioState:
     """Add a scenario from a file."""
     given = (file.filename or "scenario").removesuffix(SUFFIX)
-    scenario = read_any(file.file.read(), file=file.filename)
+    with shared.reading():
+        scenario = read_scenario_in_child(file.file.read(), file=file.filename)
     from pathlib import Path as FilePath
 
     stem = name_from_file(FilePath(given))

@@ -45,7 +45,6 @@ FILES = {
 
 
 def build_map(
-    content: bytes,
     folder: Path,
     *,
     name: str,
@@ -60,10 +59,8 @@ def build_map(
 
     Parameters
     ----------
-    content
-        The .xodr; ``file`` is its name for messages and ``sha256`` its hash.
     folder
-        Exists and is empty.
+        Holds nothing but the .xodr; ``file`` is its name for messages and ``sha256`` its hash.
     settings
         How it is converted; with a converter.
     builder
@@ -84,9 +81,9 @@ def build_map(
     """
     start = time.perf_counter()
     progress("reading the map", 0.0)
+    content = (folder / FILES["xodr"]).read_bytes()
     odr = parse(content, file=file)
     table = RoadTable.of(odr)
-    (folder / FILES["xodr"]).write_bytes(content)
     progress("building the lane graph", 0.1)
     graph = build_map_graph(odr, name=name, sha256=sha256, spacing=settings.spacing, table=table)
     (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))

@@ -21,6 +21,7 @@ from odscen.base.folder_locks import locked
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
+from odscen.workspace.allowances import BY_SIZE
 from odscen.workspace.asset_catalogue import assets_in
 from odscen.workspace.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.workspace.map_files import read_map_file
@@ -28,6 +29,7 @@ from odscen.workspace.map_files import read_map_file
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
+    from odscen.workspace.allowances import BuildLimits
     from odscen.workspace.asset_catalogue import Assets
     from odscen.workspace.converters import GivenNetwork
 
@@ -42,7 +44,8 @@ PATIENCE = 600.0
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 ProgressCallback = Callable[[str, float], None]
-"""Called with what is being done and the share done, 0 to 1."""
+"""Called with what is being done and the share done, 0 to 1, again and again while nothing changes
+too. What it raises ends the work, and nothing is left of it."""
 
 
 def check_name(name: str, *, what: str = "map") -> str:
@@ -207,13 +210,14 @@ class Workspace:
         *,
         name: str | None = None,
         settings: ConversionSettings = USUAL,
+        limits: BuildLimits = BY_SIZE,
         progress: ProgressCallback | None = None,
     ) -> MapEntry:
         """Build everything that later steps need from an OpenDRIVE file, once.
 
         A map of the same name is replaced if the file, the settings or the builder differ, and left
         as it is otherwise. A network that was brought in for it stays, unless the file is another
-        one or the settings name a converter.
+        one or the settings name a converter. The work is done in a child process.
 
         Parameters
         ----------
@@ -223,18 +227,42 @@ class Workspace:
             Name in the catalogue; the file's stem if not given.
         settings
             How it is converted.
+        limits
+            What that may use.
 
         Raises
         ------
         InputError
             If the name, the spacing or the file cannot be used; names file, element and value.
+        LimitError
+            If the map needs more memory or time than it may have.
         ToolError
             If netconvert cannot convert the map.
         WorkspaceError
             If the workspace cannot be written.
         """
         name = check_name(name_from_file(source) if name is None else name)
-        content, file = read_map_file(source), printable(source.name)
+        return self.add_map_content(
+            read_map_file(source),
+            file=source.name,
+            name=name,
+            settings=settings,
+            limits=limits,
+            progress=progress,
+        )
+
+    def add_map_content(
+        self,
+        content: bytes,
+        *,
+        file: str,
+        name: str,
+        settings: ConversionSettings = USUAL,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Build a map as :meth:`add_map` does, from the text of a file of that name."""
+        name, file = check_name(name), printable(file)
         final = self.root / "maps" / name
         with _workspace_errors(self.root), self._lock(name):
             built = _whole(final)
@@ -245,10 +273,15 @@ class Workspace:
                 return same
             kept = same is not None and same.converter == settings.converter == "file"
             given = same.given() if same and kept else None
-            return self._built(name, content, file, settings, given, progress)
+            return self._built(name, content, file, settings, given, limits, progress)
 
     def set_network(
-        self, name: str, source: Path, *, progress: ProgressCallback | None = None
+        self,
+        name: str,
+        source: Path,
+        *,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
     ) -> MapEntry:
         """Make a SUMO network from outside that of a map; the lane table is made anew by geometry.
 
@@ -258,6 +291,8 @@ class Workspace:
             Of the map.
         source
             The ``.net.xml``: the map's own after changes in netedit, or any other of this map.
+        limits
+            What building the map may use.
 
         Raises
         ------
@@ -265,6 +300,8 @@ class Workspace:
             If there is no such map.
         InputError
             If the file cannot be read, is no network, or none of this map; the map stays as it is.
+        LimitError
+            If it needs more memory or time than it may have.
         WorkspaceError
             If the workspace cannot be written.
         """
@@ -278,7 +315,7 @@ class Workspace:
         settings = replace(entry.conversion, converter="file")
         content, file = entry.read("xodr"), str(entry.info["source"])
         with _workspace_errors(self.root), self._lock(name):
-            return self._built(name, content, file, settings, given, progress)
+            return self._built(name, content, file, settings, given, limits, progress)
 
     def _lock(self, name: str) -> AbstractContextManager[int]:
         """Hold the lock of a map; another process that builds it is waited for."""
@@ -291,22 +328,23 @@ class Workspace:
         file: str,
         settings: ConversionSettings,
         given: GivenNetwork | None,
+        limits: BuildLimits,
         progress: ProgressCallback | None,
     ) -> MapEntry:
-        from odscen.workspace.map_build import build_map
+        from odscen.workspace.guarded_build import build_in_child
 
         final, sha256 = self.root / "maps" / name, digest(content)
         with in_file(file), new_folder(final) as folder:
-            build_map(
+            build_in_child(
                 content,
                 folder,
                 name=name,
                 file=file,
-                sha256=sha256,
                 settings=settings,
                 builder=BUILDER,
                 given=given,
-                progress=progress or (lambda _what, _share: None),
+                limits=limits,
+                progress=progress,
             )
             write_sums(folder, sums_of(folder, known={XODR_FILE: sha256}))
             info = read_entry(folder).info

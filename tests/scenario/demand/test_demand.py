@@ -8,7 +8,13 @@ from odscen.scenario import edits
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.demand.count_stations import Passing, contradictions, geh
 from odscen.scenario.demand.day_profiles import BUILT_IN, DAY, Curve
-from odscen.scenario.demand.demand_tables import read_counts, read_matrix, read_profile, read_zones
+from odscen.scenario.demand.demand_tables import (
+    MOST_ROWS,
+    read_counts,
+    read_matrix,
+    read_profile,
+    read_zones,
+)
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Background, Counts, Matrix, Scenario
 from tests.graphs import fork
@@ -205,6 +211,18 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
 def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, message) -> None:
     with pytest.raises(InputError, match=message):
         read(text)
+
+
+def test_a_table_has_as_many_lines_as_it_may_have_and_no_more() -> None:
+    assert len(read_profile("share\n" + "1\n" * MOST_ROWS)) == MOST_ROWS
+    with pytest.raises(InputError, match=r"^line 500002: there are more than 500000 lines"):
+        read_profile("share\n" + "1\n" * (MOST_ROWS + 1))
+
+
+def test_a_number_of_400_digits_is_refused_in_a_short_message() -> None:
+    with pytest.raises(InputError, match=r"^line 2: share must be a number from 0 on") as caught:
+        read_profile("share\n" + "9" * 400 + "\n")
+    assert len(str(caught.value)) < 150
 
 
 def test_a_mix_of_a_matrix_may_hold_all_seven_categories() -> None:

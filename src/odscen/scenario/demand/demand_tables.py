@@ -12,6 +12,7 @@ import re
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from odscen.base.errors import InputError
+from odscen.base.shown import shown
 from odscen.scenario.demand.day_profiles import DAY
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 """As identifiers of the document."""
+MOST_ROWS = 500_000
+"""Lines of a table: all of them are in memory at a time."""
 _TIME_OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
 
 MatrixTrip = tuple[str, str, float]
@@ -154,7 +157,7 @@ class _TableLine:
         except ValueError:
             value = -1.0
         if not 0.0 <= value <= 1e7:
-            msg = f"{column} must be a number from 0 on, not {self[column]!r}"
+            msg = f"{column} must be a number from 0 on, not {shown(self[column])}"
             raise InputError(msg, element=self.where)
         return value
 
@@ -194,6 +197,9 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
     for cells in reader:
         if not any(cell.strip() for cell in cells):
             continue
+        if reader.line_num > MOST_ROWS + 1:
+            msg = f"there are more than {MOST_ROWS} lines below the first; make the table smaller"
+            raise InputError(msg, element=f"line {reader.line_num}")
         if len(cells) != len(columns):
             msg = f"{len(cells)} values for {len(columns)} columns"
             raise InputError(msg, element=f"line {reader.line_num}")

@@ -39,7 +39,7 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
         if foreign := _foreign(text):
             raise ScenarioError(foreign, file=file) from error
         problems = validation_problems(error)
-        count = "a problem" if len(problems) == 1 else f"{len(problems)} problems"
+        count = "a problem" if len(problems) == 1 else f"{error.error_count()} problems"
         msg = f"the scenario document has {count}"
         raise ScenarioError(msg, problems=problems, file=file) from error
 

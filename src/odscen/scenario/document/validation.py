@@ -15,13 +15,20 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
+_LISTED = 1000
+"""Problems of one document that are listed."""
 _SHOWN = 60
 """Longest piece of a wrong value that is quoted in a message."""
 
 
 def validation_problems(error: ValidationError) -> tuple[str, ...]:
-    """One line per problem of a pydantic error: the place, what is wrong, and the value."""
-    return tuple(_problem(details) for details in error.errors(include_url=False))
+    """One line per problem of a pydantic error: the place, what is wrong, and the value.
+
+    Of very many the first thousand, and a line with how many more there are.
+    """
+    found = error.errors(include_url=False)
+    listed = tuple(_problem(details) for details in found[:_LISTED])
+    return listed if len(found) <= _LISTED else (*listed, f"and {len(found) - _LISTED} more")
 
 
 def validated(model: type[_Model], fields: Mapping[str, Any]) -> _Model:
