@@ -3,6 +3,7 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_a_map_is_added_in_the_background_and_removed(client: TestClient) -> Non
     assert job(client, same)["state"] == "done"
     other = upload(client, (SHIPPED / f"{CROSSING}.xodr").read_bytes(), name="t_junction")
     assert other.status_code == 409
-    assert client.delete("/api/maps/t_junction").status_code == 204
+    assert client.delete("/api/maps/t_junction").json()["kind"] == "map"
     assert client.delete("/api/maps/t_junction").status_code == 404
 
 
@@ -173,3 +174,19 @@ def test_a_map_can_be_added_with_a_network_by_netconvert(
     assert rows[CROSSING] == {"converter": "odscen", "source": None}
     assert upload(client, content, "m.xodr", converter="file").status_code == 422
     workspace.remove_map("by_netconvert")
+
+
+def test_a_damaged_map_is_listed_as_broken_and_hides_no_other(
+    client: TestClient, workspace: Workspace
+) -> None:
+    shutil.copytree(workspace.root / "maps" / CROSSING, workspace.root / "maps" / "torn")
+    info = workspace.root / "maps" / "torn" / "map.json"
+    whole = info.read_text(encoding="utf-8")
+    for damaged in ("", whole[:300], "[]", "null", "{}", '{"builder": "6", "sha256": []}'):
+        info.write_text(damaged, encoding="utf-8")
+        assert [row["name"] for row in client.get("/api/maps").json()] == [CROSSING]
+        (broken,) = client.get("/api/broken-maps").json()
+        assert broken["name"] == "torn"
+        assert broken["error"]
+    assert client.delete("/api/maps/torn").status_code == 200
+    assert client.get("/api/broken-maps").json() == []

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
+from odscen.app.removal import removed_map
 from odscen.app.reports import write_report
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, in_file
@@ -193,11 +194,12 @@ def carry_out(
     ConflictError
         If a run that has not ended is in the folder.
     """
+    loaded = run.map  # the map may be removed while the run goes on
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         if ended is not None:
             ended(folder)
-        write_report(folder, summary, loaded=run.map)
+        write_report(folder, summary, loaded=loaded)
 
     return run_prepared(
         prepared, run.folder, progress=progress, finish=finish, live=live, simulate=simulate
@@ -390,10 +392,11 @@ def resume(
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        loaded = None
+        entry = None
         with suppress(InputError):  # the map has been removed meanwhile
-            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-        write_report(folder, summary, loaded=loaded)
+            entry = workspace.map_for(summary["map"], summary["map_sha256"])
+        entry = entry or removed_map(workspace, summary["map_sha256"])
+        write_report(folder, summary, loaded=None if entry is None else load_map(entry))
 
     folder = run if run.is_dir() else workspace.runs / run
     return long_runs.resume(
@@ -402,10 +405,16 @@ def resume(
 
 
 def _job(run: CheckedRun, *, report: bool) -> RunJob:
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        write_report(folder, summary, loaded=run.map)
+    kept: list[LoadedMap] = []  # the map may be removed while the run goes on
 
-    return RunJob(run.name, lambda: prepare_run(run), run.folder, finish if report else None)
+    def get_ready() -> PreparedRun:
+        kept.append(run.map)
+        return prepare_run(run)
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        write_report(folder, summary, loaded=kept.pop())
+
+    return RunJob(run.name, get_ready, run.folder, finish if report else None)
 
 
 def _own_name(name: str, taken: set[str]) -> str:

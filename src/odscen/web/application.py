@@ -21,6 +21,7 @@ from odscen.web import (
     demand_routes,
     figure_routes,
     map_routes,
+    removal_routes,
     result_routes,
     run_routes,
     scenario_routes,
@@ -109,6 +110,7 @@ def create_app(
         result_routes,
         figure_routes,
         carla_routes,
+        removal_routes,
     ):
         app.include_router(routes.router)
 

@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.base.categories import DEFAULT_BODY
-from odscen.base.errors import ConflictError
+from odscen.base.errors import ConflictError, NotFoundError, OdscenError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.messages import (
@@ -27,6 +27,7 @@ from odscen.web.messages import (
 from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
 from odscen.web.wire.map_messages import (
+    BrokenMap,
     ConversionInfo,
     DrawingColumns,
     GraphColumns,
@@ -44,6 +45,8 @@ from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from odscen.workspace.store import MapEntry, ProgressCallback
 
 router = APIRouter(prefix="/api")
@@ -54,8 +57,14 @@ _DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 @router.get("/maps")
 def list_maps(shared: Shared) -> list[MapInfo]:
-    """All maps of the catalogue, by name."""
-    return [_map_info(entry) for entry in shared.workspace.maps()]
+    """All maps of the catalogue that can be used, by name."""
+    return [found for found in _catalogue(shared) if isinstance(found, MapInfo)]
+
+
+@router.get("/broken-maps")
+def list_broken_maps(shared: Shared) -> list[BrokenMap]:
+    """Maps whose folders are damaged, by name, and why; they can be removed or added again."""
+    return [found for found in _catalogue(shared) if isinstance(found, BrokenMap)]
 
 
 @router.get("/maps/{name}")
@@ -151,12 +160,6 @@ def add_shipped_maps(shared: Shared) -> JobStarted:
     return JobStarted(job=shared.jobs.start(work))
 
 
-@router.delete("/maps/{name}", status_code=204)
-def remove_map(name: str, shared: Shared) -> None:
-    """Remove a map; scenarios made on it stay."""
-    shared.workspace.remove_map(name)
-
-
 @router.get("/jobs/{job}")
 def show_job(job: str, shared: Shared) -> JobInfo:
     """How far a job is."""
@@ -204,6 +207,19 @@ def _refuse_other(shared: Shared, name: str, source: Path) -> None:
     if shared.workspace.map(name).sha256 != hashlib.sha256(source.read_bytes()).hexdigest():
         msg = f"there is another map named {name!r}; give this one another name, or remove that one"
         raise ConflictError(msg)
+
+
+def _catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMap]:
+    """All maps; one that is damaged does not hide the others."""
+    for name in shared.workspace.map_names():
+        try:
+            yield _map_info(shared.workspace.map(name))
+        except NotFoundError:
+            continue  # removed meanwhile
+        except OdscenError as error:
+            yield BrokenMap(name=name, error=str(error))
+        except (AttributeError, KeyError, TypeError, ValueError):
+            yield BrokenMap(name=name, error="its map.json is damaged; add the map again")
 
 
 def _map_info(entry: MapEntry) -> MapInfo:

@@ -90,12 +90,6 @@ def show(run: str, shared: Shared) -> RunInfo:
     return shared.runs.info(run)
 
 
-@router.delete("/{run}", status_code=204)
-def remove(run: str, shared: Shared) -> None:
-    """Remove a finished run."""
-    shared.runs.remove(run)
-
-
 @router.post("/{run}/control")
 def control(run: str, wish: RunControl, shared: Shared) -> RunInfo:
     """Pause, resume, step, change the speed of, or stop a run."""

@@ -93,7 +93,7 @@ class Guard:
         if self._hosts is not None and name not in self._hosts:
             return f"this server does not answer to the name {name!r}"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and _netloc(origin) != host.lower():
             return f"a page of {origin!r} may not use this server"
         return None
 
@@ -133,6 +133,14 @@ class Guard:
             await send(message)
 
         await self._app(scope, counted, with_headers)
+
+
+def _netloc(origin: str) -> str | None:
+    """Host and port of an origin; ``None`` if it is none."""
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return None
 
 
 async def _refuse(

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.atomic_folders import discard, new_folder
+from odscen.base.atomic_folders import new_folder
 from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
 from odscen.base.shown import printable
 from odscen.convert.lane_table.table_json import table_from_json
@@ -401,20 +401,21 @@ class Workspace:
         return MapEntry(name, final, info)
 
     def remove_map(self, name: str) -> None:
-        """Remove a map; scenarios made on it stay, and say that the map is missing.
+        """Move a map into the wastebasket; scenarios made on it say that the map is missing.
 
         Raises
         ------
         NotFoundError
             If there is no such map.
         WorkspaceError
-            If its folder cannot be removed.
+            If its folder cannot be moved.
         """
+        from odscen.workspace.wastebasket import Wastebasket
+
         names = self.map_names()
         if name not in names:
             raise NotFoundError("map", name, names)
-        with _workspace_errors(self.root):
-            discard(self.root / "maps" / name)
+        Wastebasket(self).put("map", name)
 
 
 def _read_entry(folder: Path) -> MapEntry:

@@ -74,6 +74,13 @@ class MapInfo(Answer):
     preview: str
 
 
+class BrokenMap(Answer):
+    """A map whose folder is damaged, and what is wrong with it."""
+
+    name: str
+    error: str
+
+
 class CrosswalkInfo(Answer):
     """A crosswalk: its outline, and the line along which people walk; metres."""
 
