@@ -27,7 +27,13 @@ if TYPE_CHECKING:
     from fastapi import FastAPI
     from starlette.requests import Request
 
-_NAMES = {404: "NotFound", 405: "MethodNotAllowed", 413: "TooLarge", 400: "BadRequest"}
+_NAMES = {
+    400: "BadRequest",
+    404: "NotFound",
+    405: "MethodNotAllowed",
+    408: "TooSlow",
+    413: "TooLarge",
+}
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 _FAULT = "the server has a fault of its own: {}; what it printed belongs into a report of it"
 
@@ -38,7 +44,8 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         401: "The token is missing.",
         403: "The request comes from a foreign page, or for another host.",
         404: "There is no such thing.",
-        409: "It is taken, in use, or has changed meanwhile.",
+        408: "The rest of the request did not come in time.",
+        409: "It is taken, in use, damaged, or has changed meanwhile.",
         413: "Too large.",
         422: "What was sent cannot be used; the message says why.",
         503: "The workspace cannot be read or written now, or memory is short.",
