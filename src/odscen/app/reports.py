@@ -19,6 +19,7 @@ from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.recorded import read_conflicts, read_light_states, read_trajectories
@@ -139,7 +140,8 @@ def renew_report(
     NotFoundError
         If there is no such run.
     InputError
-        If it has not ended, its map is not in the workspace, or one cannot drive so.
+        If it has not ended, its files are damaged, its map is not in the workspace, or one cannot
+        drive so.
     """
     if isinstance(run, Run):
         run = run.folder
@@ -148,9 +150,11 @@ def renew_report(
         names = [path.name for path in workspace.runs.glob("*")]
         msg = "run"
         raise NotFoundError(msg, str(run), names)
-    summary = read_summary(folder)
-    loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+    with damage_named(folder):
+        summary = read_summary(folder)
+        loaded = load_map(workspace.map_for(str(summary["map"]), str(summary["map_sha256"])))
     graph = loaded.sumo.graph
     segments = path_between(graph, *ends) if ends is not None else corridor
     along = corridor_along(graph, segments) if segments else None
-    return write_report(folder, summary, loaded=loaded, corridor=along, out=out)
+    with damage_named(folder):
+        return write_report(folder, summary, loaded=loaded, corridor=along, out=out)

@@ -15,6 +15,7 @@ from odscen.results.measures.registry import SEGMENT_FIGURES
 from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.report.place_shapes import place_shapes
+from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.layout import FIGURES_FOLDER, SUMMARY_FILE
@@ -190,7 +191,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     Raises
     ------
     InputError
-        If there is no run, one has failed, or two have the same seed.
+        If there is no run, one has failed or is damaged, or two have the same seed.
     """
     if (folder / SUMMARY_FILE).is_file():
         folders = [folder]
@@ -205,12 +206,14 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     networks: list[pl.DataFrame] = []
     maps: set[tuple[str, str]] = set()
     for path in folders:
-        summary = _summary(path)
+        with damage_named(path):
+            summary = _summary(path)
+            measured, figures = measure(path, summary), read_tables(path / FIGURES_FOLDER)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))
-        runs[summary["seed"]] = measure(path, summary)
-        if (figures := read_tables(path / FIGURES_FOLDER)) is not None:
+        runs[summary["seed"]] = measured
+        if figures is not None:
             networks.append(figures.network)
         maps.add((str(summary.get("map")), str(summary.get("map_sha256"))))
         scenarios[str(summary.get("scenario"))] = None

@@ -10,6 +10,7 @@ from starlette.responses import FileResponse, Response
 from odscen.app import demands
 from odscen.app.scenarios import read_scenario
 from odscen.scenario.demand.count_stations import place_points
+from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.layout import SCENARIO_FILE
 from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
@@ -36,7 +37,8 @@ def file(run: str, name: str, shared: Shared) -> Response:
 def fit(run: str, shared: Shared) -> RunFit:
     """How well a finished run meets the counts of its scenario."""
     folder = shared.runs.kept.folder(run)
-    found = demands.fit(shared.workspace, folder)
+    with damage_named(folder):
+        found = demands.fit(shared.workspace, folder)
     scenario = read_scenario(folder / SCENARIO_FILE)
     graph = shared.map_of(scenario).sumo.graph
     points = place_points(graph, [row.place for row in found.rows])
