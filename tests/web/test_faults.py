@@ -32,7 +32,7 @@ def test_a_folder_that_cannot_be_written_is_503_and_never_a_traceback(
     workspace.scenarios.write_text("a file where a folder belongs")
     answer = client.post("/api/scenarios", json={"map": CROSSING, "name": "new"})
     assert answer.status_code == 503
-    assert "File exists" in answer.json()["error"]["message"]
+    assert "Not a directory" in answer.json()["error"]["message"]
     assert "Traceback" not in answer.text
 
 

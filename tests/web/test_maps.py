@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.app.removal import remove
 from odscen.lanegraph.query import node_ids
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
@@ -173,7 +174,7 @@ def test_a_map_can_be_added_with_a_network_by_netconvert(
     assert rows["by_netconvert"] == {"converter": "netconvert", "source": None}
     assert rows[CROSSING] == {"converter": "odscen", "source": None}
     assert upload(client, content, "m.xodr", converter="file").status_code == 422
-    workspace.remove_map("by_netconvert")
+    remove(workspace, "map", "by_netconvert")
 
 
 def test_a_damaged_map_is_listed_as_broken_and_hides_no_other(

@@ -2,7 +2,7 @@ import { Alert, Button, Group, Text } from "@mantine/core";
 
 import type { BrokenMap } from "../api/removal";
 
-/** Maps whose folders are damaged: what is wrong with each, and a way out. */
+/** Maps whose folders are damaged: what is wrong with each, and what can be done. */
 export function BrokenMaps({ list, onRemove }: { list: BrokenMap[]; onRemove: (name: string) => void }) {
   if (list.length === 0) return null;
   const title = list.length === 1 ? "A map is damaged" : `${list.length} maps are damaged`;

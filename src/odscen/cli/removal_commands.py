@@ -153,7 +153,7 @@ def _ask(question: str, *, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        msg = "nobody is here to be asked; --yes says that it is meant"
+        msg = "this is no terminal, so there is no answer; --yes says that it is meant"
         raise InputError(msg)
     if not typer.confirm(question, err=True):
         msg = "nothing was removed"
@@ -163,7 +163,7 @@ def _ask(question: str, *, yes: bool) -> None:
 def _words(facts: RemovalFacts) -> str:
     """What depends on it, in a sentence."""
     if facts.kind == "run":
-        return f"Run {facts.name}" + (" goes on now." if facts.live else " has ended.")
+        return f"Run {facts.name}" + (" is live." if facts.live else " has ended.")
     runs = f"{_count(facts.runs, 'run')}, {facts.live} live"
     if facts.kind == "scenario":
         return f"Scenario {facts.name} has {runs}; they stay."

@@ -37,8 +37,8 @@ def serve(
 ) -> None:
     """Design, run and watch scenarios in the browser, without code.
 
-    The link that is printed has a token, without which nobody comes in. What is on a command line
-    can be seen by everybody on the machine: give a token of your own as $ODSCEN_TOKEN.
+    The link that is printed has a token, which opens the page. What is on a command line can
+    be seen by all users of the machine: give a token of your own as $ODSCEN_TOKEN.
     """
     from odscen.carla.client import Address
     from odscen.web.http_server import serve as run_server

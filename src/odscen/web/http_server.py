@@ -14,15 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.client import Address
 from odscen.web.application import create_app
-from odscen.web.patient_protocol import PatientProtocol
 from odscen.web.security import LOOPBACK, check_token
 from odscen.workspace.wastebasket import Wastebasket
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Callable, Iterator
 
     from starlette.types import ASGIApp
@@ -34,6 +35,54 @@ MOST_CONNECTIONS = 2000
 """Connections and requests at a time; more are answered with 503."""
 _MESSAGE = 2**16
 """Bytes of a WebSocket message from a client, at most; theirs are a word."""
+
+
+HEAD_TIME = 20.0
+"""Wall seconds in which the head of a request has to be complete."""
+
+
+class PatientProtocol(H11Protocol):
+    """One connection, closed when the head of its next request does not come in time.
+
+    uvicorn waits for it for ever; connections that send a byte now and then would use up all that
+    the server can have.
+    """
+
+    _timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait."""
+        super().connection_made(transport)
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what has come, and wait for the rest of a head, if it is one."""
+        super().data_received(data)
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait no longer."""
+        self._forget()
+        super().connection_lost(exc)
+
+    def _watch(self) -> None:
+        asked = self.cycle is not None and not self.cycle.response_complete
+        if asked:
+            self._forget()
+        elif self._timer is None:
+            self._timer = self.loop.call_later(HEAD_TIME, self._hang_up)
+
+    def _forget(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _hang_up(self) -> None:
+        self._timer = None
+        idle = self.cycle is None or self.cycle.response_complete
+        # A connection that has become a WebSocket belongs to another protocol.
+        if idle and self.transport.get_protocol() is self and not self.transport.is_closing():
+            self.transport.close()
 
 
 def serve(

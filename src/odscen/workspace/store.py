@@ -400,23 +400,6 @@ class Workspace:
             info = _read_entry(folder).info
         return MapEntry(name, final, info)
 
-    def remove_map(self, name: str) -> None:
-        """Move a map into the wastebasket; scenarios made on it say that the map is missing.
-
-        Raises
-        ------
-        NotFoundError
-            If there is no such map.
-        WorkspaceError
-            If its folder cannot be moved.
-        """
-        from odscen.workspace.wastebasket import Wastebasket
-
-        names = self.map_names()
-        if name not in names:
-            raise NotFoundError("map", name, names)
-        Wastebasket(self).put("map", name)
-
 
 def _read_entry(folder: Path) -> MapEntry:
     try:
