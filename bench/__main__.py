@@ -15,6 +15,7 @@ ALL = (
     "recording",
     "long_run",
     "live_view",
+    "server_load",
     "carla_mirror",
     "canvas",
     "in_browser",

@@ -37,7 +37,7 @@ class Served:
 @contextmanager
 def served(workspace: Path, *options: str) -> Iterator[Served]:
     """``odscen serve`` as a process with more options, on a free port of this machine."""
-    command = [sys.executable, "-m", "odscen", "serve", "--no-browser", "--port", "0"]
+    command = [sys.executable, "-m", "odscen", "serve", "--no-browser", "--no-token", "--port", "0"]
     log = workspace / "serve.log"
     with (
         log.open("w", encoding="utf-8") as told,

@@ -52,7 +52,7 @@ test("a body goes out as JSON, a form as a form, and no body as none", async () 
 
 test("an answer without a body is nothing, and a refusal is thrown in the server's words", async () => {
   asked(204, null);
-  expect(await api.removeMap("m")).toBeUndefined();
+  expect(await api.undo("s", 3)).toBeUndefined();
   asked(409, { error: { kind: "ConflictError", message: "it has changed", problems: [], current: 4 } });
   const error: unknown = await api.undo("s", 3).catch((reason: unknown) => reason);
   expect(error).toBeInstanceOf(ApiError);

@@ -104,14 +104,6 @@ def test_an_unknown_map_is_answered_with_close_names(workspace):
     assert "did you mean signal_crossing" in done.err
 
 
-def test_a_removed_map_is_gone(tmp_path):
-    w = ("--workspace", tmp_path)
-    odscen("maps", "add", SHIPPED / "roundabout.xodr", *w)
-    assert odscen("maps", "remove", "roundabout", "--json", *w).json == {"removed": ["roundabout"]}
-    assert odscen("maps", "list", "--json", *w).json == {"maps": []}
-    assert odscen("maps", "remove", "roundabout", *w).code == 2
-
-
 def test_render_writes_svg_and_png_and_refuses_the_rest(workspace, tmp_path):
     w = ("--workspace", workspace)
     assert odscen("maps", "render", "signal_crossing", "-o", tmp_path / "a.svg", *w).code == 0

@@ -3,12 +3,14 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from odscen.app.removal import remove
 from odscen.lanegraph.query import node_ids
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
@@ -102,7 +104,7 @@ def test_a_map_is_added_in_the_background_and_removed(client: TestClient) -> Non
     assert job(client, same)["state"] == "done"
     other = upload(client, (SHIPPED / f"{CROSSING}.xodr").read_bytes(), name="t_junction")
     assert other.status_code == 409
-    assert client.delete("/api/maps/t_junction").status_code == 204
+    assert client.delete("/api/maps/t_junction").json()["kind"] == "map"
     assert client.delete("/api/maps/t_junction").status_code == 404
 
 
@@ -173,7 +175,7 @@ def test_a_map_can_be_added_with_a_network_by_netconvert(
     assert rows["by_netconvert"] == {"converter": "netconvert", "source": None}
     assert rows[CROSSING] == {"converter": "odscen", "source": None}
     assert upload(client, content, "m.xodr", converter="file").status_code == 422
-    workspace.remove_map("by_netconvert")
+    remove(workspace, "map", "by_netconvert")
 
 
 def motorway() -> bytes:
@@ -218,3 +220,19 @@ def test_a_scenario_made_to_hurt_is_refused(client: TestClient, content: bytes) 
     answer = client.post("/api/scenarios/upload", files={"file": ("bad.json", content)})
     assert (answer.status_code, answer.json()["error"]["kind"]) == (422, "ScenarioError")
     assert answer.json()["error"]["message"].startswith("bad.json: ")
+
+
+def test_a_damaged_map_is_listed_as_broken_and_hides_no_other(
+    client: TestClient, workspace: Workspace
+) -> None:
+    shutil.copytree(workspace.root / "maps" / CROSSING, workspace.root / "maps" / "torn")
+    info = workspace.root / "maps" / "torn" / "map.json"
+    whole = info.read_text(encoding="utf-8")
+    for damaged in ("", whole[:300], "[]", "null", "{}", '{"builder": "6", "sha256": []}'):
+        info.write_text(damaged, encoding="utf-8")
+        assert [row["name"] for row in client.get("/api/maps").json()] == [CROSSING]
+        (broken,) = client.get("/api/broken-maps").json()
+        assert broken["name"] == "torn"
+        assert broken["problem"]
+    assert client.delete("/api/maps/torn").status_code == 200
+    assert client.get("/api/broken-maps").json() == []

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from urllib.parse import quote
 
 import pytest
 from starlette.testclient import TestClient
@@ -51,7 +52,17 @@ def test_a_file_name_never_becomes_a_path(client: TestClient, workspace: Workspa
         assert (workspace.scenarios / f"{saved.json()['name']}.scenario.json").is_file()
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999"])
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "null",
+        "http://127.0.0.1:9999",
+        "http://[",
+        "http://testserver:x]",
+        "",
+    ],
+)
 def test_a_foreign_page_is_refused_also_where_it_opens_a_socket(
     client: TestClient, origin: str
 ) -> None:
@@ -89,6 +100,60 @@ def test_a_token_is_asked_for_and_kept_in_a_cookie_that_scripts_cannot_read(
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
     assert guarded.get("/api/maps").status_code == 200
+
+
+def test_a_browser_is_led_on_from_the_link_to_an_address_without_the_token(
+    guarded: TestClient,
+) -> None:
+    headers = {"Accept": "text/html,*/*;q=0.8"}
+    first = guarded.get("/?token=s3cret&x=1&y=%22%3E%3Cb", headers=headers)
+    assert first.status_code == 200
+    assert 'content="0;url=/?x=1&amp;y=%22%3E%3Cb"' in first.text
+    assert "s3cret" not in first.text
+    assert first.headers["referrer-policy"] == "no-referrer"
+    assert first.headers["cache-control"] == "no-store"
+    assert "httponly" in first.headers["set-cookie"].lower()
+    assert guarded.get("/", headers=headers).status_code == 200
+
+
+def test_a_browser_without_the_token_is_told_what_to_do(guarded: TestClient) -> None:
+    headers = {"Accept": "text/html,*/*;q=0.8"}
+    page = guarded.get("/", headers=headers)
+    assert (page.status_code, page.headers["content-type"][:9]) == (401, "text/html")
+    assert "odscen serve" in page.text
+    assert "not the token" not in page.text
+    assert "not the token" in guarded.get("/?token=<b>wrong", headers=headers).text
+    told = guarded.get("/api/maps").json()["error"]
+    assert told["kind"] == "TokenNeeded"
+    assert "Authorization: Bearer" in told["message"]
+
+
+def test_a_socket_needs_the_token_too(guarded: TestClient) -> None:
+    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect("/api/runs/a-1/live"):
+        pass
+    headers = {"Authorization": "Bearer s3cret"}
+    with (
+        pytest.raises(WebSocketDisconnect) as known,
+        guarded.websocket_connect("/api/runs/a-1/live", headers=headers),
+    ):
+        pass
+    assert "no run of this server" in known.value.reason
+
+
+def test_servers_on_two_ports_keep_their_cookies_apart(workspace: Workspace) -> None:
+    for port, token in ((8001, "one"), (8002, "two")):
+        app = create_app(workspace, token=token, hosts=None)
+        with TestClient(app, base_url=f"http://box:{port}") as client:
+            cookie = client.get(f"/?token={token}", follow_redirects=False).headers["set-cookie"]
+            assert cookie.startswith(f"odscen_token_{port}={token};")
+
+
+@pytest.mark.parametrize("token", ["", "é", "s3cre", "s3crett", "\ud800", "s3cret\0"])
+def test_what_is_nearly_the_token_is_not_enough(guarded: TestClient, token: str) -> None:
+    shown = token.encode("utf-8", "surrogatepass")
+    headers = {"Authorization": b"Bearer " + shown, "Cookie": b"odscen_token_80=" + shown}
+    assert guarded.get("/api/maps", headers=headers).status_code == 401
+    assert guarded.get(f"/api/maps?token={quote(shown)}").status_code == 401
 
 
 def test_a_token_is_not_a_way_to_be_sent_elsewhere(guarded: TestClient) -> None:

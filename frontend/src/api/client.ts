@@ -107,6 +107,8 @@ export async function call<M extends Method, P extends Route<M>>(
   } catch {
     throw unanswered(0, "offline", "The server cannot be reached. Is it still running?");
   }
+  // The server was started anew and has another token: its own page says what to do.
+  if (response.status === 401) location.reload();
   if (!response.ok) throw await refusal(response);
   if (response.status === 204) return undefined as Answer<M, P>;
   return (await response.json()) as Answer<M, P>;
@@ -126,7 +128,6 @@ export const api = {
   graph: (name: string) => call("get", "/api/maps/{name}/graph", { path: { name } }),
   addMap: (file: File, converter: Converter) =>
     call("post", "/api/maps", { body: form({ file, converter }) }),
-  removeMap: (name: string) => call("delete", "/api/maps/{name}", { path: { name } }),
   job: (job: string) => call("get", "/api/jobs/{job}", { path: { job } }),
   cancelJob: (job: string) => call("delete", "/api/jobs/{job}", { path: { job } }),
   assets: () => call("get", "/api/assets"),
@@ -134,7 +135,6 @@ export const api = {
   newScenario: (map: string, name?: string) =>
     call("post", "/api/scenarios", { body: name ? { map, name } : { map } }),
   scenario: (name: string) => call("get", "/api/scenarios/{name}", { path: { name } }),
-  removeScenario: (name: string) => call("delete", "/api/scenarios/{name}", { path: { name } }),
   rename: (name: string, to: string) =>
     call("put", "/api/scenarios/{name}/name", { path: { name }, body: { name: to } }),
   copyScenario: (name: string, to: string) =>

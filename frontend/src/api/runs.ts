@@ -41,7 +41,6 @@ export const runs = {
       path: { run },
       body: speed === undefined ? { action } : { action, speed },
     }),
-  remove: (run: string) => call("delete", "/api/runs/{run}", { path: { run } }),
   events: (run: string) => call("get", "/api/runs/{run}/events", { path: { run } }),
   curves: (run: string) => call("get", "/api/runs/{run}/curves", { path: { run } }),
   content: (run: string) => call("get", "/api/runs/{run}/content", { path: { run } }),

@@ -1,19 +1,23 @@
-import { Alert, Button, Chip, Group, Loader, Modal, Select, Text, TextInput, Title } from "@mantine/core";
+import { Alert, Button, Chip, Group, Loader, Select, Text, TextInput, Title } from "@mantine/core";
 import { useState } from "react";
 
 import { api } from "../api/client";
+import { removal } from "../api/removal";
 import type { MapInfo } from "../api/types";
 import { forgetMaps } from "../map/loaded";
-import { IconSearch } from "../ui/icons";
-import { tell, tellError } from "../ui/notices";
+import { IconSearch, IconTrash } from "../ui/icons";
+import { tellError } from "../ui/notices";
+import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { count } from "../ui/words";
 import { AddMap } from "./AddMap";
+import { BrokenMaps } from "./BrokenMaps";
 import { Conversion } from "./Conversion";
 import { MapCard } from "./MapCard";
 import { arranged, type Order, ORDERS, type Wish, WISHES } from "./order";
 import { Scenarios } from "./Scenarios";
+import { Wastebasket } from "./Wastebasket";
 
 /** The first screen: choose a map, or open a scenario. */
 export function CatalogueView() {
@@ -22,7 +26,9 @@ export function CatalogueView() {
   const [search, setSearch] = useState("");
   const [order, setOrder] = useState<Order>("name");
   const [wishes, setWishes] = useState<Wish[]>([]);
-  const [removing, setRemoving] = useState<{ what: "map" | "scenario"; name: string } | null>(null);
+  const broken = useLoaded(removal.brokenMaps);
+  const [removing, setRemoving] = useState<ToRemove | null>(null);
+  const [basket, setBasket] = useState(false);
   const [reported, setReported] = useState<string | null>(null);
   const [starting, setStarting] = useState<string | null>(null);
 
@@ -36,16 +42,11 @@ export function CatalogueView() {
       },
     );
   };
-  const remove = (): void => {
-    if (!removing) return;
-    const { what, name } = removing;
-    setRemoving(null);
-    (what === "map" ? api.removeMap(name) : api.removeScenario(name)).then(() => {
-      tell(`${name} is removed.`);
-      if (what === "map") forgetMaps();
-      maps.reload();
-      scenarios.reload();
-    }, tellError);
+  const reload = (): void => {
+    forgetMaps();
+    maps.reload();
+    broken.reload();
+    scenarios.reload();
   };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);
@@ -66,6 +67,7 @@ export function CatalogueView() {
           </Button>
         </Alert>
       )}
+      <BrokenMaps list={broken.value ?? []} onRemove={(name) => setRemoving({ kind: "map", name })} />
       {!maps.value && !maps.error && <Loader my="xl" aria-label="Loading the maps" />}
       {all.length > 0 && (
         <>
@@ -131,38 +133,29 @@ export function CatalogueView() {
               starting={starting === map.name}
               onStart={() => start(map)}
               onReport={() => setReported(map.name)}
-              onRemove={() => setRemoving({ what: "map", name: map.name })}
+              onRemove={() => setRemoving({ kind: "map", name: map.name })}
             />
           </li>
         ))}
       </ul>
       {maps.value && (
         <div style={{ marginTop: 22 }}>
-          <AddMap empty={all.length === 0} onAdded={maps.reload} onReport={setReported} />
+          <AddMap empty={all.length === 0} onAdded={reload} onReport={setReported} />
         </div>
       )}
-      <Scenarios list={scenarios.value ?? []} onRemove={(name) => setRemoving({ what: "scenario", name })} />
-      {reported && <Conversion map={reported} onClose={() => setReported(null)} />}
-      <Modal
-        opened={removing !== null}
-        onClose={() => setRemoving(null)}
-        centered
-        title={`Remove ${removing?.name ?? ""}?`}
+      <Scenarios list={scenarios.value ?? []} onRemove={(name) => setRemoving({ kind: "scenario", name })} />
+      <Button
+        mt="xl"
+        variant="subtle"
+        color="gray"
+        leftSection={<IconTrash />}
+        onClick={() => setBasket(true)}
       >
-        <Text size="sm">
-          {removing?.what === "map"
-            ? "The map and all that was built from it are deleted. Scenarios on it stay, but need it to run."
-            : "The scenario is deleted. The results of its runs stay."}
-        </Text>
-        <Group justify="flex-end" mt="lg">
-          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>
-            Keep it
-          </Button>
-          <Button color="red" onClick={remove}>
-            Remove
-          </Button>
-        </Group>
-      </Modal>
+        Wastebasket
+      </Button>
+      {basket && <Wastebasket onClose={() => setBasket(false)} onRestored={reload} />}
+      {reported && <Conversion map={reported} onClose={() => setReported(null)} />}
+      <RemovalDialog what={removing} onClose={() => setRemoving(null)} onChanged={reload} />
     </div>
   );
 }

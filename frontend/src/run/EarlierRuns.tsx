@@ -1,20 +1,9 @@
-import {
-  ActionIcon,
-  Alert,
-  Anchor,
-  Button,
-  Group,
-  Loader,
-  Modal,
-  Table,
-  Text,
-  VisuallyHidden,
-} from "@mantine/core";
+import { ActionIcon, Alert, Anchor, Group, Loader, Table, Text, VisuallyHidden } from "@mantine/core";
 import { useCallback, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
 import { IconTrash } from "../ui/icons";
-import { tell, tellError } from "../ui/notices";
+import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
 import { hasEnded, STATE_WORD, when } from "./figures";
@@ -30,15 +19,7 @@ export function EarlierRuns({
   onRemoved?: (run: string) => void;
 }) {
   const { value, error, reload } = useLoaded(useCallback(() => runs.list(scenario), [scenario]));
-  const [removing, setRemoving] = useState<string | null>(null);
-  const remove = (run: string): void => {
-    setRemoving(null);
-    runs.remove(run).then(() => {
-      tell("The run is removed.");
-      reload();
-      onRemoved?.(run);
-    }, tellError);
-  };
+  const [removing, setRemoving] = useState<ToRemove | null>(null);
   if (error)
     return (
       <Alert color="red" title="The runs cannot be shown">
@@ -98,7 +79,7 @@ export function EarlierRuns({
                       variant="subtle"
                       color="gray"
                       aria-label={`Remove ${one.run}`}
-                      onClick={() => setRemoving(one.run)}
+                      onClick={() => setRemoving({ kind: "run", name: one.run })}
                     >
                       <IconTrash />
                     </ActionIcon>
@@ -109,22 +90,14 @@ export function EarlierRuns({
           ))}
         </Table.Tbody>
       </Table>
-      <Modal opened={removing !== null} onClose={() => setRemoving(null)} centered title="Remove this run?">
-        <Text size="sm">Its figures, its recording and its report are deleted. The scenario stays.</Text>
-        <Group justify="flex-end" mt="lg">
-          <Button variant="default" data-autofocus onClick={() => setRemoving(null)}>
-            Keep it
-          </Button>
-          <Button
-            color="red"
-            onClick={() => {
-              if (removing) remove(removing);
-            }}
-          >
-            Remove
-          </Button>
-        </Group>
-      </Modal>
+      <RemovalDialog
+        what={removing}
+        onClose={() => setRemoving(null)}
+        onChanged={(what, there) => {
+          reload();
+          if (!there) onRemoved?.(what.name);
+        }}
+      />
     </>
   );
 }

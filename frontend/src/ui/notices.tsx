@@ -1,34 +1,43 @@
-import { Alert, CloseButton, Stack } from "@mantine/core";
+import { Alert, Button, CloseButton, Stack } from "@mantine/core";
 import { create } from "zustand";
 
 import { reasonOf } from "./reason";
+
+/** What can be done about a notice. */
+interface Action {
+  label: string;
+  run: () => void;
+}
 
 interface Notice {
   key: number;
   kind: "error" | "info";
   text: string;
+  action: Action | undefined;
 }
 
 interface Notices {
   list: Notice[];
-  add: (kind: Notice["kind"], text: string) => void;
+  add: (kind: Notice["kind"], text: string, action?: Action) => void;
   close: (key: number) => void;
 }
 
 let last = 0;
 const LONGEST = 9000;
+/** Time enough to think again, and to reach the button without a mouse. */
+const LONGEST_ACTION = 20_000;
 
 export const useNotices = create<Notices>((set, get) => ({
   list: [],
-  add: (kind, text) => {
+  add: (kind, text, action) => {
     const key = ++last;
-    set({ list: [...get().list.filter((one) => one.text !== text), { key, kind, text }].slice(-3) });
-    setTimeout(() => get().close(key), LONGEST);
+    set({ list: [...get().list.filter((one) => one.text !== text), { key, kind, text, action }].slice(-3) });
+    setTimeout(() => get().close(key), action ? LONGEST_ACTION : LONGEST);
   },
   close: (key) => set({ list: get().list.filter((one) => one.key !== key) }),
 }));
 
-export const tell = (text: string): void => useNotices.getState().add("info", text);
+export const tell = (text: string, action?: Action): void => useNotices.getState().add("info", text, action);
 export function tellError(error: unknown): void {
   useNotices.getState().add("error", reasonOf(error));
 }
@@ -42,6 +51,19 @@ export function NoticeList() {
         <Alert key={one.key} color={one.kind === "error" ? "red" : "blue"} variant="filled" py="xs" pr="xs">
           <div className="notice">
             <span>{one.text}</span>
+            {one.action && (
+              <Button
+                size="compact-sm"
+                variant="white"
+                style={{ flexShrink: 0 }}
+                onClick={() => {
+                  one.action?.run();
+                  close(one.key);
+                }}
+              >
+                {one.action.label}
+              </Button>
+            )}
             <CloseButton
               size="sm"
               variant="transparent"

@@ -4,8 +4,9 @@ import { expect, test, vi } from "vitest";
 
 import { CatalogueView } from "../../src/catalogue/CatalogueView";
 import { Conversion } from "../../src/catalogue/Conversion";
+import { NoticeList } from "../../src/ui/notices";
 import { mapInfo } from "../example";
-import { choose, server, show } from "../page";
+import { choose, rowsOf, server, show } from "../page";
 
 const names = (): (string | null)[] =>
   within(screen.getByRole("list", { name: "Maps" }))
@@ -33,15 +34,76 @@ test("without maps the example maps are offered", async () => {
   expect(screen.getByText("None yet. Choose a map above, or open a scenario file.")).toBeTruthy();
 });
 
-test("a map is only removed after a question", async () => {
-  const asked = server({ "/scenarios": [], "/maps": [mapInfo("Town", 9)] });
-  const { user } = show(<CatalogueView />);
+const ITEM = { id: "map-1", kind: "map", name: "Town", removed: 1.8e9, until: 1.8e9 + 2_592_000 };
+
+test("a map is only removed after a question with facts, and the notice undoes it", async () => {
+  const asked = server({
+    "/removal": { kind: "map", name: "Town", scenarios: 2, runs: 3, live: 1 },
+    "/maps/Town": ITEM,
+    "/trash/map-1/restore": ITEM,
+    "/scenarios": [],
+    "/broken-maps": [],
+    "/maps": [mapInfo("Town", 9)],
+  });
+  const { user } = show(
+    <>
+      <CatalogueView />
+      <NoticeList />
+    </>,
+  );
+  const sent = (path: string): boolean => asked.some((one) => one.path === path);
   await user.click(await screen.findByRole("button", { name: "Remove Town" }));
+  expect(await screen.findByText(/^2 scenarios and 3 runs, 1 of them live were made/)).toBeTruthy();
+  expect(screen.getByText(/wastebasket for 30 days/)).toBeTruthy();
   await user.click(screen.getByRole("button", { name: "Keep it" }));
-  expect(asked.some(({ path }) => path === "/api/maps/Town")).toBe(false);
+  expect(sent("/api/maps/Town")).toBe(false);
   await user.click(screen.getByRole("button", { name: "Remove Town" }));
+  await screen.findByText(/^2 scenarios/);
   await user.click(screen.getByRole("button", { name: "Remove" }));
-  expect(asked.some(({ path }) => path === "/api/maps/Town")).toBe(true);
+  expect(sent("/api/maps/Town")).toBe(true);
+  expect(await screen.findByText("Town is in the wastebasket.")).toBeTruthy();
+  await user.click(screen.getByRole("button", { name: "Undo" }));
+  expect(sent("/api/trash/map-1/restore")).toBe(true);
+});
+
+test("a damaged map is named with a way out, beside those that can be used", async () => {
+  server({
+    "/scenarios": [],
+    "/broken-maps": [{ name: "Torn", error: "its map.json is damaged" }],
+    "/removal": { kind: "map", name: "Torn", scenarios: 0, runs: 0, live: 0 },
+    "/maps": [mapInfo("Town", 9)],
+  });
+  const { user } = show(<CatalogueView />);
+  const alert = await screen.findByRole("alert");
+  expect(within(alert).getByText("A map is damaged")).toBeTruthy();
+  expect(names()).toEqual(["Town"]);
+  await user.click(within(alert).getByRole("button", { name: "Remove Torn" }));
+  expect(await screen.findByText("Nothing was made on this map.")).toBeTruthy();
+});
+
+test("what is in the wastebasket is restored at once, and deleted only after a second click", async () => {
+  const other = { ...ITEM, id: "run-2", kind: "run", name: "Town-1", size: 2_500_000 };
+  const asked = server({
+    "/trash/": ITEM,
+    "/trash": [{ ...ITEM, size: 4_000_000 }, other],
+    "/scenarios": [],
+    "/broken-maps": [],
+    "/maps": [],
+  });
+  const { user } = show(<CatalogueView />);
+  const sent = (path: string): boolean => asked.some((one) => one.path === path);
+  await user.click(await screen.findByRole("button", { name: "Wastebasket" }));
+  const rows = rowsOf(await screen.findByRole("table", { name: "Wastebasket" }));
+  expect(rows.map((row) => [row[0], row[1], row[4]])).toEqual([
+    ["Town", "Map", "4 MB"],
+    ["Town-1", "Run", "2.5 MB"],
+  ]);
+  await user.click(screen.getByRole("button", { name: "Delete Town-1" }));
+  expect(sent("/api/trash/run-2")).toBe(false);
+  await user.click(screen.getByRole("button", { name: "Delete Town-1 for good" }));
+  expect(sent("/api/trash/run-2")).toBe(true);
+  await user.click(await screen.findByRole("button", { name: "Restore Town" }));
+  expect(sent("/api/trash/map-1/restore")).toBe(true);
 });
 
 test("the import report of a map says how much of it can be driven on", async () => {

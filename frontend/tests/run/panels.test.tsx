@@ -106,6 +106,7 @@ test("what is saved of a long run is said while it runs", () => {
 
 test("earlier runs are listed newest first, and those that were interrupted can be resumed", async () => {
   const asked = server({
+    "/removal": { kind: "run", name: "s-1", scenarios: 0, runs: 0, live: 0 },
     "/runs": [info("completed", { run: "s-1", finished: 1e9 }), info("interrupted", { run: "s-2" })],
   });
   const { user } = show(<EarlierRuns scenario="s" />);
@@ -113,6 +114,7 @@ test("earlier runs are listed newest first, and those that were interrupted can 
   expect(rowsOf(screen.getByRole("table")).map((row) => row[1])).toEqual(["Interrupted", "Finished"]);
   expect(screen.queryByRole("link", { name: "Report of s-2" })).toBeNull();
   await user.click(screen.getByRole("button", { name: "Remove s-1" }));
+  await screen.findByText(/wastebasket for 30 days/);
   await user.click(screen.getByRole("button", { name: "Remove" }));
   expect(asked.filter(({ path }) => path === "/api/runs/s-1")).toHaveLength(1);
 });

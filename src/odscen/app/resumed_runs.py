@@ -6,6 +6,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
+from odscen.app.removal import removed_map
 from odscen.app.reports import write_report
 from odscen.base.errors import InputError
 from odscen.sumo.runner import long_runs
@@ -60,10 +61,11 @@ def resume(
     """
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        loaded = None
+        entry = None
         with suppress(InputError):  # the map has been removed meanwhile
-            loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-        write_report(folder, summary, loaded=loaded)
+            entry = workspace.map_for(summary["map"], summary["map_sha256"])
+        entry = entry or removed_map(workspace, summary["map_sha256"])
+        write_report(folder, summary, loaded=None if entry is None else load_map(entry))
 
     folder = run if run.is_dir() else workspace.runs / run
     return long_runs.resume(

@@ -193,11 +193,12 @@ def carry_out(
     ConflictError
         If a run that has not ended is in the folder.
     """
+    loaded = run.map  # the map may be removed while the run goes on
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         if ended is not None:
             ended(folder)
-        write_report(folder, summary, loaded=run.map)
+        write_report(folder, summary, loaded=loaded)
 
     return run_prepared(
         prepared, run.folder, progress=progress, finish=finish, live=live, simulate=simulate
@@ -357,10 +358,16 @@ def run_many(
 
 
 def _job(run: CheckedRun, *, report: bool) -> RunJob:
-    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
-        write_report(folder, summary, loaded=run.map)
+    kept: list[LoadedMap] = []  # the map may be removed while the run goes on
 
-    return RunJob(run.name, lambda: prepare_run(run), run.folder, finish if report else None)
+    def get_ready() -> PreparedRun:
+        kept.append(run.map)
+        return prepare_run(run)
+
+    def finish(folder: Path, summary: Mapping[str, Any]) -> None:
+        write_report(folder, summary, loaded=kept.pop())
+
+    return RunJob(run.name, get_ready, run.folder, finish if report else None)
 
 
 def _own_name(name: str, taken: set[str]) -> str:

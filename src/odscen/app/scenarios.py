@@ -16,6 +16,7 @@ from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, Generatio
 from odscen.scenario.sampling.sampler import choose_map, sample_scenario
 from odscen.sumo.runner.network_fit import place_fit, route_fit
 from odscen.workspace.store import plain_name
+from odscen.workspace.wastebasket import SCENARIO_SUFFIX
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
 
-SUFFIX = ".scenario.json"
+SUFFIX = SCENARIO_SUFFIX
 """Ending of scenario files."""
 
 

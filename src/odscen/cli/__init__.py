@@ -25,6 +25,7 @@ from odscen.cli.map_commands import app as maps
 from odscen.cli.network_commands import compare_networks, network
 from odscen.cli.pull_command import pull
 from odscen.cli.regression_commands import compare, gate
+from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate
@@ -42,10 +43,12 @@ maps.command()(pull)
 maps.command()(network)
 maps.command("compare")(compare_networks)
 maps.command("diff")(diff_maps)
+maps.command("remove")(remove_map)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.add_typer(demand, name="demand")
 app.add_typer(signals, name="signals")
+app.add_typer(trash, name="trash")
 app.command()(generate)
 app.command()(check)
 app.command()(export)
@@ -57,6 +60,7 @@ app.command()(compare)
 app.command("diff")(diff_scenarios)
 app.command()(cosim)
 app.command()(serve)
+app.command()(remove)
 app.command()(doctor)
 app.command()(demo)
 

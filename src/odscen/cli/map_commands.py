@@ -190,26 +190,6 @@ def show(
 
 
 @app.command()
-def remove(
-    names: Annotated[list[str], typer.Argument(metavar="NAME...")],
-    workspace: WorkspaceOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Remove maps from the catalogue."""
-    from odscen.workspace.store import Workspace
-
-    store = Workspace.open(workspace)
-    for name in names:
-        if name not in store.map_names():
-            store.map(name)
-    for name in names:
-        store.remove_map(name)
-        log(f"Removed {name}")
-    if as_json:
-        print_json({"removed": names})
-
-
-@app.command()
 def render(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     out: Annotated[Path, typer.Option("-o", "--out", help="File ending in .svg or .png.")],

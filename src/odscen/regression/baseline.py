@@ -150,7 +150,10 @@ def read_baseline(file: Path) -> Baseline | None:
     with in_file(str(file)):
         try:
             return _from_data(json.loads(text))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except RecursionError as error:
+            msg = "not a baseline, write it again with --update-baseline: too many brackets"
+            raise InputError(msg) from error
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             msg = f"not a baseline, write it again with --update-baseline: {error!r}"
             raise InputError(msg) from error
 
@@ -165,7 +168,10 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
         if "figure" in row:
             figures[FigureKey("run", "", row["figure"])] = _values(row["values"], seeds)
             continue
-        kind = next(kind for kind in _KINDS if kind in row)
+        kind = next((kind for kind in _KINDS if kind in row), None)
+        if kind is None:
+            msg = f"a row with {', '.join(map(str, row))} is of no run, segment, junction or actor"
+            raise ValueError(msg)
         for name, values in row.items():
             if name != kind:
                 figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)

@@ -210,11 +210,12 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     maps: set[tuple[str, str]] = set()
     for path in folders:
         summary = _summary(path)
+        measured, figures = measure(path, summary), read_tables(path / FIGURES_FOLDER)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))
-        runs[summary["seed"]] = measure(path, summary)
-        if (figures := read_tables(path / FIGURES_FOLDER)) is not None:
+        runs[summary["seed"]] = measured
+        if figures is not None:
             networks.append(figures.network)
         maps.add((str(summary.get("map")), str(summary.get("map_sha256"))))
         scenarios[str(summary.get("scenario"))] = None

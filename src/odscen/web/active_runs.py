@@ -13,16 +13,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from odscen.app.removal import KnownRun, known_runs, remove
 from odscen.app.resumed_runs import resume
 from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import SUFFIX, read_scenario
-from odscen.base.atomic_folders import discard
-from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError, WorkspaceError
+from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError
 from odscen.carla.served_run import ServedJob, run_served
 from odscen.results.records.run_records import Plan
 from odscen.scenario.document.json_form import dumps
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.run_status import going, read_status
+from odscen.sumo.folder.run_status import read_status
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.runner.live_run import Live
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from odscen.sumo.folder.finished_run import Run
     from odscen.web.run_messages import GoOn, NewRun, RunControl
     from odscen.workspace.store import Workspace
+    from odscen.workspace.wastebasket import RemovedItem
 
 MOST = 8
 """Runs that can go on at a time."""
@@ -254,8 +255,14 @@ class Runs:
                 rows.append(self.info(name).model_copy(update={"summary": None}))
         return rows
 
-    def remove(self, run: str) -> None:
-        """Remove a finished or interrupted run."""
+    def remove(self, run: str) -> RemovedItem | None:
+        """Move a finished or interrupted run into the wastebasket.
+
+        Returns
+        -------
+        RemovedItem or None
+            ``None`` if it failed before it had anything to keep.
+        """
         with self._lock:
             active = self._active.get(run)
             if active is not None and active.ended is None:
@@ -263,16 +270,18 @@ class Runs:
                 raise ConflictError(msg)
             self._active.pop(run, None)
         if active is not None and not (self._workspace.runs / run).exists():
-            return  # it failed before it had anything to keep
-        folder = self.kept.folder(run)
-        if going(folder) == "running":
-            msg = f"run {run!r} is running in another process"
-            raise ConflictError(msg)
-        try:
-            discard(folder)
-        except OSError as error:
-            msg = f"run {run!r}: {error.strerror or error}"
-            raise WorkspaceError(msg) from error
+            return None
+        self.kept.folder(run)
+        return remove(self._workspace, "run", run)
+
+    def known(self) -> list[KnownRun]:
+        """All runs, those of this server that go on included."""
+        with self._lock:
+            going = {name: one for name, one in self._active.items() if one.ended is None}
+        kept = [run for run in known_runs(self._workspace) if run.name not in going]
+        maps = {name: one.scenario.map for name, one in going.items()}
+        own = [KnownRun(name, of.name, of.sha256, live=True) for name, of in maps.items()]
+        return [*kept, *own]
 
     def close(self) -> None:
         """Stop everything that is going on; what does not stop in time is ended."""

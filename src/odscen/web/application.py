@@ -10,6 +10,7 @@ from fastapi import FastAPI
 from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaMode
 from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.responses import HTMLResponse, Response
 from starlette.staticfiles import StaticFiles
 
@@ -21,6 +22,7 @@ from odscen.web import (
     demand_routes,
     figure_routes,
     map_routes,
+    removal_routes,
     result_routes,
     run_routes,
     scenario_routes,
@@ -42,6 +44,14 @@ if TYPE_CHECKING:
 
 STATIC = Path(__file__).parent / "static"
 """Where the built front end lies."""
+
+_PACKED = (
+    *DEFAULT_EXCLUDED_CONTENT_TYPES,
+    "application/octet-stream",
+    "application/vnd.apache.parquet",
+    "multipart/x-mixed-replace",
+)
+"""What is not compressed: it is already, or has to go out picture by picture."""
 
 _PLAIN = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>odscen</title></head>
@@ -100,8 +110,8 @@ def create_app(
     add_error_handlers(app)
 
     @app.get("/api/health")
-    def health(shared: Shared) -> Health:
-        """Say that the server is there."""
+    async def health(shared: Shared) -> Health:
+        """Say that the server is there, also while all threads are at work."""
         return Health(version=__version__, workspace=str(shared.workspace.root))
 
     for routes in (
@@ -113,6 +123,7 @@ def create_app(
         result_routes,
         figure_routes,
         carla_routes,
+        removal_routes,
     ):
         app.include_router(routes.router)
 
@@ -125,6 +136,7 @@ def create_app(
         app.mount("/", _BuiltPage(directory=static, html=True))
     else:
         app.get("/", include_in_schema=False)(lambda: HTMLResponse(_PLAIN))
+    app.add_middleware(GZipMiddleware, compresslevel=5, exclude_content_types=_PACKED)
     app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
     return app
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from odscen.app.removal import remove
 from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import (
     ConflictError,
@@ -27,6 +28,7 @@ from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
 from odscen.workspace.store import check_name
+from odscen.workspace.wastebasket import HISTORY, Wastebasket
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
+    from odscen.workspace.wastebasket import RemovedItem
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,7 @@ class Drafts:
     """All scenarios of a workspace; one change at a time."""
 
     def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
         self._folder = workspace.scenarios
         self._lock = threading.RLock()
         self._open: dict[str, Draft] = {}
@@ -139,16 +143,19 @@ class Drafts:
             self._open[new] = replace(draft, name=new)
             return self._open[new]
 
-    def remove(self, name: str) -> None:
-        """Remove a scenario and its history."""
-        with self._lock, _disk_errors():
-            path = self._path(name)
-            if not path.is_file():
+    def remove(self, name: str) -> RemovedItem:
+        """Move a scenario and its history into the wastebasket."""
+        with self._lock:
+            if not self._path(name).is_file():
                 what = "scenario"
                 raise NotFoundError(what, name, [row.name for row in self.rows()])
-            path.unlink()
-            shutil.rmtree(self._history(name), ignore_errors=True)
             self._open.pop(name, None)
+            return remove(self._workspace, "scenario", name)
+
+    def restore(self, item: str) -> RemovedItem:
+        """Put an item of the wastebasket back, between two changes of scenarios."""
+        with self._lock:
+            return Wastebasket(self._workspace).restore(item)
 
     def _opened(self, name: str, text: str, sha256: str) -> Draft:
         scenario = history.document(text, file=f"{name}{SUFFIX}")
@@ -218,7 +225,7 @@ class Drafts:
         return self._folder / f"{check_name(name, what='scenario')}{SUFFIX}"
 
     def _history(self, name: str) -> Path:
-        return self._folder / ".history" / check_name(name, what="scenario")
+        return self._folder / HISTORY / check_name(name, what="scenario")
 
 
 def _is_name(name: str) -> bool:

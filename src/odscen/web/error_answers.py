@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from typing import TYPE_CHECKING, Any
 
 import orjson
@@ -9,7 +10,15 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
-from odscen.base.errors import ConflictError, InputError, NotFoundError, OdscenError, ScenarioError
+from odscen.base.errors import (
+    ConflictError,
+    InputError,
+    NotFoundError,
+    OdscenError,
+    ScenarioError,
+    WorkspaceError,
+)
+from odscen.base.shown import printable
 from odscen.web.messages import ErrorAnswer, ErrorInfo
 
 if TYPE_CHECKING:
@@ -18,7 +27,15 @@ if TYPE_CHECKING:
     from fastapi import FastAPI
     from starlette.requests import Request
 
-_NAMES = {404: "NotFound", 405: "MethodNotAllowed", 413: "TooLarge", 400: "BadRequest"}
+_NAMES = {
+    400: "BadRequest",
+    404: "NotFound",
+    405: "MethodNotAllowed",
+    408: "TooSlow",
+    413: "TooLarge",
+}
+_FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+_FAULT = "the server has a fault of its own: {}; what it printed belongs into a report of it"
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {"model": ErrorAnswer, "description": words}
@@ -27,9 +44,12 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         401: "The token is missing.",
         403: "The request comes from a foreign page, or for another host.",
         404: "There is no such thing.",
-        409: "It is taken, in use, or has changed meanwhile.",
+        408: "The rest of the request did not come in time.",
+        409: "It is taken, in use, damaged, or has changed meanwhile.",
         413: "Too large.",
         422: "What was sent cannot be used; the message says why.",
+        503: "The workspace cannot be read or written now, or memory is short.",
+        507: "The disk is full.",
     }.items()
 }
 """What every route may answer besides what it is asked for."""
@@ -68,10 +88,38 @@ def add_error_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     def plain(_request: Request, error: HTTPException) -> Response:
+        if isinstance(error.__cause__, OSError | MemoryError):  # a body that found no room
+            return _of_machine(error.__cause__)
         kind = _NAMES.get(error.status_code, "HttpError")
         response = error_response(error.status_code, kind, str(error.detail))
         response.headers.update(error.headers or {})
         return response
+
+    @app.exception_handler(OSError)
+    @app.exception_handler(MemoryError)
+    def machine(_request: Request, error: OSError | MemoryError) -> Response:
+        return _of_machine(error)
+
+    @app.exception_handler(Exception)
+    def unknown(_request: Request, error: Exception) -> Response:
+        return error_response(500, "ServerFault", _FAULT.format(type(error).__name__))
+
+
+def _of_machine(error: OSError | MemoryError) -> Response:
+    """Answer with what the disk or the memory refuses, and with what can be done."""
+    if isinstance(error, FileNotFoundError):
+        message = f"{_name(error)} is not there any more; it was removed or is damaged"
+        return error_response(404, "NotFound", message)
+    if isinstance(error, MemoryError):
+        return error_response(503, "OutOfMemory", "memory is short; end a run, then try again")
+    message = f"{error.strerror or error} ({_name(error)})"
+    if error.errno in _FULL:
+        return error_response(507, "DiskFull", f"{message}; make room on the disk, then try again")
+    return error_response(503, "DiskFault", message)
+
+
+def _name(error: OSError) -> str:
+    return printable(str(error.filename or "the server's disk"))
 
 
 def _status(error: OdscenError) -> int:
@@ -79,7 +127,13 @@ def _status(error: OdscenError) -> int:
         return 404
     if isinstance(error, ConflictError):
         return 409
-    return 422 if isinstance(error, InputError) else 500
+    if isinstance(error, InputError):
+        return 422
+    if not isinstance(error, WorkspaceError):
+        return 500
+    if not isinstance(error.__cause__, OSError):  # what is there is damaged, and can be repaired
+        return 409
+    return 507 if error.__cause__.errno in _FULL else 503
 
 
 def _response(status: int, info: ErrorInfo) -> Response:

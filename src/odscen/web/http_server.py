@@ -2,27 +2,87 @@
 
 from __future__ import annotations
 
+import resource
 import secrets
 import socket
+import tempfile
 import threading
 import webbrowser
+from contextlib import ExitStack, contextmanager, suppress
+from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from odscen.base.errors import WorkspaceError
+from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.client import Address
 from odscen.web.application import create_app
-from odscen.web.security import LOOPBACK
+from odscen.web.security import LOOPBACK, check_token
+from odscen.workspace.wastebasket import Wastebasket
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import asyncio
+    from collections.abc import Callable, Iterator
+
+    from starlette.types import ASGIApp
 
     from odscen.workspace.store import Workspace
 
 _ANY = ("0.0.0.0", "::", "")  # noqa: S104 - compared with, not bound to
+MOST_CONNECTIONS = 2000
+"""Connections and requests at a time; more are answered with 503."""
 _MESSAGE = 2**16
 """Bytes of a WebSocket message from a client, at most; theirs are a word."""
+
+
+HEAD_TIME = 20.0
+"""Wall seconds in which the head of a request has to be complete."""
+
+
+class PatientProtocol(H11Protocol):
+    """One connection, closed when the head of its next request does not come in time.
+
+    uvicorn waits for it for ever; connections that send a byte now and then would use up all that
+    the server can have.
+    """
+
+    _timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait."""
+        super().connection_made(transport)
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what has come, and wait for the rest of a head, if it is one."""
+        super().data_received(data)
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait no longer."""
+        self._forget()
+        super().connection_lost(exc)
+
+    def _watch(self) -> None:
+        asked = self.cycle is not None and not self.cycle.response_complete
+        if asked:
+            self._forget()
+        elif self._timer is None:
+            self._timer = self.loop.call_later(HEAD_TIME, self._hang_up)
+
+    def _forget(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _hang_up(self) -> None:
+        self._timer = None
+        idle = self.cycle is None or self.cycle.response_complete
+        # A connection that has become a WebSocket belongs to another protocol.
+        if idle and self.transport.get_protocol() is self and not self.transport.is_closing():
+            self.transport.close()
 
 
 def serve(
@@ -31,6 +91,8 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 8420,
     browser: bool = True,
+    token: str | None = None,
+    open_to_all: bool = False,
     carla: Address = Address(),  # noqa: B008 - immutable
     say: Callable[[str], None] = lambda _line: None,
 ) -> None:
@@ -39,11 +101,15 @@ def serve(
     Parameters
     ----------
     host
-        Address to listen on. Any but a loopback one needs a token, which is made and told.
+        Address to listen on.
     port
         0 for any that is free.
     browser
         Open the page in the user's browser.
+    token
+        What clients have to show, by link, cookie or as bearer; one is made if none is given.
+    open_to_all
+        Ask for no token: whoever can reach the address may use it. Only on this machine.
     carla
         Where the CARLA server is that runs can be shown on, if there is one.
     say
@@ -51,34 +117,77 @@ def serve(
 
     Raises
     ------
+    InputError
+        If the token cannot be one, or another machine could come in without one.
     WorkspaceError
         If the address cannot be listened on.
     """
     local = host in LOOPBACK
-    token = None if local else secrets.token_urlsafe(24)
+    if open_to_all and not local:
+        msg = f"--no-token is for this machine only, and {host} can be reached from others"
+        raise InputError(msg)
+    token = None if open_to_all else check_token(token or secrets.token_urlsafe(24))
     hosts = None if host in _ANY else LOOPBACK | {host.lower()}
     bound = _bind(host, port)
     port = bound.getsockname()[1]
     shown = "127.0.0.1" if host in _ANY else f"[{host}]" if ":" in host else host
     url = f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
     say(f"odscen is at {url}")
-    if token:
-        say("It can be reached from other machines; anyone who has this address may use it.")
+    if not local:
+        say("It can be reached from other machines; anyone who has this link may use it.")
+    elif token:
+        say("Only this link opens it; others on this machine cannot. --no-token does without.")
     say(f"Workspace: {workspace.root}. Ctrl-C ends it.")
+    Wastebasket(workspace).sweep()
+    _allow_many_files()
     app = create_app(workspace, token=token, hosts=hosts, carla=carla)
-    config = uvicorn.Config(
+    with ExitStack() as stack:
+        if browser:
+            page = stack.enter_context(_private_link(url)) if token else url
+            opener = threading.Timer(0.5, webbrowser.open, (page,))
+            opener.daemon = True
+            opener.start()
+        uvicorn.Server(_config(app)).run(sockets=[bound])
+
+
+def _config(app: ASGIApp) -> uvicorn.Config:
+    """How uvicorn serves; it logs no addresses, in which a token might be."""
+    return uvicorn.Config(
         app,
+        http=PatientProtocol,
         log_level="warning",
+        access_log=False,
         ws_max_size=_MESSAGE,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,
+        limit_concurrency=MOST_CONNECTIONS,
         server_header=False,
     )
-    if browser:
-        opener = threading.Timer(0.5, webbrowser.open, (url,))
-        opener.daemon = True
-        opener.start()
-    uvicorn.Server(config).run(sockets=[bound])
+
+
+@contextmanager
+def _private_link(url: str) -> Iterator[str]:
+    """Yield the address of a file that leads to the page, and that only its user can read.
+
+    What a browser is started with is in the list of processes, which everybody on the machine sees.
+    """
+    with tempfile.TemporaryDirectory(prefix="odscen-") as folder:  # mode 0700
+        file = Path(folder) / "open.html"
+        file.write_text(
+            f'<!doctype html><meta http-equiv="refresh" content="0;url={escape(url)}">\n'
+            f'<title>odscen</title><a href="{escape(url)}">Open odscen</a>\n',
+            encoding="utf-8",
+        )
+        yield file.as_uri()
+
+
+def _allow_many_files() -> None:
+    """Let the process have as many connections as it answers at a time, if the system lets it."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = 2 * MOST_CONNECTIONS
+    if soft < wanted:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (min(wanted, hard), hard))
 
 
 def _bind(host: str, port: int) -> socket.socket:

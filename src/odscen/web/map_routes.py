@@ -45,6 +45,8 @@ from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import ProgressCallback
 
@@ -54,17 +56,16 @@ _DRAWING = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 """Content security policy of a drawing that is opened by itself."""
 
 
-@router.get("/broken-maps")
-def list_broken_maps(shared: Shared) -> list[BrokenMapInfo]:
-    """Maps that cannot be used, and why; adding such a map again builds it anew."""
-    _, broken = shared.workspace.catalogue()
-    return [BrokenMapInfo(name=one.name, problem=one.problem) for one in broken]
-
-
 @router.get("/maps")
 def list_maps(shared: Shared) -> list[MapInfo]:
-    """All maps of the catalogue, by name."""
-    return [_map_info(entry) for entry in shared.workspace.maps()]
+    """All maps of the catalogue that can be used, by name."""
+    return [found for found in _catalogue(shared) if isinstance(found, MapInfo)]
+
+
+@router.get("/broken-maps")
+def list_broken_maps(shared: Shared) -> list[BrokenMapInfo]:
+    """Maps whose folders are damaged, by name, and why; they can be removed or added again."""
+    return [found for found in _catalogue(shared) if isinstance(found, BrokenMapInfo)]
 
 
 @router.get("/maps/{name}")
@@ -166,12 +167,6 @@ def add_shipped_maps(shared: Shared) -> JobStarted:
     return JobStarted(job=shared.jobs.start(work, subject="the set of example maps"))
 
 
-@router.delete("/maps/{name}", status_code=204)
-def remove_map(name: str, shared: Shared) -> None:
-    """Remove a map; scenarios made on it stay."""
-    shared.workspace.remove_map(name)
-
-
 @router.get("/jobs/{job}")
 def show_job(job: str, shared: Shared) -> JobInfo:
     """How far a job is."""
@@ -230,6 +225,18 @@ def _refuse_other(shared: Shared, name: str, content: IO[bytes]) -> None:
     if there.sha256 != hashlib.sha256(content.read()).hexdigest():
         msg = f"there is another map named {name!r}; give this one another name, or remove that one"
         raise ConflictError(msg)
+
+
+def _catalogue(shared: Shared) -> Iterator[MapInfo | BrokenMapInfo]:
+    """All maps; one that is damaged does not hide the others."""
+    entries, broken = shared.workspace.catalogue()
+    for entry in entries:
+        try:
+            yield _map_info(entry)
+        except (AttributeError, KeyError, TypeError, ValueError):
+            problem = "its map.json is damaged; add the map again"
+            yield BrokenMapInfo(name=entry.name, problem=problem)
+    yield from (BrokenMapInfo(name=one.name, problem=one.problem) for one in broken)
 
 
 def _map_info(entry: MapEntry) -> MapInfo:

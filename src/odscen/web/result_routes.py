@@ -28,7 +28,8 @@ def files(run: str, shared: Shared) -> list[RunFile]:
 def file(run: str, name: str, shared: Shared) -> Response:
     """Download one of them."""
     path = shared.runs.kept.file(run, name)
-    return FileResponse(path, filename=f"{run}-{PurePosixPath(name).name}")
+    kind = "application/vnd.apache.parquet" if path.suffix == ".parquet" else None
+    return FileResponse(path, filename=f"{run}-{PurePosixPath(name).name}", media_type=kind)
 
 
 @router.get("/fit")

@@ -18,6 +18,7 @@ from odscen.results.records.replay import replay_columns
 from odscen.results.records.run_records import EventKind, Plan, event_row, events_from_json
 from odscen.results.records.traces import ActorCounts, SpeedCurve
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.recorded import read_trajectories
 from odscen.web.live_view import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
@@ -91,12 +92,6 @@ def show(run: str, shared: Shared) -> RunInfo:
     return shared.runs.info(run)
 
 
-@router.delete("/{run}", status_code=204)
-def remove(run: str, shared: Shared) -> None:
-    """Remove a finished run."""
-    shared.runs.remove(run)
-
-
 @router.post("/{run}/control")
 def control(run: str, wish: RunControl, shared: Shared) -> RunInfo:
     """Pause, resume, step, change the speed of, or stop a run."""
@@ -136,12 +131,13 @@ def content(run: str, shared: Shared) -> RunContent:
 def events(run: str, shared: Shared) -> RunEvents:
     """What went wrong on the road in a finished run: the first thousands of incidents."""
     path = _kept(shared, run, layout.EVENTS_FILE)
-    found = [
-        event_row(event)
-        for event in events_from_json(path.read_text(encoding="utf-8"))
-        if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
-    ]
-    rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
+    with damage_named(path.parent):
+        found = [
+            event_row(event)
+            for event in events_from_json(path.read_text(encoding="utf-8"))
+            if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
+        ]
+        rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
     return RunEvents(events=rows, left_off=max(0, len(found) - MOST_EVENTS))
 
 
@@ -149,8 +145,10 @@ def events(run: str, shared: Shared) -> RunEvents:
 def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
     table, plan, _ = _recorded(shared, run)
-    actors = actors_from_json(_kept(shared, run, layout.ACTORS_FILE).read_text(encoding="utf-8"))
-    found = run_curves(plan, actors, table, end=summary(run, shared).sim_seconds or 0.0)
+    path, end = _kept(shared, run, layout.ACTORS_FILE), summary(run, shared).sim_seconds or 0.0
+    with damage_named(path.parent):
+        actors = actors_from_json(path.read_text(encoding="utf-8"))
+        found = run_curves(plan, actors, table, end=end)
     return RunCurves(
         counts=RunCurve(**_lists(found.counts)),
         speeds=RunSpeeds(**_lists(found.speeds)),
@@ -172,7 +170,8 @@ def trajectories(
     table, plan, read = _recorded(shared, run)
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
-    columns = replay_columns(table, plan, every=max(1, every // read))
+    with damage_named(shared.runs.kept.folder(run)):
+        columns = replay_columns(table, plan, every=max(1, every // read))
     names = tuple(ReplayActor.model_fields)
     columns["actors"] = [{name: getattr(one, name) for name in names} for one in plan.actors]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
@@ -189,7 +188,9 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     """
     import polars as pl
 
-    plan = Plan.from_json(_kept(shared, run, layout.PLAN_FILE).read_text(encoding="utf-8"))
+    path = _kept(shared, run, layout.PLAN_FILE)
+    with damage_named(path.parent):
+        plan = Plan.from_json(path.read_text(encoding="utf-8"))
     what = "complete trajectories of run"
     try:
         recorded = read_trajectories(shared.runs.kept.whole(run), most=REPLAY_ROWS)

@@ -100,12 +100,6 @@ def show(name: str, shared: Shared) -> ScenarioState:
     return state_of(shared, shared.drafts.get(name))
 
 
-@router.delete("/{name}", status_code=204)
-def remove(name: str, shared: Shared) -> None:
-    """Remove a scenario and its history; its runs stay."""
-    shared.drafts.remove(name)
-
-
 @router.put("/{name}/name")
 def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
     """Give a scenario's file another name."""

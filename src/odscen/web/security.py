@@ -6,8 +6,10 @@ away, and where a browser sends none (a rebound DNS name), the Host does.
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import re
+import time
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs, urlencode, urlsplit
@@ -16,6 +18,8 @@ from fastapi import HTTPException
 from starlette.datastructures import Headers
 from starlette.responses import RedirectResponse
 
+from odscen.base.errors import InputError
+from odscen.web.entry_pages import enter, token_needed
 from odscen.web.error_answers import error_response
 
 if TYPE_CHECKING:
@@ -29,6 +33,10 @@ MAX_UPLOAD = 64 * 2**20
 """Bytes of a request with a file in it; the largest CARLA town has 3.4 million."""
 MAX_BODY = 4 * 2**20
 """Bytes of any other request."""
+PATIENCE = 30.0
+"""Wall seconds for the next part of a request's body."""
+MAX_UPLOAD_TIME = 900.0
+"""Wall seconds for all of it."""
 
 _HEADERS = (
     (b"x-content-type-options", b"nosniff"),
@@ -37,6 +45,7 @@ _HEADERS = (
     (b"x-frame-options", b"SAMEORIGIN"),
 )
 _PORT = re.compile(r":\d*$")
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{16,256}")
 
 
 class Guard:
@@ -68,24 +77,21 @@ class Guard:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        headers = Headers(scope=scope)
+        headers, send = Headers(scope=scope), _with_headers(scope, send)
         refused = self._foreign(headers)
         if refused is not None:
             await _refuse(403, "ForeignRequest", refused, scope, receive, send)
-            return
-        if self._token is not None and not self._known(headers, scope):
-            message = "this server needs the token that it printed when it was started"
-            await _refuse(401, "TokenNeeded", message, scope, receive, send)
-            return
-        if self._token is not None and (clean := _without_token(scope)) is not None:
-            response = RedirectResponse(clean, 303)
-            response.set_cookie(COOKIE, self._token, httponly=True, samesite="strict", path="/")
+        elif self._token is not None and not self._known(headers, scope):
+            await _ask_for_token(headers, scope, receive, send)
+        elif self._token is not None and (clean := _without_token(scope)) is not None:
+            response = enter(clean) if _is_page(headers) else RedirectResponse(clean, 303)
+            name = _cookie_name(scope)
+            response.set_cookie(name, self._token, httponly=True, samesite="strict", path="/")
             await response(scope, receive, send)
-            return
-        if scope["type"] == "websocket":
+        elif scope["type"] == "websocket":
             await self._app(scope, receive, send)
-            return
-        await self._limited(headers, scope, receive, send)
+        else:
+            await self._limited(headers, scope, receive, send)
 
     def _foreign(self, headers: Headers) -> str | None:
         host = headers.get("host", "")
@@ -93,7 +99,7 @@ class Guard:
         if self._hosts is not None and name not in self._hosts:
             return f"this server does not answer to the name {name!r}"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and _netloc(origin) != host.lower():
             return f"a page of {origin!r} may not use this server"
         return None
 
@@ -101,7 +107,7 @@ class Guard:
         shown = [headers.get("authorization", "").removeprefix("Bearer ")]
         shown += parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
         try:
-            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+            cookie = SimpleCookie(headers.get("cookie", "")).get(_cookie_name(scope))
         except CookieError:
             cookie = None
         if cookie is not None:
@@ -117,22 +123,81 @@ class Guard:
         if length.isdigit() and int(length) > limit:
             await _refuse(413, "TooLarge", words, scope, receive, send)
             return
-        taken = 0
+        taken, end, whole = 0, time.monotonic() + MAX_UPLOAD_TIME, False
 
         async def counted() -> Message:
-            nonlocal taken
-            message = await receive()
+            nonlocal taken, whole
+            if whole:  # what is waited for now is the client's leaving
+                return await receive()
+            left = min(PATIENCE, end - time.monotonic())
+            try:
+                message = await asyncio.wait_for(receive(), left)
+            except TimeoutError as error:
+                raise HTTPException(408, "the rest of the request did not come in time") from error
+            whole = not message.get("more_body", False)
             taken += len(message.get("body", b""))
             if taken > limit:
                 raise HTTPException(413, words)
             return message
 
-        async def with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                message["headers"] = [*message["headers"], *_HEADERS]
-            await send(message)
+        await self._app(scope, counted, send)
 
-        await self._app(scope, counted, with_headers)
+
+def check_token(token: str) -> str:
+    """Return a token of the user's own if it can be one.
+
+    Raises
+    ------
+    InputError
+        If it is short, or has characters that an address or a cookie cannot have as they are.
+    """
+    if not _TOKEN.fullmatch(token):
+        msg = "the token must have 16 to 256 letters, digits, '-' or '_'"
+        raise InputError(msg)
+    return token
+
+
+def _with_headers(scope: Scope, send: Send) -> Send:
+    if scope["type"] == "websocket":
+        return send
+
+    async def headed(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message["headers"] = [*message["headers"], *_HEADERS]
+        await send(message)
+
+    return headed
+
+
+def _cookie_name(scope: Scope) -> str:
+    """Cookies belong to a host, whatever its port: servers beside each other need names."""
+    port = (scope.get("server") or (None, None))[1]
+    return f"{COOKIE}_{port}" if port else COOKIE
+
+
+def _is_page(headers: Headers) -> bool:
+    """Whether a browser asks for something to show."""
+    return "text/html" in headers.get("accept", "")
+
+
+async def _ask_for_token(headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and _is_page(headers):
+        wrong = b"token=" in scope["query_string"]
+        await token_needed(wrong=wrong)(scope, receive, send)
+        return
+    message = (
+        "this server needs the token that it printed when it was started: open that link again, "
+        "or send it as Authorization: Bearer TOKEN"
+    )
+    await _refuse(401, "TokenNeeded", message, scope, receive, send)
+
+
+def _netloc(origin: str) -> str | None:
+    """Host and port of an origin; ``None`` if it is none."""
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return None
 
 
 async def _refuse(

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.base.atomic_folders import clear_leftovers, discard, new_folder
+from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
 from odscen.base.folder_locks import locked
@@ -349,27 +349,6 @@ class Workspace:
             write_sums(folder, sums_of(folder, known={XODR_FILE: sha256}))
             info = read_entry(folder).info
         return MapEntry(name, final, info)
-
-    def remove_map(self, name: str) -> None:
-        """Remove a map; scenarios made on it stay, and say that the map is missing.
-
-        Raises
-        ------
-        NotFoundError
-            If there is no such map.
-        ConflictError
-            If another process is building it.
-        WorkspaceError
-            If its folder cannot be removed.
-        """
-        names = self.map_names()
-        if name not in names:
-            raise NotFoundError("map", name, names)
-        with (
-            _workspace_errors(self.root),
-            locked(self.root / "maps" / name, what=f"map {name!r}"),
-        ):
-            discard(self.root / "maps" / name)
 
 
 def _whole(folder: Path) -> MapEntry | None:

@@ -206,6 +206,7 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
         (read_counts, "place,begin,end,count\nr1,900,0,3\n", "line 2: the slice from 900 to 0"),
         (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: time '13:00'"),
         (read_zones, "zone,segment\nold town,r1\n", "line 2: zone must be .*not 'old town'"),
+        (read_counts, "place,begin,end,count\nr1," + "9" * 200_000, "line 2: this is no table"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, message) -> None:

@@ -114,6 +114,13 @@ def test_speeds_follow_the_limit() -> None:
     assert {actor.speed for actor in scenario.actors} == {round(0.5 * 13.89, 2)}
 
 
+@pytest.mark.parametrize("depart", ["1e18", "1e10"])
+def test_a_drawn_value_that_no_actor_can_have_is_refused_with_its_field(depart: str) -> None:
+    drawn = config(f'[behaviour]\ndepart = {{kind = "constant", value = {depart}}}')
+    with pytest.raises(ScenarioError, match=r"actor: depart: .*equal to"):
+        sample_scenario(two_lane_road(), drawn, seed=1, name="x")
+
+
 def test_nodes_that_the_simulator_cannot_use_are_left_alone() -> None:
     graph = GRAPHS["fork"]
     spawnable = np.ones(len(graph.lanes.x), dtype=bool)

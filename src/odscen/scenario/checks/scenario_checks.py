@@ -9,13 +9,12 @@ from odscen.lanegraph.query import is_connected
 from odscen.scenario.checks.actor_checks import (
     AssetLookup,
     actor_problems,
-    body_of,
     flow_problems,
 )
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.checks.start_overlaps import start_overlaps
 from odscen.scenario.document.problems import Problem, error, warning
-from odscen.scenario.placing.bodies import Crowd, box_at
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.light import Light
-
-SAME_TIME = 1.0
-"""Actors that depart within this many seconds of each other are on the road together."""
 
 
 def check(
@@ -72,7 +68,7 @@ def check(
         clock, until = scenario.demand.clock, scenario.simulation.duration
         found += signal_problems(scenario.signals, lights, clock=clock, until=until)
     found += shared_nodes(scenario)
-    found += _overlaps(scenario, region, assets)
+    found += start_overlaps(scenario, region, assets)
     return tuple(found)
 
 
@@ -187,29 +183,3 @@ def map_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
             f"the scenario's nodes are {made_on.spacing:g} m apart, those of this map "
             f"{graph.lanes.spacing:g} m; add the map with --spacing {made_on.spacing:g}",
         )
-
-
-def _overlaps(scenario: Scenario, region: Region, assets: AssetLookup | None) -> Iterator[Problem]:
-    """Bodies that share ground while both have just departed (R37); oriented boxes in plan view."""
-    bodies = [body_of(actor, assets) for actor in scenario.actors]
-    if not bodies:
-        return
-    crowd = Crowd(2 * max(body.length + body.width for body in bodies))
-    for index, (actor, body) in enumerate(zip(scenario.actors, bodies, strict=True)):
-        place = region.place(actor.spawn)
-        if place is None:
-            continue
-        graph = region.nodes_of(place)
-        box = box_at(graph, place.node, body, lateral_offset=actor.lateral_offset)
-        for other_index in sorted(crowd.touching(box)):
-            other = scenario.actors[other_index]
-            together = abs(actor.depart - other.depart) < SAME_TIME
-            if other.spawn != actor.spawn and together:
-                yield error(
-                    "bodies_overlap",
-                    f"actors[{index}].spawn",
-                    f"{actor.id!r} and {other.id!r} overlap where they start; move one of them or "
-                    "let it depart later",
-                    nodes=[actor.spawn, other.spawn],
-                )
-        crowd.add(index, box)

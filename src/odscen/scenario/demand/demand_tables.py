@@ -16,6 +16,7 @@ from odscen.base.shown import shown
 from odscen.scenario.demand.day_profiles import DAY
 
 if TYPE_CHECKING:
+    import _csv
     from collections.abc import Iterable, Iterator, Sequence
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -179,13 +180,23 @@ class _TableLine:
         return begin, end
 
 
+def _csv_rows(reader: _csv.Reader) -> Iterator[list[str]]:
+    """Cells of each line; what the csv module refuses is an error with its line."""
+    try:
+        yield from reader
+    except csv.Error as error:
+        msg = f"this is no table that can be read: {error}"
+        raise InputError(msg, element=f"line {reader.line_num}") from error
+
+
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
     """Yield the lines of a CSV file; comma, semicolon or tab, as its first line shows."""
     text = text.removeprefix("\ufeff")
     head = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=head.count)
     reader = csv.reader(io.StringIO(text), delimiter=delimiter)
-    columns = [name.strip().lower() for name in next(reader, [])]
+    rows = _csv_rows(reader)
+    columns = [name.strip().lower() for name in next(rows, [])]
     missing = [name for name in needed if name not in columns]
     unknown = [name for name in columns if name not in (*needed, *optional)]
     given = [name for name in optional if name in columns]
@@ -194,7 +205,7 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
         msg = f"the columns are {', '.join(columns) or 'missing'}; needed are {listed}"
         raise InputError(msg, element="line 1")
     found = False
-    for cells in reader:
+    for cells in rows:
         if not any(cell.strip() for cell in cells):
             continue
         if reader.line_num > MOST_ROWS + 1:

@@ -265,7 +265,8 @@ def _sample_actors(
         category = draft.spot.category
         counter[category] += 1
         actors.append(
-            Actor.model_validate(
+            validated(
+                Actor,
                 draft.fields
                 | {
                     "id": f"{category}-{counter[category]}",
@@ -274,7 +275,7 @@ def _sample_actors(
                     "goal": name_of(region.graph, NodePlace(draft.walk, draft.goal)),
                     "lateral_offset": offset,
                     "ego": index == ego,
-                }
+                },
             )
         )
     return tuple(actors)

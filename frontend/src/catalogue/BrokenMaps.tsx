@@ -1,0 +1,32 @@
+import { Alert, Button, Group, Text } from "@mantine/core";
+
+import type { BrokenMap } from "../api/removal";
+
+/** Maps whose folders are damaged: what is wrong with each, and what can be done. */
+export function BrokenMaps({ list, onRemove }: { list: BrokenMap[]; onRemove: (name: string) => void }) {
+  if (list.length === 0) return null;
+  const title = list.length === 1 ? "A map is damaged" : `${list.length} maps are damaged`;
+  return (
+    <Alert color="red" my="md" title={title}>
+      <Text size="sm" mb={8}>
+        Add its file again to repair a map, or remove it. Other maps are not affected.
+      </Text>
+      {list.map(({ name, error }) => (
+        <Group key={name} justify="space-between" wrap="nowrap" mt={6}>
+          <Text size="sm" style={{ overflowWrap: "anywhere" }}>
+            <b>{name}</b>: {error}
+          </Text>
+          <Button
+            size="compact-sm"
+            variant="default"
+            aria-label={`Remove ${name}`}
+            style={{ flexShrink: 0 }}
+            onClick={() => onRemove(name)}
+          >
+            Remove
+          </Button>
+        </Group>
+      ))}
+    </Alert>
+  );
+}
