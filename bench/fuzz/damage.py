@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,7 +100,8 @@ def damaged(data: bytes, rng: Generator, changes: dict[str, Change]) -> Damage:
     for _ in range(int(pick(rng, (1, 1, 1, 2, 3)))):
         kind = pick(rng, sorted(changes))
         kinds.append(kind)
-        data = changes[kind](data, rng)
+        with suppress(ValueError, LookupError, OverflowError, TypeError):  # nothing to damage
+            data = changes[kind](data, rng)
     return Damage(" + ".join(kinds), data)
 
 

@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -25,7 +26,7 @@ from bench.fuzz.limits import Limits
 from bench.fuzz.material import Material, prepare
 from bench.fuzz.request_targets import handmade_trial, schema_trial
 from bench.fuzz.served import Served
-from bench.fuzz.verdicts import Tried, Verdict
+from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
 KEPT = OUT / "fuzz"
@@ -64,7 +65,12 @@ class Bench:
         folder.mkdir()
         trial = Trial(self.material, self.limits, folder, seed, trial_rng(target, seed))
         begin = time.perf_counter()
-        kind = self.targets[target][0](trial)
+        try:
+            kind = self.targets[target][0](trial)
+        except Exception:  # a trial that cannot be made is to be seen, and the others go on
+            kind = "not made"
+            words = traceback.format_exc().strip().splitlines()[-1]
+            trial.findings.append(Finding(Verdict.WRONG, f"the bench itself: {words}"))
         tried = Tried(target, seed, kind, trial.finding, time.perf_counter() - begin, trial.peak)
         self.limits.clean(0.0)
         if tried.finding.verdict.failed:

@@ -227,7 +227,8 @@ def tables(trial: Trial) -> str:
     damage = damaged(material.file(f"{option}.csv").read_bytes(), trial.rng, CSV)
     file = trial.folder / f"{option}.csv"
     file.write_bytes(damage.data)
-    scenario = trial.folder / "x.scenario.json"
+    scenario = trial.folder / "document" / "x.scenario.json"
+    scenario.parent.mkdir()
     shutil.copy(material.file("done.scenario.json"), scenario)
     zones = ["--zones", str(material.file("zones.csv"))] if option != "zones" else []
     used = trial.used("maps")

@@ -39,9 +39,9 @@ class Material:
     def copy_workspace(self, folder: Path, *parts: str) -> Path:
         """Copy parts of the workspace into the folder of a trial."""
         made = folder / "workspace"
-        made.mkdir()
+        (made / "maps").mkdir(parents=True)
         for part in parts:
-            shutil.copytree(self.workspace / part, made / part)
+            shutil.copytree(self.workspace / part, made / part, dirs_exist_ok=True)
         return made
 
 

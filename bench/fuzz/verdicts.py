@@ -15,6 +15,8 @@ REFUSED_CODES = (2, 3)
 _HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069]")
 _RAW = re.compile(r"<string>|\b[A-Z][A-Za-z]*Error\(")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+LONGEST = 20_000
+"""Characters of a message that somebody still reads; a list of many problems is long."""
 _TEMPORARY = (".building-", ".removed-", ".part")
 _HOUSEKEEPING = re.compile(r"(^|/)\.[^/]*lock[^/]*$|\.lock$")
 """Locks stay, empty: a lock that is deleted is not one."""
@@ -79,7 +81,7 @@ def judge(ended: Ended) -> Finding:
         return Finding(Verdict.LEFTOVER, f"{named} (still runs: {ended.orphans[0]})")
     if re.search(r"\w+Warning: ", err):
         return Finding(Verdict.WARNING, named)
-    if _HIDDEN.search(err) or _RAW.search(err):
+    if _HIDDEN.search(err) or _RAW.search(err) or len(err) > LONGEST:
         return Finding(Verdict.UNCLEAR, named)
     if ended.code in REFUSED_CODES:
         # Usage is told by the library of the command line, in a frame.

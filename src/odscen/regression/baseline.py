@@ -13,6 +13,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, in_file
+from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
@@ -150,25 +151,24 @@ def read_baseline(file: Path) -> Baseline | None:
     except (OSError, UnicodeDecodeError) as error:
         msg = f"cannot be read: {error}"
         raise InputError(msg, file=str(file)) from error
+    what = "a baseline"
     with in_file(str(file)):
-        try:
-            return _from_data(json.loads(text))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            msg = f"not a baseline, write it again with --update-baseline: {error!r}"
-            raise InputError(msg) from error
+        data = read_document(text, form=FORMAT, version=VERSION, what=what)
+        with documents(f"{what}, write it again with --update-baseline"):
+            return _from_data(data)
 
 
 def _from_data(data: Mapping[str, Any]) -> Baseline:
-    if (data["format"], data["version"]) != (FORMAT, VERSION):
-        msg = f"format {data['format']!r} version {data['version']!r} is not a baseline"
-        raise InputError(msg)
     seeds = tuple(int(seed) for seed in data["seeds"])
     figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:
         if "figure" in row:
             figures[FigureKey("run", "", row["figure"])] = _values(row["values"], seeds)
             continue
-        kind = next(kind for kind in _KINDS if kind in row)
+        kind = next((kind for kind in _KINDS if kind in row), None)
+        if kind is None:
+            msg = f"row {row!r:.60} is of no figure, {', '.join(_KINDS)}"
+            raise ValueError(msg)
         for name, values in row.items():
             if name != kind:
                 figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import csv
 import io
 import re
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from odscen.base.errors import InputError
+from odscen.base.shown import printable, shown
 from odscen.scenario.demand.day_profiles import DAY
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ class _TableLine:
         if not _NAME.fullmatch(self[column]):
             msg = (
                 f"{column} must be at most 64 letters from a to z, digits, '-', '_' and '.', not "
-                f"{self[column]!r}"
+                f"{shown(self[column])}"
             )
             raise InputError(msg, element=self.where)
         return self[column]
@@ -154,7 +155,7 @@ class _TableLine:
         except ValueError:
             value = -1.0
         if not 0.0 <= value <= 1e7:
-            msg = f"{column} must be a number from 0 on, not {self[column]!r}"
+            msg = f"{column} must be a number from 0 on, not {shown(self[column])}"
             raise InputError(msg, element=self.where)
         return value
 
@@ -176,30 +177,44 @@ class _TableLine:
         return begin, end
 
 
+def _cells(reader: Any) -> Iterator[tuple[int, list[str]]]:
+    """Lines with their numbers; what the csv module does not take is refused with its line."""
+    while True:
+        try:
+            cells = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            msg = f"cannot be read as a table: {error}"
+            raise InputError(msg, element=f"line {reader.line_num}") from error
+        yield reader.line_num, cells
+
+
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
     """Yield the lines of a CSV file; comma, semicolon or tab, as its first line shows."""
     text = text.removeprefix("\ufeff")
     head = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=head.count)
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
-    columns = [name.strip().lower() for name in next(reader, [])]
+    reader = _cells(csv.reader(io.StringIO(text), delimiter=delimiter))
+    columns = [name.strip().lower() for name in next(reader, (1, []))[1]]
     missing = [name for name in needed if name not in columns]
     unknown = [name for name in columns if name not in (*needed, *optional)]
     given = [name for name in optional if name in columns]
     if missing or unknown or (given and len(given) != len(optional)):
         listed = ", ".join(needed) + "".join(f" [, {name}]" for name in optional)
-        msg = f"the columns are {', '.join(columns) or 'missing'}; needed are {listed}"
+        names = printable(", ".join(columns)) or "missing"
+        msg = f"the columns are {names:.200}; needed are {listed}"
         raise InputError(msg, element="line 1")
     found = False
-    for cells in reader:
+    for number, cells in reader:
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(columns):
             msg = f"{len(cells)} values for {len(columns)} columns"
-            raise InputError(msg, element=f"line {reader.line_num}")
+            raise InputError(msg, element=f"line {number}")
         found = True
         values = (cell.strip() for cell in cells)
-        yield _TableLine(reader.line_num, dict(zip(columns, values, strict=True)))
+        yield _TableLine(number, dict(zip(columns, values, strict=True)))
     if not found:
         msg = "there are no lines below the first"
         raise InputError(msg)
