@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from enum import Enum
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import orjson
 
@@ -114,9 +114,9 @@ def _first_line(error: BaseException) -> str:
 def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]:
     """Make rows of a flat dataclass or named tuple, each value of the type that it is to have.
 
-    What it gives raises :class:`TypeError` or :class:`ValueError` that name the field.
+    What it gives raises ``TypeError`` or ``ValueError`` that name the field.
     """
-    hints = {name: get_args(hint) or (hint,) for name, hint in get_type_hints(kind).items()}
+    hints = {name: _types(hint) for name, hint in get_type_hints(kind).items()}
     enums = {name: types[0] for name, types in hints.items() if issubclass(types[0], Enum)}
     known = {name: _accepted(types) for name, types in hints.items()}
 
@@ -128,6 +128,11 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
         return kind(**{**row, **{name: enum(row[name]) for name, enum in enums.items()}})
 
     return make
+
+
+def _types(hint: Any) -> tuple[type, ...]:
+    """Types of a hint: those of a union, the tuple itself of one with rows."""
+    return (tuple,) if get_origin(hint) is tuple else get_args(hint) or (hint,)
 
 
 def _accepted(types: tuple[type, ...]) -> frozenset[type]:

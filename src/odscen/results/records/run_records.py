@@ -138,8 +138,12 @@ class Plan:
         with documents(what):
             x, y = data["net_offset"]
             data["net_offset"] = (float(x), float(y))
-            data["actors"] = tuple(map(typed_rows(PlannedActor), data["actors"]))
-            return typed_rows(cls)({key: data[key] for key in data.keys() - {"format", "version"}})
+            data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
+            return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
+
+
+_PLANNED_ACTOR = typed_rows(PlannedActor)
+_PLAN = typed_rows(Plan)
 
 
 class EventKind(StrEnum):
