@@ -8,6 +8,7 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.base.errors import NotFoundError
+from odscen.base.stored_files import tables
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
@@ -63,8 +64,25 @@ def write_report(
     -------
     Path
         The file.
-    """
 
+    Raises
+    ------
+    InputError
+        If a file of the run is missing or torn.
+    """
+    with tables(str(folder)):
+        page = _page(folder, summary, loaded, corridor)
+    report = out or folder / layout.REPORT_FILE
+    report.write_text(page, encoding="utf-8")
+    return report
+
+
+def _page(
+    folder: Path,
+    summary: Mapping[str, Any],
+    loaded: LoadedMap | None,
+    corridor: Corridor | None,
+) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
@@ -76,7 +94,7 @@ def write_report(
     followed = None
     if corridor is not None and sumo_map is not None:
         followed = corridor_traces(folder, sumo_map, corridor)
-    page = render_report(
+    return render_report(
         summary,
         Plan.from_json(text(layout.PLAN_FILE)),
         actors_from_json(text(layout.ACTORS_FILE)),
@@ -90,9 +108,6 @@ def write_report(
         conflicts=read_conflicts(folder),
         lights=_lights(folder),
     )
-    report = out or folder / layout.REPORT_FILE
-    report.write_text(page, encoding="utf-8")
-    return report
 
 
 def _lights(folder: Path) -> LightsOfRun | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from odscen.base.errors import InputError
 from odscen.base.stored_files import documents, read_document, tables
 from odscen.results.by_place.traffic import TABLES, TrafficFigures, over_run
 from odscen.results.measures.figure import Basis
@@ -51,6 +52,9 @@ def read_tables(folder: Path) -> TrafficFigures | None:
         file = folder / f"{name}.csv"
         with tables(str(file)):
             names = pl.scan_csv(file).collect_schema().names()
+            if "begin" not in names:
+                msg = "not a table of figures: there is no column 'begin'"
+                raise InputError(msg, file=str(file))
             found[name] = pl.read_csv(file, schema=_schema(names))
     return TrafficFigures(**found)
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 import csv
 import io
 import re
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from odscen.base.errors import InputError
 from odscen.base.shown import printable, shown
 from odscen.scenario.demand.day_profiles import DAY
 
 if TYPE_CHECKING:
+    import _csv
     from collections.abc import Iterable, Iterator, Sequence
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -177,17 +178,13 @@ class _TableLine:
         return begin, end
 
 
-def _cells(reader: Any) -> Iterator[tuple[int, list[str]]]:
-    """Lines with their numbers; what the csv module does not take is refused with its line."""
-    while True:
-        try:
-            cells = next(reader)
-        except StopIteration:
-            return
-        except csv.Error as error:
-            msg = f"cannot be read as a table: {error}"
-            raise InputError(msg, element=f"line {reader.line_num}") from error
-        yield reader.line_num, cells
+def _csv_rows(reader: _csv.Reader) -> Iterator[list[str]]:
+    """Cells of each line; what the csv module refuses is an error with its line."""
+    try:
+        yield from reader
+    except csv.Error as error:
+        msg = f"this is no table that can be read: {error}"
+        raise InputError(msg, element=f"line {reader.line_num}") from error
 
 
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
@@ -195,8 +192,9 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
     text = text.removeprefix("\ufeff")
     head = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=head.count)
-    reader = _cells(csv.reader(io.StringIO(text), delimiter=delimiter))
-    columns = [name.strip().lower() for name in next(reader, (1, []))[1]]
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    rows = _csv_rows(reader)
+    columns = [name.strip().lower() for name in next(rows, [])]
     missing = [name for name in needed if name not in columns]
     unknown = [name for name in columns if name not in (*needed, *optional)]
     given = [name for name in optional if name in columns]
@@ -206,15 +204,15 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
         msg = f"the columns are {names:.200}; needed are {listed}"
         raise InputError(msg, element="line 1")
     found = False
-    for number, cells in reader:
+    for cells in rows:
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(columns):
             msg = f"{len(cells)} values for {len(columns)} columns"
-            raise InputError(msg, element=f"line {number}")
+            raise InputError(msg, element=f"line {reader.line_num}")
         found = True
         values = (cell.strip() for cell in cells)
-        yield _TableLine(number, dict(zip(columns, values, strict=True)))
+        yield _TableLine(reader.line_num, dict(zip(columns, values, strict=True)))
     if not found:
         msg = "there are no lines below the first"
         raise InputError(msg)
