@@ -42,12 +42,16 @@ class Bench:
         import_all()
         self.root = root
         self.limits = Limits()
-        self.material: Material = prepare(root / "material", self.limits)
+        self.material = Material(root / "material", ())
         self.served = Served(self.material, self.limits, root)
         targets: dict[str, tuple[Callable[[Trial], str], float]] = {**FILE_TARGETS, **FAULT_TARGETS}
         for name, (target, share) in REQUESTS.items():
             targets[name] = (self._with_server(target), share)
         self.targets = targets
+
+    def prepare(self) -> None:
+        """Make what is to be damaged."""
+        self.material = self.served.material = prepare(self.material.root, self.limits)
 
     def _with_server(self, target: Callable[[Trial, Served], str]) -> Callable[[Trial], str]:
         return lambda trial: target(trial, self.served)
@@ -115,6 +119,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     begin = time.perf_counter()
     bench = Bench(root)
     try:
+        bench.prepare()
         known = sorted(bench.targets)
         chosen = [options.target] if options.target else options.targets or known
         if unknown := set(chosen) - set(known):

@@ -20,7 +20,9 @@ from bench.fuzz.material import CROSSING
 from bench.fuzz.verdicts import Finding, Verdict, judge, left_over, listing
 
 NOBODY = 65534
-UNTIL, SLICE = "900", "60"
+UNTIL, SLICE = "600", "60"
+PATIENCE = 120.0
+"""Seconds in which a long run that nothing is wrong with must end."""
 ORPHAN_GRACE = 15.0
 """Seconds in which a worker whose runner was killed must have noticed."""
 RESULTS = ("actors.json", "events.json")
@@ -67,7 +69,9 @@ def _kill(trial: Trial, argv: list[str], seconds: float, number: signal.Signals)
     time.sleep(seconds)
     with suppress(ProcessLookupError):
         os.kill(pid, number)
-    ended = trial.limits.wait(pid, tuple(argv), trial.folder, begin=begin, clean=False)
+    ended = trial.limits.wait(
+        pid, tuple(argv), trial.folder, begin=begin, clean=False, seconds=ORPHAN_GRACE
+    )
     left = trial.limits.clean(ORPHAN_GRACE)
     if left:
         trial.findings.append(Finding(Verdict.LEFTOVER, f"{number.name}: still runs: {left[0]}"))
@@ -107,7 +111,7 @@ def _killed_run(trial: Trial) -> str:
             break
         argv = ["resume", str(run), *used] if (run / "status.json").exists() else argv
     if not (run / "summary.json").exists():
-        ended = trial.command(*argv)
+        ended = trial.command(*argv, seconds=PATIENCE)
         if ended.code:
             _wrong(trial, f"not resumed after {story}: {ended.err[-200:]}")
             return "run"
@@ -136,6 +140,7 @@ def _expected(trial: Trial) -> dict[str, bytes]:
                 str(material.workspace),
             ],
             trial.folder,
+            seconds=PATIENCE,
         )
         if ended.code:
             msg = f"the run alone fails: {ended.err}"
@@ -190,7 +195,7 @@ def _at_once(trial: Trial, argv: list[str], between: float) -> list[Ended]:
         started.append(trial.limits.start(argv, folder))
         time.sleep(between)
     ended = [
-        trial.limits.wait(pid, tuple(argv), folder, begin=begin, clean=False)
+        trial.limits.wait(pid, tuple(argv), folder, begin=begin, clean=False, seconds=PATIENCE)
         for pid, folder in zip(started, folders, strict=True)
     ]
     trial.limits.clean(ORPHAN_GRACE)
@@ -264,7 +269,7 @@ def _full_disk(trial: Trial) -> str:
             return "full disk: not possible here"
         for part in ("maps", "runs/done"):
             shutil.copytree(trial.material.workspace / part, workspace / part)
-        ended = trial.command(*argv)
+        ended = trial.command(*argv, seconds=PATIENCE)
         if ended.code in (2, 3) and not _FULL.search(ended.err):
             words = f"a full disk is not named: {name}: {ended.err[-200:]}"
             trial.findings.append(Finding(Verdict.UNCLEAR, words))
@@ -284,7 +289,7 @@ def _read_only(trial: Trial) -> str:
         (trial.folder / name_of).touch()
         (trial.folder / name_of).chmod(0o666)
     try:
-        trial.command(*argv, user=user)
+        trial.command(*argv, user=user, seconds=PATIENCE)
     finally:
         for path in folders:
             path.chmod(0o755)
@@ -302,7 +307,9 @@ def _no_handles(trial: Trial) -> str:
         pid = trial.limits.start(argv, trial.folder)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    ended = trial.limits.wait(pid, tuple(argv), trial.folder, begin=time.perf_counter())
+    ended = trial.limits.wait(
+        pid, tuple(argv), trial.folder, begin=time.perf_counter(), seconds=PATIENCE
+    )
     trial.findings.append(judge(ended))
     _left(trial, f"{name} with {number} files")
     kill_tree(pid)

@@ -35,7 +35,13 @@ class Trial:
     findings: list[Finding] = field(default_factory=list)
     peak: int = 0
 
-    def command(self, *argv: str, writes: Sequence[Path] = (), user: int | None = None) -> Ended:
+    def command(
+        self,
+        *argv: str,
+        writes: Sequence[Path] = (),
+        user: int | None = None,
+        seconds: float | None = None,
+    ) -> Ended:
         """Run a command and judge it.
 
         A refused command may change nothing in the workspace and in ``writes``, but a run that
@@ -43,7 +49,9 @@ class Trial:
         """
         roots = [self.folder / "workspace", self.folder / "tmp", self.folder / "cwd", *writes]
         before = listing(roots)
-        ended = self.limits.run(argv, self.folder, whole=self.seed % WHOLE == 0, user=user)
+        ended = self.limits.run(
+            argv, self.folder, whole=self.seed % WHOLE == 0, user=user, seconds=seconds
+        )
         self.peak = max(self.peak, ended.peak)
         finding = judge(ended)
         if not finding.verdict.failed:

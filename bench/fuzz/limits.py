@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -84,14 +85,23 @@ class Limits:
             _child(tuple(argv), folder, whole, user, dict(environment or {}))
         return pid
 
-    def run(self, argv: Sequence[str], folder: Path, **how: object) -> Ended:
+    def run(
+        self, argv: Sequence[str], folder: Path, *, seconds: float | None = None, **how: Any
+    ) -> Ended:
         """Run ``odscen ARGV`` to its end, or to the limits."""
         begin = time.perf_counter()
-        pid = self.start(argv, folder, **how)  # type: ignore[arg-type]
-        return self.wait(pid, tuple(argv), folder, begin=begin)
+        pid = self.start(argv, folder, **how)
+        return self.wait(pid, tuple(argv), folder, begin=begin, seconds=seconds)
 
     def wait(
-        self, pid: int, argv: tuple[str, ...], folder: Path, *, begin: float, clean: bool = True
+        self,
+        pid: int,
+        argv: tuple[str, ...],
+        folder: Path,
+        *,
+        begin: float,
+        clean: bool = True,
+        seconds: float | None = None,
     ) -> Ended:
         """Wait for a command, and for what it has started; kill what goes over the limits."""
         peak, hung, large = 0, False, False
@@ -101,7 +111,7 @@ class Limits:
             if done:
                 break
             peak = max(peak, high_water_of_tree(pid))
-            hung = time.perf_counter() - begin > self.seconds
+            hung = time.perf_counter() - begin > (seconds or self.seconds)
             large = peak > self.memory
             if hung or large:
                 kill_tree(pid)
@@ -109,14 +119,14 @@ class Limits:
                 break
             time.sleep(pause)
             pause = min(pause * 1.5, 0.1)
-        seconds = time.perf_counter() - begin
+        took = time.perf_counter() - begin
         orphans = self.clean(GRACE if not (hung or large) else 0.0) if clean else ()
         return Ended(
             argv,
             os.waitstatus_to_exitcode(status),
             _read(folder / "out"),
             _read(folder / "err"),
-            seconds,
+            took,
             peak,
             hung,
             large,
