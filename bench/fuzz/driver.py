@@ -116,10 +116,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = _options(sys.argv[1:] if argv is None else argv)
     root = Path(tempfile.mkdtemp(prefix="odscen-fuzz-"))
     root.chmod(0o755)  # trials as another user
-    begin = time.perf_counter()
     bench = Bench(root)
     try:
         bench.prepare()
+        begin = time.perf_counter()
         known = sorted(bench.targets)
         chosen = [options.target] if options.target else options.targets or known
         if unknown := set(chosen) - set(known):
@@ -139,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 def _options(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m bench fuzz")
-    parser.add_argument("--minutes", type=float, default=MINUTES, help="set-up included")
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="of trials")
     parser.add_argument("--targets", type=lambda text: text.split(","), metavar="NAME,...")
     parser.add_argument("--first", type=int, default=1, help="seed of the first trials")
     parser.add_argument("--seed", type=int, help="one trial of each target, and keep its folder")
