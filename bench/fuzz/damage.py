@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
-import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -105,11 +103,13 @@ def damaged(data: bytes, rng: Generator, changes: dict[str, Change]) -> Damage:
     return Damage(" + ".join(kinds), data)
 
 
-def _cut(data: bytes, rng: Generator) -> bytes:
+def torn(data: bytes, rng: Generator) -> bytes:
+    """The beginning only."""
     return data[: int(rng.integers(len(data) + 1))]
 
 
-def _bytes(data: bytes, rng: Generator) -> bytes:
+def flipped(data: bytes, rng: Generator) -> bytes:
+    """Some bytes that are others."""
     found = bytearray(data)
     for _ in range(int(rng.integers(1, 20)) if found else 0):
         found[int(rng.integers(len(found)))] = int(rng.integers(256))
@@ -163,8 +163,8 @@ def _deep(_data: bytes, rng: Generator) -> bytes:
 
 
 RAW: dict[str, Change] = {
-    "bytes": _bytes,
-    "cut": _cut,
+    "bytes": flipped,
+    "cut": torn,
     "empty": _empty,
     "hole": _hole,
     "twice": _twice,
@@ -299,81 +299,38 @@ CSV: dict[str, Change] = {
 }
 
 
-def _member(data: bytes, rng: Generator) -> bytes:
-    """One member of an archive gone, cut, empty, doubled, or another's."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = {name: archive.read(name) for name in archive.namelist()}
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        return _bytes(data, rng)
-    if not members:
+def _toml_value(data: bytes, rng: Generator) -> bytes:
+    lines = data.decode("utf-8", errors="replace").split("\n")
+    places = [n for n, line in enumerate(lines) if " = " in line]
+    if not places:
         return data
-    name = pick(rng, sorted(members))
-    what = pick(rng, ("drop", "cut", "swap", "array", "array", "huge", "outside"))
-    if what == "drop":
-        del members[name]
-    elif what == "cut":
-        members[name] = _cut(members[name], rng)
-    elif what == "swap":
-        members[name] = members[pick(rng, sorted(members))]
-    elif what == "outside":
-        members["../../outside.npy"] = members[name]
-    elif what == "huge":
-        members[name] = _huge_array()
-    else:
-        members[name] = _array(members[name], rng)
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
-        for each, content in members.items():
-            archive.writestr(each, content)
-    return made.getvalue()
-
-
-def _huge_array() -> bytes:
-    """A header that promises 16 GB, and nothing behind it."""
-    made = io.BytesIO()
-    np.lib.format.write_array_header_1_0(
-        made, {"descr": "<f8", "fortran_order": False, "shape": (2_000_000_000,)}
+    n = pick(rng, places)
+    key = lines[n].split(" = ")[0]
+    value = pick(
+        rng,
+        (
+            *NUMBERS,
+            "[]",
+            "{}",
+            "true",
+            '""',
+            *(repr(word) for word in WORDS),
+            '{ kind = "uniform", low = 3, high = 1e308 }',
+            '{ kind = "normal", mean = 1e18, std = 0, low = 1e18, high = 1e18 }',
+            '{ kind = "choice", values = [] }',
+            '{ kind = "choice", values = [1], weights = [0] }',
+        ),
     )
-    return made.getvalue() + bytes(64)
+    lines[n] = f"{key} = {value}"
+    return "\n".join(lines).encode("utf-8", errors="surrogatepass")
 
 
-def _array(member: bytes, rng: Generator) -> bytes:
-    """Another type, shape or content of one array."""
-    try:
-        array = np.lib.format.read_array(io.BytesIO(member))
-    except (ValueError, EOFError, OSError):
-        return _bytes(member, rng)
-    what = pick(rng, ("type", "shape", "value", "shorter", "empty"))
-    if what == "type":
-        array = (
-            array.astype(pick(rng, ("U20", "i8", "u1", "?", "c16")), casting="unsafe")
-            if array.dtype.kind != "U"
-            else np.zeros(array.shape)
-        )
-    elif what == "shape":
-        array = array.reshape(-1, 1)
-    elif what == "shorter":
-        array = array[: len(array) // 2] if array.ndim else array
-    elif what == "empty":
-        array = array[:0] if array.ndim else array
-    elif array.size and array.dtype.kind in "iuf":
-        array = array.copy()
-        array.flat[int(rng.integers(array.size))] = (
-            pick(rng, (np.nan, np.inf, -1e300, 1e300))
-            if array.dtype.kind == "f"
-            else pick(rng, (-1, np.iinfo(array.dtype).max, np.iinfo(array.dtype).min))
-        )
-    made = io.BytesIO()
-    np.lib.format.write_array(made, np.asarray(array), allow_pickle=False)
-    return made.getvalue()
-
-
-ARCHIVE: dict[str, Change] = {**RAW, **{f"member {n}": _member for n in range(8)}}
+TOML: dict[str, Change] = {**TEXT, **{f"entry {n}": _toml_value for n in range(8)}}
 
 
 def changes_for(name: str) -> dict[str, Change]:
     """What can happen to a file of this name."""
+    from bench.fuzz.archive_damage import ARCHIVE
     from bench.fuzz.map_damage import XML
 
     ends = {".json": JSON, ".csv": CSV, ".npz": ARCHIVE, ".xml": XML, ".xodr": XML, ".toml": TEXT}

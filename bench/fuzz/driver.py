@@ -21,11 +21,13 @@ from pathlib import Path
 import odscen
 from bench.common import OUT
 from bench.fuzz.fault_targets import FAULT_TARGETS
-from bench.fuzz.file_targets import FILE_TARGETS, Trial, trial_rng
+from bench.fuzz.file_targets import FILE_TARGETS
+from bench.fuzz.folder_targets import FOLDER_TARGETS
 from bench.fuzz.limits import Limits
 from bench.fuzz.material import Material, prepare
 from bench.fuzz.request_targets import handmade_trial, schema_trial
 from bench.fuzz.served import Served
+from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
@@ -44,7 +46,11 @@ class Bench:
         self.limits = Limits()
         self.material = Material(root / "material", ())
         self.served = Served(self.material, self.limits, root)
-        targets: dict[str, tuple[Callable[[Trial], str], float]] = {**FILE_TARGETS, **FAULT_TARGETS}
+        targets: dict[str, tuple[Callable[[Trial], str], float]] = {
+            **FILE_TARGETS,
+            **FOLDER_TARGETS,
+            **FAULT_TARGETS,
+        }
         for name, (target, share) in REQUESTS.items():
             targets[name] = (self._with_server(target), share)
         self.targets = targets

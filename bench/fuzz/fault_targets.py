@@ -14,9 +14,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from bench.fuzz.damage import pick
-from bench.fuzz.file_targets import Trial
 from bench.fuzz.limits import Ended, kill_tree
 from bench.fuzz.material import CROSSING
+from bench.fuzz.trials import Trial
 from bench.fuzz.verdicts import Finding, Verdict, judge, left_over, listing
 
 NOBODY = 65534

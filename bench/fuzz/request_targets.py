@@ -14,11 +14,11 @@ from typing import Any
 from urllib.parse import quote
 
 from bench.fuzz.damage import CSV, JSON, WORDS, damaged, json_value, pick
-from bench.fuzz.file_targets import Trial
 from bench.fuzz.limits import MEMORY, SECONDS, high_water_of_tree
 from bench.fuzz.map_damage import MAP
 from bench.fuzz.material import CROSSING
 from bench.fuzz.served import Served
+from bench.fuzz.trials import Trial
 from bench.fuzz.verdicts import Finding, Verdict
 
 EXAMPLES = 10
