@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 from bench.fuzz.damage import CSV, JSON, WORDS, damaged, json_value, pick
-from bench.fuzz.limits import MEMORY, SECONDS, high_water_of_tree
+from bench.fuzz.limits import MEMORY, SECONDS, busy, high_water_of_tree
 from bench.fuzz.map_damage import MAP
 from bench.fuzz.material import CROSSING
 from bench.fuzz.served import Served
@@ -62,7 +62,7 @@ def _drawn(trial: Trial, served: Served, path: str, method: str) -> None:
                 key: known.get(key, value) for key, value in (case.path_parameters or {}).items()
             }
         try:
-            answer = case.call(base_url=served.url, timeout=SECONDS, stream=False)
+            answer = case.call(base_url=served.url, timeout=SECONDS * busy(), stream=False)
         except requests.Timeout:
             trial.findings.append(Finding(Verdict.HANG, f"{where}: no answer"))
         except requests.ConnectionError as error:
@@ -132,7 +132,7 @@ def _ask(
     headers: dict[str, str] | None = None,
 ) -> bytes:
     """One request; its answer is judged, its body given."""
-    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=SECONDS)
+    connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=SECONDS * busy())
     where = f"{method} {target[:100]}"
     try:
         connection.putrequest(method, target, skip_host="Host" in (headers or {}))
@@ -201,7 +201,7 @@ def _await(trial: Trial, served: Served, said: bytes) -> None:
         name = json.loads(said)["job"]
     except (ValueError, KeyError, TypeError):
         return
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + SECONDS * busy()
     while time.monotonic() < end:
         try:
             state = json.loads(_ask(trial, served, "GET", f"/api/jobs/{name}"))["state"]

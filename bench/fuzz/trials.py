@@ -35,7 +35,7 @@ class Trial:
         self,
         *argv: str,
         writes: Sequence[Path] = (),
-        user: int | None = None,
+        plain: bool = False,
         seconds: float | None = None,
     ) -> Ended:
         """Run a command and judge it.
@@ -46,7 +46,7 @@ class Trial:
         roots = [self.folder / "workspace", self.folder / "tmp", self.folder / "cwd", *writes]
         before = listing(roots)
         ended = self.limits.run(
-            argv, self.folder, whole=self.seed % WHOLE == 0, user=user, seconds=seconds
+            argv, self.folder, whole=self.seed % WHOLE == 0, plain=plain, seconds=seconds
         )
         self.peak = max(self.peak, ended.peak)
         finding = judge(ended)

@@ -9,6 +9,7 @@ import polars as pl
 from odscen.app.maps import load_map
 from odscen.base.errors import NotFoundError
 from odscen.base.stored_files import tables
+from odscen.base.text_files import write_text
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
@@ -72,9 +73,7 @@ def write_report(
     """
     with tables(str(folder)):
         page = _page(folder, summary, loaded, corridor)
-    report = out or folder / layout.REPORT_FILE
-    report.write_text(page, encoding="utf-8")
-    return report
+    return write_text(out or folder / layout.REPORT_FILE, page)
 
 
 def _page(

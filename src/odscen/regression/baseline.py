@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError, in_file
+from odscen.base.errors import in_file
+from odscen.base.given_files import read_given
 from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
@@ -144,16 +146,12 @@ def read_baseline(file: Path) -> Baseline | None:
     InputError
         If it is not a baseline of this version.
     """
-    try:
-        text = file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return None
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"cannot be read: {error}"
-        raise InputError(msg, file=str(file)) from error
+    with suppress(OSError):  # which reading it names
+        if not file.exists():
+            return None
     what = "a baseline"
     with in_file(str(file)):
-        data = read_document(text, form=FORMAT, version=VERSION, what=what)
+        data = read_document(read_given(file), form=FORMAT, version=VERSION, what=what)
         with documents(f"{what}, write it again with --update-baseline"):
             return _from_data(data)
 

@@ -252,9 +252,19 @@ def read_signal_use_table(file: Path) -> pl.DataFrame:
     """
     import polars as pl
 
-    texts = dict.fromkeys(("junction", "group", "movements"), pl.String)
+    text, whole, decimal = pl.String, pl.Int64, pl.Float64
+    schema = {
+        **dict.fromkeys(("junction", "group", "movements"), text),
+        "greens": whole,
+        "green": decimal,
+        "mean_green": decimal,
+        "vehicles": whole,
+        "cycle_failures": whole,
+        "unused_green": decimal,
+    }
     with tables(str(file)):
-        return pl.read_csv(file, schema_overrides=texts)
+        found = pl.read_csv(file, schema_overrides=schema)
+        return found.select(list(schema)).fill_nan(None)
 
 
 def _share(run: RunData, part: str, whole: str) -> float | None:
