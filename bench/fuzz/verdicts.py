@@ -91,13 +91,13 @@ def judge(ended: Ended) -> Finding:
 
 
 def worst(findings: Iterable[Finding]) -> Finding:
-    """The first failure, else the first refusal, else the first of all."""
+    """The first failure, else the first refusal, else the first of all; fine without any."""
     known = list(findings)
     for wanted in (lambda one: one.verdict.failed, lambda one: one.verdict is Verdict.REFUSED):
         for one in known:
             if wanted(one):
                 return one
-    return known[0] if known else Finding(Verdict.SKIPPED)
+    return known[0] if known else Finding(Verdict.FINE)
 
 
 Listing = dict[str, tuple[int, int]]
