@@ -112,6 +112,51 @@ def interrupted(trial: Trial) -> str:
     return kind
 
 
+_NUMERIC = ("cycle", "per-km", "saturation", "seed", "segments", "spacing", "step", "trips")
+_TIMES = (
+    "1h",
+    "-1h",
+    "1e-300",
+    "1e-300h",
+    "0",
+    "5",
+    "0.01s",
+    "9" * 400 + "h",
+    "1e18",
+    "nan",
+    "7:15",
+)
+_OWN_VALUES: dict[str, tuple[str, ...]] = {
+    "until": _TIMES,
+    "slice": _TIMES,
+    "expect": (
+        "arrived>=",
+        "arrived>=nan",
+        "mean_delay<=1e400",
+        "arrived>=-1%",
+        "x>=1",
+        "arrived==0",
+    ),
+    "trajectories": (
+        "none",
+        "every=0",
+        "every=1e-9",
+        "every=1e18",
+        "region=1:2:3:nan",
+        "region=9:9:1:1",
+        "columns=+",
+        "columns=lane",
+        "every=2,every=3",
+        "region=-1e308:1e308:-1e308:1e308",
+    ),
+    "mix": ("car=nan", "car=1,", "car=1e308,bus=1e308", "car=0", "car=-1", "car=1e-300", "car"),
+    "corridor": ("r1,r1", "r1,j10001,r2", "r1,r2", "j10001", ",", "r1," * 5000),
+    "from": ("r1", "r2", "j10001", "r99"),
+    "along": ("r1,r2", "1,2", "r1," * 5000, "10001"),
+    "render": ("/proc/x/y.svg", "x.svg", "x.png", "x.SVG", ".svg", "/dev/full", "no/folder/x.svg"),
+}
+
+
 def options(trial: Trial) -> str:
     """Odd values of options."""
     used, material, rng = trial.used("maps", "runs/done"), trial.material, trial.rng
@@ -159,27 +204,8 @@ def options(trial: Trial) -> str:
         "scenario": ["check"],
     }
     what = pick(rng, sorted(choices))
-    value = pick(
-        rng,
-        (
-            *NUMBERS,
-            *WORDS,
-            "arrived>=",
-            "mean_delay<=1e400",
-            "every=0",
-            "every=1e-9",
-            "region=1:2:3:nan",
-            "columns=+",
-            "1h",
-            "-1h",
-            "1e-300h",
-            "car=nan",
-            "car=1,",
-            "r1,r1",
-            "r1,j10001,r2",
-            "/proc/x/y.svg",
-        ),
-    )
+    own = _OWN_VALUES.get(what, NUMBERS if what in _NUMERIC else WORDS)
+    value = pick(rng, own if rng.random() < 0.8 else (*NUMBERS, *WORDS))
     value = value.replace("\x00", "").encode("utf-8", errors="replace").decode()
     # A value that starts with a dash would be an option of its own.
     last = choices[what][-1]
