@@ -11,7 +11,7 @@ DOCS := .venv/docs-ready
 MODULES := frontend/node_modules/.package-lock.json
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
+.PHONY: demo test fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -69,6 +69,10 @@ format: $(READY)
 # Benchmarks print ratios against a named peer, measured in the same run.
 bench: $(READY) $(PAGE) chromium allocator
 	$(BIN)/python -m bench
+
+# Faults of every kind, an hour of them; see docs/faults.md.
+fuzz: $(READY) $(PAGE)
+	$(BIN)/python -m bench fuzz $(FUZZ)
 
 # The wheel from a clone of what is committed, on a machine without Node.
 check-wheel: $(READY)

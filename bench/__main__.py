@@ -1,4 +1,7 @@
-"""``python -m bench [NAME...]``: run all benchmarks, or those named."""
+"""``python -m bench [NAME...]``: run all benchmarks, or those named.
+
+After one name, options are that benchmark's own: ``python -m bench fuzz --minutes 2``.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,10 @@ ALL = (
 
 
 def main() -> None:
-    for name in sys.argv[1:] or ALL:
+    names = sys.argv[1:]
+    if len(names) > 1 and names[1].startswith("-"):
+        names, sys.argv = names[:1], [f"bench {names[0]}", *names[1:]]
+    for name in names or ALL:
         print(f"== {name}", flush=True)
         importlib.import_module(f"bench.{name}").main()
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from odscen.base.shown import printable, shown, shown_id
+from odscen.base.shown import printable, shown, shown_id, visible
 
 
 @pytest.mark.parametrize("plain", ["1", "-1", "road_7", "a.b/c:d", "x" * 60])
@@ -35,3 +35,9 @@ def test_names_of_files_stay_readable_and_can_always_be_printed() -> None:
     undecodable = b"bad\xff.xodr".decode("utf-8", "surrogateescape")
     assert printable(undecodable) == "bad\\udcff.xodr"
     assert printable("a\u202eb").encode() == b"a\\u202eb"
+
+
+def test_messages_keep_their_lines_and_escape_what_cannot_be_seen() -> None:
+    assert visible("a: \u202eb\n  - ä \x1b[31m\u200b\udcff 'c'\\") == (
+        "a: \\u202eb\n  - ä \\x1b[31m\\u200b\\udcff 'c'\\"
+    )

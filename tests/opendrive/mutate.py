@@ -1,4 +1,4 @@
-"""Deterministic damage to OpenDRIVE files, for tests and bench/fuzz_parse.py.
+"""Deterministic damage to OpenDRIVE files, for tests and `bench/fuzz/map_damage.py`.
 
 Each mutation draws one kind of damage; the same text, seed and count give the same bytes anywhere.
 """

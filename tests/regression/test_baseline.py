@@ -1,9 +1,69 @@
-"""What a baseline says of itself."""
-
 from __future__ import annotations
 
-from odscen.regression.baseline import Baseline, seeds_that_hardly_vary
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from odscen.base.errors import InputError
+from odscen.regression.baseline import Baseline, read_baseline, seeds_that_hardly_vary
 from odscen.regression.measure import FigureKey
+
+ROWS: list[dict[str, Any]] = [{"figure": "mean_delay", "values": [1.5, None]}]
+
+
+def written(folder: Path, **changed: object) -> Path:
+    data = {
+        "format": "odscen-baseline",
+        "version": 1,
+        "scenario": "x",
+        "fingerprint": {"map": "0"},
+        "seeds": [1, 2],
+        "rows": ROWS,
+        **changed,
+    }
+    file = folder / "x.json"
+    file.write_text(json.dumps(data), encoding="utf-8")
+    return file
+
+
+def test_a_baseline_is_read_by_figure_and_seed(tmp_path: Path) -> None:
+    baseline = read_baseline(written(tmp_path))
+    assert baseline is not None
+    assert baseline.seeds == (1, 2)
+    assert list(baseline.figures.values()) == [(1.5, None)]
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"rows": [{"street": "r1", "flow": [1, 2]}]}, "row .* is of no figure, segment, junction"),
+        ({"rows": [{"figure": "mean_delay"}]}, "'values' is missing"),
+        ({"rows": [{"figure": "mean_delay", "values": [1]}]}, "1 values for 2 seeds"),
+        ({"rows": [{"figure": "mean_delay", "values": [int("9" * 400), 1]}]}, "infinity"),
+        ({"rows": [{"figure": ["mean_delay"], "values": [1, 2]}]}, "unhashable"),
+        ({"rows": [7]}, "not iterable"),
+        ({"rows": None}, "not iterable"),
+        ({"fingerprint": 3}, "not iterable"),
+        ({"seeds": ["one"]}, "invalid literal"),
+        ({"version": 2}, "version 2 is not a baseline"),
+    ],
+)
+def test_a_damaged_baseline_is_refused_with_its_file(
+    tmp_path: Path, changed: dict[str, Any], words: str
+) -> None:
+    file = written(tmp_path, **changed)
+    with pytest.raises(InputError, match=words) as refused:
+        read_baseline(file)
+    assert refused.value.file == str(file)
+
+
+def test_a_hundred_thousand_brackets_are_no_baseline(tmp_path: Path) -> None:
+    file = tmp_path / "x.json"
+    file.write_text("[" * 100_000, encoding="utf-8")
+    with pytest.raises(InputError, match="not a baseline: depth limit exceeded"):
+        read_baseline(file)
 
 
 def of_travel_times(*values: float | None) -> Baseline:

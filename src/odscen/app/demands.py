@@ -11,6 +11,7 @@ import polars as pl
 from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.base.given_files import read_given_text
 from odscen.scenario import edits
 from odscen.scenario.demand.day_profiles import DAY
 from odscen.scenario.demand.demand_tables import (
@@ -68,8 +69,9 @@ def import_table(
         If the scenario has no such places.
     """
     loaded = map_of(workspace, scenario)
+    text = read_given_text(file)
     with in_file(str(file)):
-        return import_text(loaded, scenario, _text(file), kind=kind, name=name, day=day, **fields)
+        return import_text(loaded, scenario, text, kind=kind, name=name, day=day, **fields)
 
 
 def import_text(
@@ -228,10 +230,3 @@ def _by_line(scenario: Scenario, kind: str, name: str, lines: Sequence[int]) -> 
             raise ScenarioError(found[0]) from error
         msg = f"{len(found)} problems"
         raise ScenarioError(msg, problems=found) from error
-
-
-def _text(file: Path) -> str:
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(str(error)) from error

@@ -169,7 +169,7 @@ def coordinate_signals(
     numbers = chosen_lights(loaded, junctions) if junctions else _along(loaded, along)
     if len(numbers) < 2:
         named = ", ".join(junctions or along)
-        msg = f"a corridor needs two traffic lights, but {named} has {len(numbers)}"
+        msg = f"a corridor needs two traffic lights, but {named:.200} has {len(numbers)}"
         raise InputError(msg)
     if along:
         numbers = finder.in_order(numbers)

@@ -10,6 +10,8 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError, NotFoundError
+from odscen.base.stored_files import tables
+from odscen.base.text_files import write_text
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
@@ -68,8 +70,23 @@ def write_report(
     -------
     Path
         The file.
-    """
 
+    Raises
+    ------
+    InputError
+        If a file of the run is missing or torn.
+    """
+    with tables(str(folder)):
+        page = _page(folder, summary, loaded, corridor)
+    return write_text(out or folder / layout.REPORT_FILE, page)
+
+
+def _page(
+    folder: Path,
+    summary: Mapping[str, Any],
+    loaded: LoadedMap | None,
+    corridor: Corridor | None,
+) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
@@ -81,7 +98,7 @@ def write_report(
     followed = None
     if corridor is not None and sumo_map is not None:
         followed = corridor_traces(folder, sumo_map, corridor)
-    page = render_report(
+    return render_report(
         summary,
         Plan.from_json(text(layout.PLAN_FILE)),
         actors_from_json(text(layout.ACTORS_FILE)),
@@ -95,9 +112,6 @@ def write_report(
         conflicts=read_conflicts(folder),
         lights=_lights(folder),
     )
-    report = out or folder / layout.REPORT_FILE
-    report.write_text(page, encoding="utf-8")
-    return report
 
 
 def _lights(folder: Path) -> LightsOfRun | None:

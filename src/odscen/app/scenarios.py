@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
+from odscen.base.given_files import read_given, read_given_text
 from odscen.base.text_files import write_text
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
@@ -49,11 +50,7 @@ def read_scenario(path: Path) -> Scenario:
     ScenarioError
         If it is not a scenario; names every problem with its place.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(error.strerror or str(error), file=str(path)) from error
-    return read_any(content, file=str(path))
+    return read_any(read_given(path), file=str(path))
 
 
 def write_scenario(scenario: Scenario, path: Path) -> Path:
@@ -167,10 +164,7 @@ def read_config(path: Path | None) -> SamplingConfig:
     """
     if path is None:
         return SamplingConfig()
-    try:
-        return loads_config(path.read_text(encoding="utf-8"), file=str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(str(error), file=str(path)) from error
+    return loads_config(read_given_text(path), file=str(path))
 
 
 def generate(

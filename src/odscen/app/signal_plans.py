@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.given_files import read_given
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.edits.edited_parts import changed_part, with_fields
@@ -112,10 +113,7 @@ def import_signals(
 
     scenario = given_scenario(scenario)
     loaded = map_of(workspace, scenario)
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise InputError(error.strerror or str(error), file=str(file)) from error
+    content = read_given(file)
     views = {light.id: view for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True)}
     wanted = {light for light, view in views.items() if {light, *view.names} & set(junctions)}
     for name in junctions:

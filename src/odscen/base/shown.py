@@ -27,6 +27,13 @@ def printable(text: str) -> str:
     return text if text.isprintable() else repr(text)[1:-1]
 
 
+def visible(text: str) -> str:
+    """Text of several lines in which what cannot be seen is escaped, and nothing else."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in text)
+
+
 def shown_id(value: str) -> str:
     """An id in the path of an element: as it is where it is plain, else as :func:`shown`.
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from odscen.base.errors import OdscenError
+from odscen.base.shown import visible
 
 WorkspaceOption = Annotated[
     Path | None,
@@ -54,12 +55,12 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 def log(message: str) -> None:
     """Write a line for people to stderr."""
-    typer.echo(message, err=True)
+    typer.echo(visible(message), err=True)
 
 
 def report_error(error: OdscenError) -> None:
     """Write an error to stderr, and as JSON to stdout if the command line asked for JSON."""
-    typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+    typer.secho(f"error: {visible(str(error))}", err=True, fg=typer.colors.RED)
     if "--json" in sys.argv[1:]:
         print_json({"error": error_fields(error)})
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from odscen.base.arrays import Bounds, FloatArray, IntArray, offsets, ranges
-from odscen.base.errors import InputError
+from odscen.base.stored_files import documents, read_document
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -176,15 +176,10 @@ class MapDrawing:
         InputError
             If it is not a drawing, or one of another version.
         """
-        try:
-            document = json.loads(text)
-            if (document["format"], document["version"]) != (FORMAT, VERSION):
-                msg = f"not a drawing of version {VERSION}"
-                raise InputError(msg)
+        what = "a map drawing"
+        document = read_document(text, form=FORMAT, version=VERSION, what=what)
+        with documents(what):
             return cls._from_document(document)
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            msg = f"not a map drawing: {error!r}"
-            raise InputError(msg) from error
 
     @classmethod
     def _from_document(cls, document: dict[str, Any]) -> MapDrawing:

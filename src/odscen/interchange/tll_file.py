@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError
+from odscen.base.xml_reading import read_xml
 from odscen.sumo.realize.program_files import DETECTOR_PARAM
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def parse_signal_file(text: str | bytes) -> SignalFile:
     InputError
         If it is not XML, has no ``<tlLogic>``, or a value in it cannot be read.
     """
-    root = _root(text)
+    root = read_xml(text)
     programs = tuple(_program(one) for one in root.iter("tlLogic"))
     if not programs:
         msg = "there is no <tlLogic> in the file"
@@ -109,17 +110,6 @@ def parse_signal_file(text: str | bytes) -> SignalFile:
     }
     loops = [_loop(one) for tag in ("inductionLoop", "e1Detector") for one in root.iter(tag)]
     return SignalFile(programs, {loop.id: loop for loop in loops}, switches)
-
-
-def _root(text: str | bytes) -> etree._Element:
-    from lxml import etree
-
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
-    try:
-        return etree.fromstring(text.encode() if isinstance(text, str) else text, parser)
-    except etree.XMLSyntaxError as error:
-        msg = f"not XML: {error.msg}"
-        raise InputError(msg) from error
 
 
 def _program(element: etree._Element) -> FileProgram:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Final, TypeVar, cast
 
 from lxml import etree
 
-from odscen.base.errors import LimitError, OpenDriveError
+from odscen.base.errors import InputError, LimitError, OpenDriveError
 from odscen.base.shown import shown, shown_id
+from odscen.base.xml_reading import read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Container, Mapping
@@ -64,46 +65,19 @@ def load(text: str | bytes, *, max_bytes: int, max_tags: int) -> Element:
     if data.count(b"<") > max_tags:
         msg = f"the file has {data.count(b'<')} tags; the limit is {max_tags}"
         raise OpenDriveError(msg)
-    parser = etree.XMLParser(
-        # A str has been decoded already: what its declaration says about the encoding is past.
-        encoding="utf-8" if isinstance(text, str) else None,
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-        remove_blank_text=True,
-    )
     try:
-        root = etree.fromstring(data, parser)
-    except MemoryError as err:
-        raise _out_of_memory(len(data)) from err
-    except etree.XMLSyntaxError as err:
-        if getattr(err, "code", None) == etree.ErrorTypes.ERR_NO_MEMORY:
-            raise _out_of_memory(len(data)) from err
-        # What lxml's own text adds is "(<string>, line 1)".
-        msg = f"not well-formed XML: {err.msg}"
-        raise OpenDriveError(msg) from err
-    except (ValueError, LookupError) as err:
-        msg = f"not well-formed XML: {err}"
-        raise OpenDriveError(msg) from err
-    if root is None:
-        msg = "not well-formed XML: no element"
-        raise OpenDriveError(msg)
+        root = read_xml(text, bare=True)
+    except LimitError:
+        raise
+    except InputError as err:
+        raise OpenDriveError(err.problem) from err
     dtd = root.getroottree().docinfo.internalDTD
-    if dtd is not None and any(dtd.iterentities()):  # type: ignore[union-attr]  # not in the stubs
+    if dtd is not None and any(dtd.iterentities()):  # type: ignore[attr-defined]  # stubs
         msg = "the file declares XML entities; these are refused"
         raise OpenDriveError(msg)
     if b"xmlns" in data:
         _drop_namespaces(root)
     return root
-
-
-def _out_of_memory(size: int) -> LimitError:
-    return LimitError(
-        f"there is not enough memory to read XML of {size} bytes; free some and retry"
-    )
 
 
 def _drop_namespaces(root: Element) -> None:

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError, in_file
+from odscen.base.errors import in_file
+from odscen.base.given_files import read_given
+from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
@@ -140,28 +143,17 @@ def read_baseline(file: Path) -> Baseline | None:
     InputError
         If it is not a baseline of this version.
     """
-    try:
-        text = file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return None
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"cannot be read: {error}"
-        raise InputError(msg, file=str(file)) from error
+    with suppress(OSError):  # which reading it names
+        if not file.exists():
+            return None
+    what = "a baseline"
     with in_file(str(file)):
-        try:
-            return _from_data(json.loads(text))
-        except RecursionError as error:
-            msg = "not a baseline, write it again with --update-baseline: too many brackets"
-            raise InputError(msg) from error
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            msg = f"not a baseline, write it again with --update-baseline: {error!r}"
-            raise InputError(msg) from error
+        data = read_document(read_given(file), form=FORMAT, version=VERSION, what=what)
+        with documents(f"{what}, write it again with --update-baseline"):
+            return _from_data(data)
 
 
 def _from_data(data: Mapping[str, Any]) -> Baseline:
-    if (data["format"], data["version"]) != (FORMAT, VERSION):
-        msg = f"format {data['format']!r} version {data['version']!r} is not a baseline"
-        raise InputError(msg)
     seeds = tuple(int(seed) for seed in data["seeds"])
     figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:
@@ -170,7 +162,7 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
             continue
         kind = next((kind for kind in _KINDS if kind in row), None)
         if kind is None:
-            msg = f"a row with {', '.join(map(str, row))} is of no run, segment, junction or actor"
+            msg = f"row {row!r:.60} is of no figure, {', '.join(_KINDS)}"
             raise ValueError(msg)
         for name, values in row.items():
             if name != kind:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.base.errors import InputError, in_file
+from odscen.base.errors import in_file
+from odscen.base.stored_files import tables
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGURES, figure_of
 from odscen.results.measures.summary import actors_from_json
@@ -86,13 +87,11 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
     InputError
         If a file of the run cannot be read.
     """
-    import polars as pl
-
     found = run_figures(summary)
     if summary["status"] != RunStatus.COMPLETED:
         return found
     actors_file = folder / layout.ACTORS_FILE
-    try:
+    with tables(str(folder)):
         with in_file(str(actors_file)):
             actors = actors_from_json(actors_file.read_text(encoding="utf-8"))
         for actor in actors:
@@ -102,11 +101,7 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
                     for figure in ACTOR_FIGURES
                 }
         figures = read_figures(folder, end=summary["sim_seconds"])
-    except (OSError, pl.exceptions.PolarsError) as error:
-        msg = f"files of the run cannot be read: {error}"
-        raise InputError(msg, file=str(folder)) from error
-    if figures is not None:
-        for key, value in place_figures(figures):
+        for key, value in place_figures(figures) if figures is not None else ():
             if value is not None:
                 found[key] = round(float(value), DIGITS)
     return found

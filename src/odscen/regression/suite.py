@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo
 
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.base.given_files import read_given_text
 from odscen.regression.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
 from odscen.regression.tolerance import Tolerances, parse_tolerance
 from odscen.results.measures.expectations import parse_expectation
@@ -174,8 +175,8 @@ def read_suite(file: Path) -> Suite:
         If it is not a suite; names every key at fault.
     """
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        data = tomllib.loads(read_given_text(file))
+    except (ValueError, RecursionError) as error:
         msg = f"the suite cannot be read: {error}"
         raise InputError(msg, file=str(file)) from error
     own = declared(data)

@@ -162,7 +162,7 @@ def _fetched(file: Path, _changed: int) -> Assets:
     try:
         rows = json.loads(file.read_text(encoding="utf-8"))["blueprints"]
         models = {row["id"]: _blueprint(row) for row in rows}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         msg = f"{file}: not a catalogue of models ({error}); remove it or fetch it again"
         raise WorkspaceError(msg) from error
     return Assets(models, shipped.presets)

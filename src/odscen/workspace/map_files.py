@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import stat
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import InputError
-from odscen.base.shown import printable
+from odscen.base.given_files import read_given
 from odscen.opendrive.parse_rules import MAX_BYTES
 
 if TYPE_CHECKING:
@@ -22,16 +20,4 @@ def read_map_file(source: Path) -> bytes:
         If it is no regular file (a pipe or device might never end), is larger than
         :data:`~odscen.opendrive.parse_rules.MAX_BYTES`, or cannot be read.
     """
-    try:
-        found = source.stat()
-        if not stat.S_ISREG(found.st_mode):
-            what = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe, device or socket"
-            msg = f"this is {what}, not a regular file"
-            raise InputError(msg, file=printable(str(source)))
-        if found.st_size > MAX_BYTES:
-            msg = f"the file has {found.st_size} bytes; the limit is {MAX_BYTES}"
-            raise InputError(msg, file=printable(str(source)))
-        return source.read_bytes()
-    except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(reason, file=printable(str(source))) from error
+    return read_given(source, most=MAX_BYTES)

@@ -15,6 +15,7 @@ from lxml import etree
 
 from odscen.base.errors import InputError
 from odscen.base.ids import SumoEdgeId, SumoLaneId
+from odscen.base.xml_reading import read_xml
 from odscen.convert.model.net import CROSSING, NORMAL, STAGE, WALKING_AREA, Phase, Request
 
 if TYPE_CHECKING:
@@ -173,14 +174,7 @@ def read_network(content: bytes) -> ImportedNet:
     InputError
         If it is no network of SUMO, not complete, or too old for sumolib.
     """
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, huge_tree=True, remove_comments=True
-    )
-    try:
-        root = etree.fromstring(content, parser)
-    except etree.XMLSyntaxError as error:
-        msg = f"the SUMO network is not XML: {error.msg}"
-        raise InputError(msg) from error
+    root = read_xml(content, huge=True, bare=True)
     if root.tag != "net":
         msg = f"the SUMO network cannot be read: its first element is <{root.tag}>, not <net>"
         raise InputError(msg)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from odscen.base.errors import OpenDriveError
+from odscen.base.errors import InputError, LimitError, OpenDriveError
+from odscen.base.xml_reading import read_xml
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
 
@@ -94,12 +95,12 @@ def with_lane_limits(xodr: bytes) -> tuple[bytes, tuple[ReportEntry, ...]]:
     OpenDriveError
         If the text is not XML.
     """
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
     try:
-        root = etree.fromstring(xodr, parser)
-    except etree.XMLSyntaxError as error:
-        msg = f"not XML: {error.msg}"
-        raise OpenDriveError(msg) from error
+        root = read_xml(xodr, huge=True)
+    except LimitError:
+        raise
+    except InputError as error:
+        raise OpenDriveError(error.problem) from error
     entries: list[ReportEntry] = []
     count = sum(_limit_lanes(road, entries) for road in root.iter("{*}road"))
     if not count:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from odscen.base.errors import GraphFormatError
+from odscen.base.errors import GraphFormatError, InputError
 from odscen.base.ids import JunctionId, LaneKey, RoadId, Roadside, SumoEdgeId, SumoLaneId
+from odscen.base.stored_files import documents, read_json
 from odscen.convert.lane_table.mapping_intervals import MappingInterval
 from odscen.convert.lane_table.table import (
     VERSION,
@@ -36,11 +37,13 @@ def table_from_json(text: str | bytes) -> LaneTable:
     GraphFormatError
         If the text is not a lane table of this version.
     """
+    what = "a lane table"
     try:
-        return _from_data(json.loads(text))
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        msg = f"not a lane table: {type(error).__name__}: {error}"
-        raise GraphFormatError(msg) from error
+        data = read_json(text, what=what)
+        with documents(what):
+            return _from_data(data)
+    except InputError as error:
+        raise GraphFormatError(error.problem) from error
 
 
 def _to_data(table: LaneTable) -> dict[str, Any]:

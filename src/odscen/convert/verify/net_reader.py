@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from lxml import etree
 
 from odscen.base.errors import InputError
+from odscen.base.xml_reading import read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from lxml import etree
 
     from odscen.base.arrays import FloatArray
 
@@ -116,9 +118,8 @@ def read_net(content: bytes) -> NetFile:
     InputError
         If it is not a complete SUMO network.
     """
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+    root = read_xml(content, huge=True)
     try:
-        root = etree.fromstring(content, parser)
         lanes, edges = _lanes(root)
         return NetFile(
             left_hand=root.get("lefthand") == "true",
@@ -132,9 +133,8 @@ def read_net(content: bytes) -> NetFile:
                 for logic in root.iterfind("tlLogic")
             ),
         )
-    except (etree.XMLSyntaxError, LookupError, ValueError) as error:
-        words = getattr(error, "msg", error)
-        msg = f"the SUMO network cannot be read: {type(error).__name__}: {words}"
+    except (LookupError, ValueError) as error:
+        msg = f"the SUMO network cannot be read: {type(error).__name__}: {error}"
         raise InputError(msg) from error
 
 

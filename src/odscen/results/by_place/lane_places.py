@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import InputError
+from odscen.base.stored_files import documents, read_document
 
 if TYPE_CHECKING:
     import polars as pl
@@ -65,15 +65,12 @@ class LanePlaces:
         InputError
             If it is not such a document of this version.
         """
-        try:
-            data = json.loads(text)
-            if (data["format"], data["version"]) != (_FORMAT, _VERSION):
-                msg = f"format {data['format']!r} version {data['version']!r} is not known"
-                raise InputError(msg)
+        import polars as pl
+
+        what = "the places of lanes"
+        data = read_document(text, form=_FORMAT, version=_VERSION, what=what)
+        with documents(what, pl.exceptions.PolarsError):
             return cls.of(**{field.name: data[field.name] for field in fields(cls)})
-        except (KeyError, TypeError, ValueError) as error:
-            msg = f"not the places of lanes: {error!r}"
-            raise InputError(msg) from error
 
     @classmethod
     def of(cls, **tables: object) -> LanePlaces:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.base.stored_files import tables
 from odscen.results.measures.figure import Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
@@ -242,11 +243,28 @@ def write_signal_use(table: pl.DataFrame, folder: Path) -> None:
 
 
 def read_signal_use_table(file: Path) -> pl.DataFrame:
-    """Inverse of :func:`write_signal_use`."""
+    """Inverse of :func:`write_signal_use`.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read.
+    """
     import polars as pl
 
-    texts = dict.fromkeys(("junction", "group", "movements"), pl.String)
-    return pl.read_csv(file, schema_overrides=texts)
+    text, whole, decimal = pl.String, pl.Int64, pl.Float64
+    schema = {
+        **dict.fromkeys(("junction", "group", "movements"), text),
+        "greens": whole,
+        "green": decimal,
+        "mean_green": decimal,
+        "vehicles": whole,
+        "cycle_failures": whole,
+        "unused_green": decimal,
+    }
+    with tables(str(file)):
+        found = pl.read_csv(file, schema_overrides=schema)
+        return found.select(list(schema)).fill_nan(None)
 
 
 def _share(run: RunData, part: str, whole: str) -> float | None:

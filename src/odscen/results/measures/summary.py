@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.base.stored_files import typed_rows
 from odscen.results.records.outcomes import ActorStatus
 from odscen.results.records.run_records import (
     ACTORS_FORMAT,
@@ -247,11 +248,7 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
     InputError
         If it is not a list of actors of this version.
     """
-
-    def outcome(row: Mapping[str, Any]) -> ActorOutcome:
-        return ActorOutcome(**{**row, "status": ActorStatus(row["status"])})
-
-    return rows_from_json(text, "actors", ACTORS_FORMAT, outcome)
+    return rows_from_json(text, "actors", ACTORS_FORMAT, typed_rows(ActorOutcome))
 
 
 def summary_to_json(summary: Mapping[str, Any]) -> str:

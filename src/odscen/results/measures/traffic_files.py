@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from odscen.base.errors import InputError
+from odscen.base.stored_files import documents, read_document, tables
 from odscen.results.by_place.traffic import TABLES, TrafficFigures, over_run
 from odscen.results.measures.figure import Basis
 from odscen.results.measures.registry import COLUMN_UNITS, RUN_FIGURES, figure_values
@@ -34,25 +36,44 @@ def write_tables(figures: TrafficFigures, folder: Path) -> None:
 
 
 def read_tables(folder: Path) -> TrafficFigures | None:
-    """Inverse of :func:`write_tables`; ``None`` if the run has none."""
+    """Inverse of :func:`write_tables`; ``None`` if the run has none.
+
+    Raises
+    ------
+    InputError
+        If a table cannot be read.
+    """
     import polars as pl
 
     if not all((folder / f"{name}.csv").is_file() for name in TABLES):
         return None
-    tables = {}
+    found = {}
     for name in TABLES:
         file = folder / f"{name}.csv"
-        names = pl.scan_csv(file).collect_schema().names()
-        tables[name] = pl.read_csv(file, schema=_schema(names))
-    return TrafficFigures(**tables)
+        with tables(str(file)):
+            names = pl.scan_csv(file).collect_schema().names()
+            if "begin" not in names:
+                msg = "not a table of figures: there is no column 'begin'"
+                raise InputError(msg, file=str(file))
+            found[name] = pl.read_csv(file, schema=_schema(names))
+    return TrafficFigures(**found)
 
 
 def places_from_json(text: str, table: TableName) -> pl.DataFrame:
-    """One table of :func:`figures_json`: a row for each place, over the whole run."""
+    """One table of :func:`figures_json`: a row for each place, over the whole run.
+
+    Raises
+    ------
+    InputError
+        If the text is something else.
+    """
     import polars as pl
 
-    rows = json.loads(text)[table]
-    return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
+    what = "figures of a run"
+    data = read_document(text, form=FIGURES_FORMAT, version=VERSION, what=what)
+    with documents(what, pl.exceptions.PolarsError):
+        rows = data[table]
+        return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
 
 
 def _schema(names: Iterable[str]) -> dict[str, type[pl.DataType]]:

@@ -10,7 +10,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
-from odscen.base.errors import InputError
+from odscen.base.stored_files import documents, read_document
 
 _FORMAT = "odscen-signals"
 _VERSION = 1
@@ -165,15 +165,10 @@ def programs_from_json(text: str) -> tuple[LightProgram, ...]:
     InputError
         If it is not such a document of this version.
     """
-    try:
-        data = json.loads(text)
-        if (data["format"], data["version"]) != (_FORMAT, _VERSION):
-            msg = f"format {data['format']!r} version {data['version']!r} is not known"
-            raise InputError(msg)
+    what = "the programs of lights"
+    data = read_document(text, form=_FORMAT, version=_VERSION, what=what)
+    with documents(what):
         return tuple(_light(light) for light in data["lights"])
-    except (KeyError, TypeError, ValueError) as error:
-        msg = f"not the programs of lights: {error!r}"
-        raise InputError(msg) from error
 
 
 def _light(data: dict[str, object]) -> LightProgram:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import orjson
 
-from odscen.base.errors import InputError
+from odscen.base.stored_files import documents, read_document, typed_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -133,26 +133,17 @@ class Plan:
         InputError
             If it is not a plan of this version.
         """
-        try:
-            data = orjson.loads(text)
-            if (data["format"], data["version"]) != (PLAN_FORMAT, VERSION):
-                msg = f"format {data['format']!r} version {data['version']!r} is not a plan"
-                raise InputError(msg)
+        what = "a plan of a run"
+        data = read_document(text, form=PLAN_FORMAT, version=VERSION, what=what)
+        with documents(what):
             x, y = data["net_offset"]
-            return cls(
-                scenario=data["scenario"],
-                seed=data["seed"],
-                until=data["until"],
-                step_length=data["step_length"],
-                net_offset=(x, y),
-                actors=tuple(PlannedActor(**actor) for actor in data["actors"]),
-                elevation=data["elevation"],
-                slice_length=data.get("slice_length"),
-                trajectories=data.get("trajectories", True),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            msg = f"not a plan of a run: {error!r}"
-            raise InputError(msg) from error
+            data["net_offset"] = (float(x), float(y))
+            data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
+            return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
+
+
+_PLANNED_ACTOR = typed_rows(PlannedActor)
+_PLAN = typed_rows(Plan)
 
 
 class EventKind(StrEnum):
@@ -244,11 +235,7 @@ def events_from_json(text: str) -> tuple[Event, ...]:
     InputError
         If it is not a list of events of this version.
     """
-    return rows_from_json(text, "events", EVENTS_FORMAT, _event)
-
-
-def _event(row: Mapping[str, Any]) -> Event:
-    return Event(**{**row, "kind": EventKind(row["kind"])})
+    return rows_from_json(text, "events", EVENTS_FORMAT, typed_rows(Event))
 
 
 def json_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[Mapping[str, Any]]) -> str:
@@ -278,15 +265,10 @@ def rows_from_json(
     InputError
         If the text has another format or version, or rows that ``make`` cannot take.
     """
-    try:
-        data = orjson.loads(text)
-        if (data["format"], data["version"]) != (form, VERSION):
-            msg = f"format {data['format']!r} version {data['version']!r} is not a list of {key}"
-            raise InputError(msg)
+    what = f"a list of {key}"
+    data = read_document(text, form=form, version=VERSION, what=what)
+    with documents(what):
         return tuple(map(make, data[key]))
-    except (KeyError, TypeError, ValueError) as error:
-        msg = f"not a list of {key}: {error!r}"
-        raise InputError(msg) from error
 
 
 def text_with_rows(head: Mapping[str, Any], key: str, rows: Iterable[str]) -> Iterator[str]:

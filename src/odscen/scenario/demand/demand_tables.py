@@ -12,7 +12,7 @@ import re
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from odscen.base.errors import InputError
-from odscen.base.shown import shown
+from odscen.base.shown import printable, shown
 from odscen.scenario.demand.day_profiles import DAY
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class _TableLine:
         if not _NAME.fullmatch(self[column]):
             msg = (
                 f"{column} must be at most 64 letters from a to z, digits, '-', '_' and '.', not "
-                f"{self[column]!r}"
+                f"{shown(self[column])}"
             )
             raise InputError(msg, element=self.where)
         return self[column]
@@ -202,7 +202,8 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
     given = [name for name in optional if name in columns]
     if missing or unknown or (given and len(given) != len(optional)):
         listed = ", ".join(needed) + "".join(f" [, {name}]" for name in optional)
-        msg = f"the columns are {', '.join(columns) or 'missing'}; needed are {listed}"
+        names = printable(", ".join(columns)) or "missing"
+        msg = f"the columns are {names:.200}; needed are {listed}"
         raise InputError(msg, element="line 1")
     found = False
     for cells in rows:

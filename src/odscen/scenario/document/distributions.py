@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _Key = TypeVar("_Key")
 
+Drawn = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""A number that may be drawn: within what all fields of a scenario can be."""
 _RETRIES = 64
 """Draws outside ``low``..``high`` before a normal distribution is clipped instead."""
 
@@ -26,7 +28,7 @@ class Constant(Part):
     """Always ``value``."""
 
     kind: Literal["constant"] = "constant"
-    value: float
+    value: Drawn
 
     def draw(self, rng: np.random.Generator) -> float:  # noqa: ARG002 - same call as the others
         """Return the value."""
@@ -37,8 +39,8 @@ class Uniform(Part):
     """Any number from ``low`` to ``high``."""
 
     kind: Literal["uniform"] = "uniform"
-    low: float
-    high: float
+    low: Drawn
+    high: Drawn
 
     @model_validator(mode="after")
     def _ordered(self) -> Uniform:
@@ -54,10 +56,10 @@ class Normal(Part):
     """Normal distribution, drawn again while outside ``low`` to ``high``."""
 
     kind: Literal["normal"] = "normal"
-    mean: float
-    std: Annotated[float, Field(ge=0)]
-    low: float
-    high: float
+    mean: Drawn
+    std: Annotated[float, Field(ge=0, le=1e9)]
+    low: Drawn
+    high: Drawn
 
     @model_validator(mode="after")
     def _ordered(self) -> Normal:
@@ -77,7 +79,7 @@ class Choice(Part):
     """One of ``values``, each with its weight (equal if there are none)."""
 
     kind: Literal["choice"] = "choice"
-    values: Annotated[tuple[float, ...], Field(min_length=1)]
+    values: Annotated[tuple[Drawn, ...], Field(min_length=1)]
     weights: tuple[Annotated[float, Field(ge=0)], ...] | None = None
 
     @model_validator(mode="after")

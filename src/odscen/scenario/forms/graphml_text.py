@@ -11,7 +11,8 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape, quoteattr
 
-from odscen.base.errors import ScenarioError
+from odscen.base.errors import InputError, LimitError, ScenarioError
+from odscen.base.xml_reading import read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -105,13 +106,12 @@ def read_graphml(text: str) -> nx.MultiDiGraph:
 
 
 def _parse(text: str) -> etree._Element:
-    from lxml import etree
-
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
     try:
-        root = etree.fromstring(text.encode(), parser)
-    except (etree.XMLSyntaxError, UnicodeEncodeError) as error:
-        msg = f"not GraphML: {getattr(error, 'msg', error)}"
+        root = read_xml(text)
+    except LimitError:
+        raise
+    except InputError as error:
+        msg = f"not GraphML: {error.problem}"
         raise ScenarioError(msg) from error
     if root.getroottree().docinfo.internalDTD is not None:
         msg = "not GraphML: a document type declaration is not accepted"

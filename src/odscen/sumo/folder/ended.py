@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, in_file
+from odscen.base.stored_files import documents, read_json
+from odscen.results.records.outcomes import RunStatus
 from odscen.sumo.folder.layout import SUMMARY_FILE
 from odscen.sumo.folder.run_status import unfinished_words
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+_PARTS: dict[str, type | tuple[type, ...]] = {
+    "seed": int,
+    "scenario": str,
+    "map": str,
+    "map_sha256": str,
+    "actors": dict,
+    "figures": dict,
+    "files": dict,
+    "sim_seconds": (int, float),
+}
+"""What every run that did not fail says of itself, and of which type."""
 
 
 def read_summary(run: Path) -> dict[str, Any]:
@@ -28,10 +41,30 @@ def read_summary(run: Path) -> dict[str, Any]:
     if not file.is_file():
         msg = f"no finished run here: there is no {SUMMARY_FILE}"
         raise InputError(msg, file=str(run))
-    try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-        summary["status"], summary["seed"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        msg = f"not the summary of a run: {error!r}"
-        raise InputError(msg, file=str(file)) from error
-    return dict(summary)
+    what = "the summary of a run"
+    with in_file(str(file)):
+        try:
+            summary = read_json(file.read_bytes(), what=what)
+        except OSError as error:
+            msg = f"cannot be read: {error.strerror or error}"
+            raise InputError(msg) from error
+        with documents(what):
+            _check(summary)
+    return summary
+
+
+def _check(summary: dict[str, Any]) -> None:
+    """Raise a ValueError or KeyError for what no run writes."""
+    ended = RunStatus(summary["status"]) is not RunStatus.FAILED
+    for name, kinds in _PARTS.items():
+        value = summary[name] if ended or name == "seed" else summary.get(name)
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            if value is None and not ended:
+                continue
+            msg = f"{name} cannot be {value!r:.60}"
+            raise ValueError(msg)
+    for name in ("figures", "actors"):
+        for figure, value in (summary.get(name) or {}).items():
+            if not isinstance(value, int | float | None):
+                msg = f"{name} > {figure} cannot be {value!r:.60}"
+                raise ValueError(msg)

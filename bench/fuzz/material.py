@@ -1,0 +1,242 @@
+"""What is damaged: a workspace with a map, scenarios, runs, tables, a suite, made once."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.common import shared_maps
+from bench.fuzz.limits import Ended, Limits, kill_tree
+
+ROOT = Path(__file__).parents[2]
+CROSSING = "signal_crossing"
+SMALL = 100_000
+"""Bytes of the largest map that is damaged: the limits of time are for small maps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Files of which trials take copies; nothing here is changed after it was made."""
+
+    root: Path
+    map_files: tuple[Path, ...]
+
+    @property
+    def workspace(self) -> Path:
+        return self.root / "workspace"
+
+    @property
+    def scenario(self) -> Path:
+        """With cars, pedestrians, flows, demand of each kind and programs of lights."""
+        return self.root / "full.scenario.json"
+
+    def file(self, name: str) -> Path:
+        return self.root / name
+
+    def copy_workspace(self, folder: Path, *parts: str) -> Path:
+        """Copy parts of the workspace into the folder of a trial."""
+        made = folder / "workspace"
+        (made / "maps").mkdir(parents=True)
+        for part in parts:
+            shutil.copytree(self.workspace / part, made / part, dirs_exist_ok=True)
+        return made
+
+
+def prepare(root: Path, limits: Limits) -> Material:
+    """Make the material with the command line itself."""
+    root.mkdir(parents=True)
+    workspace = root / "workspace"
+    shipped = [
+        ROOT / "maps" / f"{name}.xodr"
+        for name in (
+            CROSSING,
+            "roundabout",
+            "motorway_weave",
+            "t_junction_signs",
+            "left_hand_crossing",
+        )
+    ]
+    real = shared_maps()
+    found = sorted((real / "esmini").glob("*.xodr")) if real else []
+    files = [path for path in (*shipped, *found) if path.stat().st_size <= SMALL]
+    material = Material(root, (*files, _full(root)))
+    used = ["--workspace", str(workspace)]
+    scenario = str(material.scenario)
+    _ok(limits, root, "maps", "add", str(shipped[0]), *used)
+    _ok(
+        limits,
+        root,
+        "generate",
+        "--map",
+        CROSSING,
+        "--seed",
+        "3",
+        "--fill",
+        "0.3",
+        "--out",
+        str(root / "made"),
+        *used,
+    )
+    (sampled,) = (root / "made").glob("*.scenario.json")
+    _tables(root)
+    shutil.copy(sampled, material.scenario)
+    _ok(
+        limits,
+        root,
+        "demand",
+        "import",
+        scenario,
+        "--od",
+        str(root / "od.csv"),
+        "--zones",
+        str(root / "zones.csv"),
+        "--profile",
+        str(root / "profile.csv"),
+        *used,
+    )
+    _ok(limits, root, "demand", "import", scenario, "--counts", str(root / "counts.csv"), *used)
+    _ok(limits, root, "demand", "add", scenario, "--per-km", "3", *used)
+    _ok(limits, root, "signals", "webster", scenario, *used)
+    _ok(limits, root, "signals", "export", scenario, "--out", str(root / "tll.add.xml"), *used)
+    _ok(limits, root, "signals", "import", scenario, str(root / "tll.add.xml"), *used)
+    _ok(limits, root, "export", str(sampled), "--to", "graphml", "--out", str(root), *used)
+    _ok(limits, root, "maps", "network", CROSSING, "--out", str(root / "net.net.xml"), *used)
+    (root / "config.toml").write_text(CONFIG, encoding="utf-8")
+    _runs(material, limits, sampled)
+    return material
+
+
+def _runs(material: Material, limits: Limits, sampled: Path) -> None:
+    """A finished run, one in slices that was interrupted, and a suite with its baseline."""
+    root, used = material.root, ["--workspace", str(material.workspace)]
+    shutil.copy(sampled, root / "done.scenario.json")
+    shutil.copy(sampled, root / "sliced.scenario.json")
+    runs = str(material.workspace / "runs")
+    _ok(
+        limits,
+        root,
+        "run",
+        str(root / "done.scenario.json"),
+        "--until",
+        "60",
+        "--out",
+        runs,
+        "--criticality",
+        *used,
+    )
+    interrupted = material.workspace / "runs" / "sliced"
+    pid = limits.start(
+        [
+            "run",
+            str(root / "sliced.scenario.json"),
+            "--until",
+            "6h",
+            "--slice",
+            "60",
+            "--out",
+            runs,
+            *used,
+        ],
+        root,
+    )
+    _wait_for(interrupted / "slices", pid)
+    limits.clean(0.0)
+    suite = root / "suite"
+    suite.mkdir()
+    shutil.copy(ROOT / "maps" / f"{CROSSING}.xodr", suite)
+    shutil.copy(sampled, suite / "one.scenario.json")
+    (suite / "suite.toml").write_text(SUITE, encoding="utf-8")
+    _ok(limits, root, "test", str(suite / "suite.toml"), "--update-baseline", *used)
+
+
+def _wait_for(slices: Path, pid: int) -> None:
+    """Kill a run once two slices are complete."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end and len(list(slices.glob("[0-9]*"))) < 2:
+        time.sleep(0.02)
+    kill_tree(pid)
+
+
+def _full(root: Path) -> Path:
+    from tests.opendrive.full import FULL
+
+    path = root / "every_element.xodr"
+    path.write_text(FULL, encoding="utf-8")
+    return path
+
+
+def _tables(root: Path) -> None:
+    """Tables of demand on the roads of the shipped crossing."""
+    tables = {
+        "zones": [("zone", "segment"), ("west", "r1"), ("east", "r2")],
+        "od": [("from", "to", "trips"), ("west", "east", "12"), ("r3", "west", "7.5")],
+        "counts": [
+            ("place", "begin", "end", "count"),
+            ("r1", "0", "900", "20"),
+            ("r2>j10001", "0", "900", "15"),
+        ],
+        "profile": [("share",), ("1",), ("3",), ("2",)],
+    }
+    for name, rows in tables.items():
+        with (root / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(rows)
+
+
+def _ok(limits: Limits, root: Path, *argv: str) -> Ended:
+    ended = limits.run(argv, root)
+    if ended.code:
+        msg = f"the material cannot be made: odscen {' '.join(argv)}: {ended.err}{ended.out}"
+        raise RuntimeError(msg)
+    return ended
+
+
+SUITE = """name = "one"
+scenarios = ["one.scenario.json"]
+maps = ["signal_crossing.xodr"]
+baselines = "baselines"
+seeds = [1]
+until = 20
+expect = ["arrived >= 0 %"]
+
+[tolerance]
+mean_delay = "10 % or 2 s"
+"""
+CONFIG = """fill = 0.2
+pedestrian_share = 0.1
+actors_max = 500
+ego = false
+duration = 600.0
+[maps]
+names = ["*"]
+weight_by = "road_length"
+[maps.where]
+junctions = { min = 1 }
+speed_limit_max = { max = 50.0 }
+[roi]
+segments = { kind = "uniform", low = 4, high = 16 }
+[environment.presets]
+ClearNoon = 3
+HardRainNight = 1
+[environment.parameters]
+fog_density = { kind = "uniform", low = 0, high = 30 }
+[vehicles]
+car = 0.8
+truck = 0.2
+[places]
+minimum_gap = 3.0
+minimum_trip = 20.0
+lane_types = []
+exclude_segments = []
+[places.speed_limit_max]
+bicycle = 17.0
+[behaviour]
+speed_factor = { kind = "normal", mean = 1.0, std = 0.1, low = 0.7, high = 1.2 }
+bicycle_speed = { kind = "choice", values = [4, 5], weights = [3, 1] }
+styles = { cautious = 0.25, normal = 0.55, sporty = 0.2 }
+depart = 0.0
+crosses_anywhere = 0.1
+ignores_red = 0.1
+"""

@@ -1,0 +1,54 @@
+"""Reading files that users name: regular files of a sensible size only."""
+
+from __future__ import annotations
+
+import stat
+from typing import TYPE_CHECKING
+
+from odscen.base.errors import InputError
+from odscen.base.shown import printable
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MOST = 256_000_000
+"""Bytes; a scenario of 200,000 actors has a fifth of it."""
+
+
+def read_given(file: Path, *, most: int = MOST) -> bytes:
+    """Content of a file.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file (a pipe or device might never end), has more than ``most`` bytes,
+        or cannot be read.
+    """
+    try:
+        found = file.stat()
+        if not stat.S_ISREG(found.st_mode):
+            what = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe, device or socket"
+            msg = f"this is {what}, not a regular file"
+            raise InputError(msg, file=printable(str(file)))
+        if found.st_size > most:
+            msg = f"the file has {found.st_size} bytes; the limit is {most}"
+            raise InputError(msg, file=printable(str(file)))
+        return file.read_bytes()
+    except (OSError, ValueError) as error:  # a name with a NUL is a ValueError
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(reason, file=printable(str(file))) from error
+
+
+def read_given_text(file: Path) -> str:
+    """Content of a text file in UTF-8.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_given`, and if it is no such text.
+    """
+    try:
+        return read_given(file).decode("utf-8")
+    except UnicodeDecodeError as error:
+        msg = f"not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}"
+        raise InputError(msg, file=printable(str(file))) from error
