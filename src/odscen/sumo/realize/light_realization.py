@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING
 
-from odscen.convert.model.net import STAGE
 from odscen.results.records.light_programs import (
     LightProgram,
     ProgramPhase,
@@ -41,6 +40,7 @@ from odscen.sumo.realize.stage_phases import (
     bus_phases,
     calling_crossings,
     kept_cycle,
+    kept_phases,
     plan_phases,
     started_offset,
 )
@@ -62,6 +62,9 @@ TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
 
 CONTROL_PARAM = "odscen.control"
 """Parameter that says whether the program is meant to be fixed-time or actuated."""
+
+STAGES_PARAM, MAP_STAGES = "odscen.stages", "map"
+"""Parameter of a program that calls the stages of the map, and its value."""
 
 GROUP_PARAM = "odscen.group."
 """How parameters begin that name signal groups; their values are places in the states."""
@@ -149,16 +152,7 @@ class _Realizing:
     def kept(self) -> RealizedLight:
         """The network's stages, perhaps with other greens, offset or control."""
         light, timing = self._light, self._timing
-        stages = sum(phase.is_stage for phase in light.phases)
-        # Times for other stages are those of a network that the map had before.
-        greens = iter(timing.green if len(timing.green) == stages else ())
-        phases = []
-        for phase in light.phases:
-            stage = phase.name.removeprefix(STAGE) if phase.is_stage else ""
-            seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
-            least = min(phase.least, seconds)
-            most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
-            phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
+        phases = kept_phases(light, timing.green)
         offset = timing.offset or light.offset
         changed = [p.seconds for p in phases] != [p.duration for p in light.phases]
         loops: tuple[PlacedLoop, ...] = ()
@@ -181,9 +175,9 @@ class _Realizing:
         if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
-        program = SumoProgram(
-            ONLY_PLAN, kind, started_offset(plan, offset), plan, conditions, self._params(loops)
-        )
+        params = self._params(loops) | ({} if called is None else {STAGES_PARAM: MAP_STAGES})
+        start = started_offset(plan, offset)
+        program = SumoProgram(ONLY_PLAN, kind, start, plan, conditions, params)
         return RealizedLight(shown, (program,), loops, buses=self._buses, areas=areas)
 
     def _called(self, phases: Sequence[SumoPhase]) -> CalledLight | None:

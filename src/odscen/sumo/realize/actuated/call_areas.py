@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.signals.light import Light
     from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
 
 STUCK = 20.0
 """Seconds of standing at a green that gives way, after which a vehicle needs another stage."""
+
+
+SEEN = 20.0
+"""Metres before the stop line of a lane without a loop in which a vehicle calls."""
 
 
 class CallArea(NamedTuple):
@@ -33,16 +39,19 @@ class CallArea(NamedTuple):
     length: float
 
 
-def call_areas(light: str, loops: Iterable[PlacedLoop]) -> tuple[CallArea, ...]:
-    """One for each lane of vehicles that has a loop, as long as the farthest loop is away."""
-    lanes: dict[str, tuple[float, set[int]]] = {}
+def call_areas(light: SumoLight, view: Light, loops: Iterable[PlacedLoop]) -> tuple[CallArea, ...]:
+    """One in each lane of vehicles, from its farthest loop on; all lanes call, loop or not."""
+    lengths = dict[str, float]()
     for loop in loops:
         if not loop.walk:
-            length, movements = lanes.get(loop.before, (loop.length, set[int]()))
-            lanes[loop.before] = max(length, loop.ahead), movements | set(loop.movements)
+            lengths[loop.before] = max(lengths.get(loop.before, loop.length), loop.ahead)
+    lanes = dict[str, list[int]]()
+    for n, one in enumerate(view.movements):
+        if one.drive:
+            lanes.setdefault(light.links[n].source, []).append(n)
     return tuple(
-        CallArea(f"{light}.area.{number}", lane, tuple(sorted(movements)), length)
-        for number, (lane, (length, movements)) in enumerate(lanes.items())
+        CallArea(f"{light.id}.area.{number}", lane, tuple(own), lengths.get(lane, SEEN))
+        for number, (lane, own) in enumerate(lanes.items())
     )
 
 

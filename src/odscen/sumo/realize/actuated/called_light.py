@@ -59,8 +59,8 @@ def called_light(
 
     Returns
     -------
-    ``None`` where there is nothing to choose: fewer than two stages, or none that vehicles prolong,
-    or movements of which is not known where they meet.
+    ``None`` where there is nothing to choose: fewer than two stages, one for vehicles that none
+    prolong, or movements of which is not known where they meet.
     """
     green = {p.stage: _green(p.state) for p in phases if p.stage}
     variants = StageVariants(phases, view)
@@ -82,7 +82,7 @@ def called_light(
         return None
     walks = {n for n, one in enumerate(view.movements) if one.walk}
     places = waiting_places(light, net, {name: own & walks for name, own in green.items()})
-    areas = call_areas(light.id, loops)
+    areas = call_areas(light, view, loops)
     callers = Callers(areas, places, buses)
     plan = called_phases(variants, callers, ends=ends, conditions=conditions)
     return CalledLight(plan, (*loops, *places), areas, conditions)
