@@ -33,6 +33,8 @@ from odscen.scenario import edits
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.edits.edited_parts import changed_part, with_fields
 from odscen.scenario.signals.webster import LONGEST_CYCLE, whole_seconds
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -53,6 +55,8 @@ LEVELS = (0.4, 0.5, 0.6, 0.7, 0.8)
 MAJOR = 4.0
 """Vehicles on each leg of the main road for one on each leg of the side road."""
 
+
+SETTINGS = RunSettings(recording=Recording(trajectories=False, emissions=False))
 
 CLOSE = 5.0
 """Vehicles an hour to which capacity is found."""
@@ -171,7 +175,7 @@ class _Bench:
 
     def _run(self, scenario: Scenario) -> Delays:
         self._runs += 1
-        done = run(self._workspace, scenario, name=f"run{self._runs}")
+        done = run(self._workspace, scenario, name=f"run{self._runs}", settings=SETTINGS)
         plan = json.loads((done.folder / "plan.json").read_text())
         kinds = {actor["id"]: actor["category"] for actor in plan["actors"]}
         planned = {actor["id"]: actor["depart"] for actor in plan["actors"]}

@@ -84,7 +84,13 @@ def first_stage_at(program: FileProgram) -> float:
 
 
 def main_phases(program: FileProgram) -> list[int]:
-    """Phases of one cycle in which every stage comes: of several ways the first."""
+    """Phases of one cycle in which every stage comes: of several ways the first.
+
+    Raises
+    ------
+    InputError
+        If it does not come back to its first phase.
+    """
     order, at = [], 0
     while at not in order:
         order.append(at)
