@@ -11,6 +11,7 @@ reaches what the longest cycle can carry, 1 - L / 120 s.
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import statistics
@@ -51,6 +52,9 @@ T_FOUR = 2.776
 
 LEVELS = (0.4, 0.5, 0.6, 0.7, 0.8)
 """Fractions of capacity."""
+
+BUS_LEVELS = (0.4, 0.6)
+"""Of them those with buses."""
 
 MAJOR = 4.0
 """Vehicles on each leg of the main road for one on each leg of the side road."""
@@ -136,10 +140,11 @@ class _Bench:
             )
 
     def buses(self) -> None:
-        level = LEVELS[2]
-        for control in ("fixed", "actuated"):
+        for level, control in itertools.product(BUS_LEVELS, ("fixed", "actuated")):
 
-            def made(seed: int, asked: bool, control: str = control) -> Scenario:
+            def made(
+                seed: int, asked: bool, level: float = level, control: str = control
+            ) -> Scenario:
                 timed = self._timed(self._crossing(seed, level, buses=0.1))
                 changes = {"control": control, "bus_priority": asked}
                 return with_fields(timed, signals=changed_part(timed.signals, changes))
