@@ -21,10 +21,14 @@ from odscen.scenario.document.scenario_document import Demand
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.scenario.signals.light import Light
 from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.run_settings import RunSettings
 from odscen.sumo.realize.sumo_map import SumoMap
+from odscen.sumo.runner.prepare import prepare
+from odscen.sumo.runner.run_jobs import run_prepared
 
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.folder.finished_run import Run
 
 ROOT = Path(__file__).parents[1]
 MAP = ROOT / "maps" / "signal_crossing.xodr"
@@ -101,6 +105,22 @@ def scenario(
     demand = Demand(clock=clock)
     simulation = one.simulation.model_copy(update={"duration": until})
     return one.model_copy(update={"signals": signals, "demand": demand, "simulation": simulation})
+
+
+def carried_out(
+    one: Scenario, folder: Path, *, sumo_map: SumoMap | None = None, **settings: object
+) -> Run:
+    """Run a scenario on the crossing (or with other lights on it), to its end."""
+    folder.mkdir(exist_ok=True)
+    prepared = prepare(
+        one,
+        sumo_map or crossing().sumo,
+        crossing().net(folder),
+        settings=RunSettings(**settings),  # type: ignore[arg-type]
+    )
+    done = run_prepared(prepared, folder / "run")
+    assert done.status == "completed"
+    return done
 
 
 def entries() -> list[str]:

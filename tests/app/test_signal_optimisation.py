@@ -45,6 +45,22 @@ def test_volumes_are_those_of_the_vehicles_of_a_run(workspace: Workspace) -> Non
     assert sum(m.vehicles for m in light.movements) == pytest.approx(36 * inside)
 
 
+def test_turns_through_gaps_wait_for_the_queue_that_comes_towards_them(
+    workspace: Workspace,
+) -> None:
+    (light,) = time_signals(workspace, placed(workspace, scenario(None, vehicles=500.0))).lights
+    loads = {lane.load.lane: lane.load for lane in light.lanes}
+    left = next(one for one in loads.values() if one.turns == ("left",) and "1.0" in one.lane)
+    queue = max(one.ratio for one in loads.values() if one.lane.startswith("3.") and one != left
+                and one.turns != ("left",))  # fmt: skip
+    gaps = left.volume / left.saturation
+    assert queue > 0.05
+    assert left.blocked == pytest.approx(queue)
+    assert left.ratio == pytest.approx(queue + (1.0 - queue) * gaps)
+    assert light.splits.ratios[0] >= left.ratio
+    assert all(one.blocked == 0.0 for one in loads.values() if one.turns != ("left",))
+
+
 def test_greens_of_the_map_and_of_a_program_are_replaced_and_add_up(workspace: Workspace) -> None:
     for junction in (None, one_plan(cycle=None, on_call=None)):
         one = placed(workspace, scenario(junction, vehicles=500.0))

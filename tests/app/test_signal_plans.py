@@ -117,6 +117,29 @@ def test_groups_stages_calls_detectors_and_plans_come_back_as_they_were(
     assert timing.plans[0].offset == 12.0
 
 
+@pytest.mark.parametrize(
+    "own",
+    [
+        {},
+        {"green": [20.0, 9.0], "offset": 12.0},
+        {
+            "detectors": [
+                {"id": "D1", "at": "r1", "before": 25.0, "stages": ["1"], "gap": 2.5},
+                {"id": "D2", "at": "r2", "before": 25.0, "stages": ["2"]},
+            ]
+        },
+        {"bus_priority": True},
+    ],
+)
+def test_an_actuated_light_with_the_stages_of_the_map_comes_back_as_it_was(
+    workspace: Workspace, tmp_path: Path, own: dict[str, object]
+) -> None:
+    one = placed(workspace, scenario({"junction": "10001", "control": "actuated", **own}))
+    back = taken(workspace, one, tmp_path)
+    assert back.signals.junctions == one.signals.junctions
+    assert export_signals(workspace, back) == export_signals(workspace, one)
+
+
 def test_the_program_of_the_network_becomes_one_of_stages(workspace: Workspace) -> None:
     """Where vehicles begin before the crossings, they have a short stage of their own."""
     one = placed(workspace, scenario(None))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
+from odscen.interchange.tll_called import called_timing
 from odscen.interchange.tll_loops import taken_detectors
 from odscen.interchange.tll_stages import (
     file_stages,
@@ -28,7 +29,12 @@ from odscen.scenario.signals.stage_sequence import (
     change_steps,
     stage_state,
 )
-from odscen.sumo.realize.light_realization import CONTROL_PARAM, GROUP_PARAM
+from odscen.sumo.realize.light_realization import (
+    CONTROL_PARAM,
+    GROUP_PARAM,
+    MAP_STAGES,
+    STAGES_PARAM,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -66,6 +72,8 @@ def taken_timing(
                 f"has {len(light.movements)} links; it is of another network"
             )
             raise InputError(msg)
+    if plans[-1].program.params.get(STAGES_PARAM) == MAP_STAGES:
+        return called_timing(light, plans[-1].program, loops or {}), ()
     return _Taking(light, plans, loops or {}).timing()
 
 

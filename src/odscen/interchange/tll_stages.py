@@ -14,8 +14,11 @@ if TYPE_CHECKING:
 
     from odscen.interchange.tll_file import FileProgram
 
-_STAGE = re.compile(r"stage\s+([A-Za-z0-9][A-Za-z0-9_.-]*)$")
-_GAP = re.compile(r"z:(\S+) > ([0-9.]+)")
+STAGE_NAME = re.compile(r"stage\s+([A-Za-z0-9][A-Za-z0-9_.-]*)$")
+"""Name of the phase of a stage; its id."""
+
+GAP = re.compile(r"z:(\S+) > ([0-9.]+)")
+"""A loop of a condition, and the seconds without vehicles that it asks for."""
 
 
 @dataclass(slots=True)
@@ -71,7 +74,7 @@ def joined_steps(steps: Sequence[FilePhase]) -> list[FilePhase]:
 
 def first_stage_at(program: FileProgram) -> float:
     """Seconds in the file's cycle before its first stage."""
-    order = _main(program)
+    order = main_phases(program)
     lead = 0.0
     for at, before in zip(order, (order[-1], *order), strict=False):
         if _begins(program.phases[before].state, program.phases[at].state):
@@ -80,8 +83,14 @@ def first_stage_at(program: FileProgram) -> float:
     return 0.0
 
 
-def _main(program: FileProgram) -> list[int]:
-    """Phases of one cycle in which every stage comes: of several ways the first."""
+def main_phases(program: FileProgram) -> list[int]:
+    """Phases of one cycle in which every stage comes: of several ways the first.
+
+    Raises
+    ------
+    InputError
+        If it does not come back to its first phase.
+    """
     order, at = [], 0
     while at not in order:
         order.append(at)
@@ -109,7 +118,7 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     InputError
         If nothing begins in it, or it does not come back to its first phase.
     """
-    order = _main(program)
+    order = main_phases(program)
     phases = [program.phases[n] for n in order]
     states = [phase.state for phase in phases]
     firsts = [n for n in range(len(phases)) if _begins(states[n - 1], states[n])]
@@ -123,7 +132,7 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     for n in turned:
         phase = phases[n]
         if n in firsts:
-            named = _STAGE.search(phase.name)
+            named = STAGE_NAME.search(phase.name)
             stages.append(
                 FileStage(
                     named[1] if named else "",
@@ -154,7 +163,7 @@ def _gaps(program: FileProgram, at: int) -> dict[str, float]:
     """Loops whose gaps let a phase come, and the seconds."""
     words = program.phases[at].early.split()
     text = " ".join(program.conditions.get(word, word) for word in words)
-    return {name: float(gap) for name, gap in _GAP.findall(text)}
+    return {name: float(gap) for name, gap in GAP.findall(text)}
 
 
 def _called(program: FileProgram, order: Sequence[int], n: int) -> bool:

@@ -143,3 +143,15 @@ def test_a_program_with_errors_is_refused_before_anything_is_written() -> None:
 def test_old_timings_and_programs_cannot_be_mixed() -> None:
     with pytest.raises(ValueError, match="give the green in the stages"):
         problems(one_plan(green=[20, 20]))
+
+
+def test_an_offset_that_buses_undo_is_warned_of() -> None:
+    own = {"junction": "10001", "offset": 12, "bus_priority": True}
+    problem = only(problems(own))
+    assert (problem.code, problem.severity) == ("offset_lost_to_buses", "warning")
+    assert problem.where == "signals.junctions[0].bus_priority"
+    assert "offset of 12 s" in problem.message
+    assert problems({**own, "offset": 0}) == []
+    assert problems({**own, "bus_priority": False}) == []
+    kept = one_plan(control="actuated", cycle=84, offset=12, bus_priority=True)
+    assert problems(kept) == []

@@ -10,31 +10,12 @@ import pytest
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_calls, read_light_states
-from odscen.sumo.realize.run_settings import RunSettings
-from odscen.sumo.runner.prepare import prepare
-from odscen.sumo.runner.run_jobs import run_prepared
-from tests.signal_case import crossing, light, program, scenario, timing
+from tests.signal_case import carried_out, light, program, scenario, timing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.folder.finished_run import Run
-
 EVENING = 18.5 * 3600.0 - 200.0
-
-
-def carried_out(one: Scenario, folder: Path, **settings: object) -> Run:
-    folder.mkdir()
-    prepared = prepare(
-        one,
-        crossing().sumo,
-        crossing().net(folder),
-        settings=RunSettings(**settings),  # type: ignore[arg-type]
-    )
-    done = run_prepared(prepared, folder / "run")
-    assert done.status == "completed"
-    return done
 
 
 def stages(states: pl.DataFrame) -> list[tuple[str, float]]:

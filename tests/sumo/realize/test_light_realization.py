@@ -147,6 +147,29 @@ def test_an_actuated_program_with_a_cycle_keeps_to_it(tmp_path: Path) -> None:
     assert len({one.seconds for one in seen if one.name == "stage 3"}) > 1
 
 
+def test_a_left_turn_through_gaps_is_protected_in_the_stage_behind(tmp_path: Path) -> None:
+    seen = shown(tmp_path, scenario(without_call(), walkers=0.0))
+    movements = light().movements
+    left, oncoming = (
+        next(n for n, one in enumerate(movements) if one.approach == leg and one.turn == turn)
+        for leg, turn in (("r1", "left"), ("r3", "straight"))
+    )
+    parts = [
+        (key, sum(one.seconds for one in same))
+        for key, same in groupby(seen, lambda one: (one.state[left], one.state[oncoming]))
+    ]
+    # A whole cycle: through gaps, while oncoming traffic clears, by the arrow.
+    start = next(n for n, (key, _) in enumerate(parts) if key == ("g", "G"))
+    assert parts[start][1] >= 20.0  # and pedestrian clearance
+    assert [key[0] + key[1] for key, _ in parts[start : start + 6]] == [
+        "gG", "gy", "gr", "Gr", "yr", "rr",
+    ]  # fmt: skip
+    assert parts[start + 3][1] == 6.0
+    clearing = light().clearing(oncoming, left)
+    assert clearing is not None
+    assert parts[start + 1][1] + parts[start + 2][1] >= movements[oncoming].yellow + clearing
+
+
 def test_plans_of_the_day_take_over_in_the_first_stage_and_fall_in_step(tmp_path: Path) -> None:
     seen = shown(tmp_path, scenario(program(), clock=18.5 * 3600 - 200))
     assert [name for name, _ in groupby(one.program for one in seen)] == ["day", "evening"]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from odscen.scenario.document.problems import Problem
-    from odscen.scenario.document.signals_document import JunctionTiming, Signals
+    from odscen.scenario.document.signals_document import Control, JunctionTiming, Signals
     from odscen.scenario.signals.light import Light
 
 LEAST_GREEN = 5.0
@@ -53,13 +53,27 @@ def signal_problems(
         control = timing.control or signals.control
         yield from program_problems(timing, light, control, where, clock=clock, until=until)
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
-        if asked and timing.stages and control == "fixed":
-            message = (
-                f"the light of junction {timing.junction!r} has a fixed-time program of its own, "
-                "which buses cannot change; make its control actuated or its bus_priority false"
-            )
-            yield error("bus_priority_needs_actuation", f"{where}.bus_priority", message)
+        if asked:
+            yield from _priority_problems(timing, control, where)
     yield from _coordination_problems(signals)
+
+
+def _priority_problems(timing: JunctionTiming, control: Control, where: str) -> Iterator[Problem]:
+    """Buses at a program that they cannot change, or whose offset they undo."""
+    if timing.stages and control == "fixed":
+        message = (
+            f"the light of junction {timing.junction!r} has a fixed-time program of its own, "
+            "which buses cannot change; make its control actuated or its bus_priority false"
+        )
+        yield error("bus_priority_needs_actuation", f"{where}.bus_priority", message)
+    elif timing.offset and not timing.stages:
+        message = (
+            f"the light of junction {timing.junction!r} has an offset of {timing.offset:g} s, but "
+            "does not come back to it after a bus that has priority: in a green wave make its "
+            "bus_priority false, or give it an actuated program of its own with a cycle, which "
+            "it keeps to"
+        )
+        yield warning("offset_lost_to_buses", f"{where}.bus_priority", message)
 
 
 def _green_problems(timing: JunctionTiming, light: Light, where: str) -> Iterator[Problem]:

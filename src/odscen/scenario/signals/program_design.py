@@ -72,15 +72,26 @@ class DesignedProgram:
     ----------
     control
         Of the light, after what the scenario says of all.
+    groups
+        Groups by their ids, in place of those of ``timing``.
     """
 
-    def __init__(self, timing: JunctionTiming, light: Light, control: Control) -> None:
+    def __init__(
+        self,
+        timing: JunctionTiming,
+        light: Light,
+        control: Control,
+        *,
+        groups: Mapping[str, DesignedGroup] | None = None,
+    ) -> None:
         self.timing = timing
         self.light = light
         self.control = control
-        self.groups: Mapping[str, DesignedGroup] = {
-            group.id: designed_group(group, light) for group in timing.groups
-        }
+        self.groups: Mapping[str, DesignedGroup] = (
+            {group.id: designed_group(group, light) for group in timing.groups}
+            if groups is None
+            else groups
+        )
         self.group_of = {n: g.id for g in self.groups.values() for n in g.movements}
         self._given = {(one, other): s for one, other, s in timing.intergreens}
 

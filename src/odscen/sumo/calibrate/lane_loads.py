@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.scenario.signals.webster import (
@@ -53,6 +53,9 @@ class LaneLoad:
         Vehicles an hour of green that it carries with these turns and vehicles.
     links
         Places in the light's states of the movements that use it.
+    blocked
+        Flow ratio of the oncoming queue that its permissive turns wait for: as long as that moves
+        off, there are no gaps (HCM, permitted left turns: unsaturated green).
     """
 
     lane: str
@@ -60,11 +63,12 @@ class LaneLoad:
     volume: float
     saturation: float
     links: tuple[int, ...]
+    blocked: float = 0.0
 
     @property
     def ratio(self) -> float:
-        """Flow ratio."""
-        return self.volume / self.saturation
+        """Flow ratio: share of the cycle that it needs as green."""
+        return self.blocked + (1.0 - self.blocked) * self.volume / self.saturation
 
     def green(self, phases: Sequence[ProgramPhase]) -> float:
         """Seconds of a cycle in which all movements that use it have green."""
@@ -143,14 +147,22 @@ class LightDemand:
                 work[lane] += volume.vehicles / _SHARES * needs[n]
                 cars[lane] += volume.vehicles / _SHARES
                 links[lane].add(n)
-        return tuple(
+        loads = [
             LaneLoad(
                 self._view.movements[min(links[lane])].lanes[0],
                 tuple(dict.fromkeys(self._view.movements[n].turn for n in sorted(links[lane]))),
                 cars[lane], cars[lane] / work[lane], tuple(sorted(links[lane])),
             )
             for lane in sorted(cars, key=lambda lane: min(links[lane]))
-        )  # fmt: skip
+        ]  # fmt: skip
+        return tuple(replace(load, blocked=self._blocked(load, loads)) for load in loads)
+
+    def _blocked(self, load: LaneLoad, loads: Sequence[LaneLoad]) -> float:
+        """Flow ratio of the queue that a lane of permissive turns alone waits for."""
+        if not all(self._permissive(n) for n in load.links):
+            return 0.0
+        before = {other for n in load.links for other in self._given_way(n)}
+        return max((one.ratio for one in loads if before & set(one.links)), default=0.0)
 
     def _equivalent(self, link: int) -> float:
         turn = self._view.movements[link].turn
@@ -158,21 +170,31 @@ class LightDemand:
             return 1.0
         if turn == self._near_side:
             return RIGHT_TURN
-        letters = {phase.state[link] for phase in self._phases if phase.stage}
-        if "G" in letters or "g" not in letters:
+        if not self._permissive(link):
             return PROTECTED_LEFT
         return left_turn_equivalent(self._opposing(link), self._base)
 
-    def _opposing(self, link: int) -> float:
-        """Vehicles an hour that a permissive movement gives way to while both have green."""
+    def _permissive(self, link: int) -> bool:
+        """Whether a turn across has the green that gives way in all of its stages."""
+        turn = self._view.movements[link].turn
+        letters = {phase.state[link] for phase in self._phases if phase.stage}
+        return turn not in {"straight", self._near_side} and "g" in letters and "G" not in letters
+
+    def _given_way(self, link: int) -> set[int]:
+        """Movements that have green together with one that gives way to them."""
         greens = [phase.state for phase in self._phases if phase.stage and phase.state[link] == "g"]
         before = {
             meeting.other if meeting.one == link else meeting.one
             for meeting in self._view.meetings
             if meeting.yields == link
         }
+        return {n for n in before if any(state[n] in "Gg" for state in greens)}
+
+    def _opposing(self, link: int) -> float:
+        """Vehicles an hour that a permissive movement gives way to while both have green."""
+        before = self._given_way(link)
         return sum(
             self._volumes[turn].vehicles
             for turn, links in self._turns.items()
-            if any(n in before and state[n] in "Gg" for n in links for state in greens)
+            if before & set(links)
         )

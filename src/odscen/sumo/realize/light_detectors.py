@@ -117,6 +117,17 @@ def bus_in(areas: Iterable[BusArea], green: set[int]) -> tuple[str, str]:
     return " or ".join(own) or "0", " or ".join(other) or "0"
 
 
+def ended_with_buses(ended: str, areas: Sequence[BusArea], green: set[int]) -> str:
+    """SUMO's expression for: a stage ends, but not for a bus to it, and sooner for one elsewhere.
+
+    ``ended`` is the one without buses, which is returned where there are no areas.
+    """
+    if not areas:
+        return ended
+    own, other = bus_in(areas, green)
+    return f"(({ended}) or ({other})) and (({own}) < 1)"
+
+
 def vehicle_loops(
     light: SumoLight,
     view: Light,

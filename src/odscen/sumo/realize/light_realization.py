@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import TYPE_CHECKING
 
-from odscen.convert.model.net import STAGE
 from odscen.results.records.light_programs import (
     LightProgram,
     ProgramPhase,
@@ -22,10 +21,11 @@ from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.plan_times import active_plans
 from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
+from odscen.sumo.realize.actuated.called_light import called_light
 from odscen.sumo.realize.light_detectors import (
     bus_areas,
-    bus_in,
     called,
+    ended_with_buses,
     idle_loop,
     idle_loops,
     may_end,
@@ -39,6 +39,7 @@ from odscen.sumo.realize.stage_phases import (
     bus_phases,
     calling_crossings,
     kept_cycle,
+    kept_phases,
     plan_phases,
     started_offset,
 )
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import Control
     from odscen.scenario.signals.light import Light
+    from odscen.sumo.realize.actuated.call_areas import CallArea
+    from odscen.sumo.realize.actuated.called_light import CalledLight
     from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 
@@ -58,6 +61,9 @@ TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
 
 CONTROL_PARAM = "odscen.control"
 """Parameter that says whether the program is meant to be fixed-time or actuated."""
+
+STAGES_PARAM, MAP_STAGES = "odscen.stages", "map"
+"""Parameter of a program that calls the stages of the map, and its value."""
 
 GROUP_PARAM = "odscen.group."
 """How parameters begin that name signal groups; their values are places in the states."""
@@ -87,6 +93,7 @@ class RealizedLight:
     loops: tuple[PlacedLoop, ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
     buses: tuple[BusArea, ...] = ()
+    areas: tuple[CallArea, ...] = ()
 
     @property
     def watched(self) -> bool:
@@ -145,24 +152,19 @@ class _Realizing:
     def kept(self) -> RealizedLight:
         """The network's stages, perhaps with other greens, offset or control."""
         light, timing = self._light, self._timing
-        stages = sum(phase.is_stage for phase in light.phases)
-        # Times for other stages are those of a network that the map had before.
-        greens = iter(timing.green if len(timing.green) == stages else ())
-        phases = []
-        for phase in light.phases:
-            stage = phase.name.removeprefix(STAGE) if phase.is_stage else ""
-            seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
-            least = min(phase.least, seconds)
-            most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
-            phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
+        phases = kept_phases(light, timing.green)
         offset = timing.offset or light.offset
         changed = [p.seconds for p in phases] != [p.duration for p in light.phases]
         loops: tuple[PlacedLoop, ...] = ()
+        areas: tuple[CallArea, ...] = ()
         conditions: dict[str, str] = {}
-        if self._control == "actuated":
+        called = self._called(phases) if self._control == "actuated" else None
+        if called is not None:
+            loops, areas, conditions = called.loops, called.areas, dict(called.conditions)
+        elif self._control == "actuated":
             loops = self._loops({p.stage: p for p in phases if p.prolonged})
             phases = self._ending(phases, loops, conditions)
-        plan = PhasePlan(tuple(phases), len(phases))
+        plan = PhasePlan(tuple(phases), len(phases)) if called is None else called.plan
         if self._buses and self._control == "fixed":
             plan = bus_phases(plan, {p.stage: _green(p.state) for p in phases}, self._buses,
                               conditions)  # fmt: skip
@@ -173,10 +175,17 @@ class _Realizing:
         if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
-        program = SumoProgram(
-            ONLY_PLAN, kind, started_offset(plan, offset), plan, conditions, self._params(loops)
-        )
-        return RealizedLight(shown, (program,), loops, buses=self._buses)
+        params = self._params(loops) | ({} if called is None else {STAGES_PARAM: MAP_STAGES})
+        start = started_offset(plan, offset)
+        program = SumoProgram(ONLY_PLAN, kind, start, plan, conditions, params)
+        return RealizedLight(shown, (program,), loops, buses=self._buses, areas=areas)
+
+    def _called(self, phases: Sequence[SumoPhase]) -> CalledLight | None:
+        """The map's stages, which vehicles and people call, where there is a choice."""
+        return called_light(
+            self._light, self._view, self._net, phases, detectors=self._timing.detectors,
+            buses=self._buses,
+        )  # fmt: skip
 
     def _ending(
         self, phases: Sequence[SumoPhase], loops: Sequence[PlacedLoop], conditions: dict[str, str]
@@ -191,17 +200,10 @@ class _Realizing:
                 result[index] = replace(result[index], least=0.0, most=0.0)
                 continue
             name = f"end{phase.stage}"
-            conditions[name] = self._with_buses(expression, _green(phase.state))
+            conditions[name] = ended_with_buses(expression, self._buses, _green(phase.state))
             after = (index + 1) % len(phases)
             result[after] = replace(result[after], early=name, final="1")
         return result
-
-    def _with_buses(self, ended: str, green: set[int]) -> str:
-        """When a prolonged stage ends: not for a bus that comes to it, but for one elsewhere."""
-        if not self._buses:
-            return ended
-        own, other = bus_in(self._buses, green)
-        return f"(({ended}) or ({other})) and (({own}) < 1)"
 
     def designed(self, clock: float, until: float) -> RealizedLight:
         """A program of the scenario."""
@@ -253,7 +255,7 @@ class _Realizing:
             expression = may_end(loops, stage.id, green)
             if self._control == "actuated" and expression and stage.most > stage.least:
                 ends[stage.id] = f"end{stage.id}"
-                conditions[ends[stage.id]] = self._with_buses(expression, green)
+                conditions[ends[stage.id]] = ended_with_buses(expression, self._buses, green)
             if stage.on_call:
                 calls[stage.id] = f"call{stage.id}"
                 conditions[calls[stage.id]] = called(loops, stage.id)

@@ -10,6 +10,7 @@ from odscen.sumo.realize.light_detectors import BUS_AREA
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from odscen.sumo.realize.actuated.call_areas import CallArea
     from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
     from odscen.sumo.realize.stage_phases import SumoPhase
@@ -34,6 +35,7 @@ def signals_xml(lights: Iterable[RealizedLight], *, buses: Sequence[str] = ()) -
         if light.programs:
             lines += [_loop_xml(loop) for loop in light.loops]
             lines += [_bus_xml(area, buses) for area in light.buses]
+            lines += [_area_xml(area) for area in light.areas]
             for program in light.programs:
                 lines += _program_xml(light.shown.id, program)
             lines += _switches_xml(light)
@@ -60,6 +62,13 @@ def _bus_xml(area: BusArea, buses: Sequence[str]) -> str:
         f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-0.1"'
         f' length="{BUS_AREA:g}" friendlyPos="true" vTypes="{" ".join(buses) or "bus"}"'
         f' file="NUL" period="{_PERIOD}"/>'
+    )
+
+
+def _area_xml(area: CallArea) -> str:
+    return (
+        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-0.1"'
+        f' length="{area.length:g}" friendlyPos="true" file="NUL" period="{_PERIOD}"/>'
     )
 
 

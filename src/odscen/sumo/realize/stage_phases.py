@@ -24,6 +24,7 @@ from odscen.sumo.realize.light_detectors import BUS_GREEN, bus_in
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
     from odscen.sumo.realize.light_detectors import BusArea
 
@@ -77,6 +78,23 @@ class PhasePlan:
     def chooses(self) -> bool:
         """Whether SUMO has to choose among ways."""
         return any(len(phase.following) > 1 for phase in self.phases)
+
+
+def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
+    """Phases of the network's program, with other seconds of green if there is one for each stage.
+
+    Times for other stages are those of a network that the map had before.
+    """
+    stages = sum(phase.is_stage for phase in light.phases)
+    greens = iter(green if len(green) == stages else ())
+    phases = []
+    for phase in light.phases:
+        stage = phase.name.removeprefix(STAGE) if phase.is_stage else ""
+        seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
+        least = min(phase.least, seconds)
+        most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
+        phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
+    return phases
 
 
 def kept_cycle(program: DesignedProgram, plan: TimedPlan) -> float | None:

@@ -1,0 +1,1 @@
+"""Actuated lights with the stages of the map: vehicles and people call them."""

@@ -1,0 +1,103 @@
+"""Who calls a stage: vehicles between loop and stop line, buses, and people who wait to cross."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.signals.light import Light
+    from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
+
+STUCK = 20.0
+"""Seconds of standing at a green that gives way, after which a vehicle needs another stage."""
+
+
+SEEN = 20.0
+"""Metres before the stop line of a lane without a loop in which a vehicle calls."""
+
+
+class CallArea(NamedTuple):
+    """The metres of a lane from its loop to the stop line, in which a vehicle calls.
+
+    A loop alone would forget who passed it in yellow and stands behind it at red.
+
+    Attributes
+    ----------
+    movements
+        Places in the light's states of the movements of the lane.
+    length
+        Metres.
+    """
+
+    id: str
+    lane: str
+    movements: tuple[int, ...]
+    length: float
+
+
+def call_areas(light: SumoLight, view: Light, loops: Iterable[PlacedLoop]) -> tuple[CallArea, ...]:
+    """One in each lane of vehicles, from its farthest loop on; all lanes call, loop or not."""
+    lengths = dict[str, float]()
+    for loop in loops:
+        if not loop.walk:
+            lengths[loop.before] = max(lengths.get(loop.before, loop.length), loop.ahead)
+    lanes = dict[str, list[int]]()
+    for n, one in enumerate(view.movements):
+        if one.drive:
+            lanes.setdefault(light.links[n].source, []).append(n)
+    return tuple(
+        CallArea(f"{light.id}.area.{number}", lane, tuple(own), lengths.get(lane, SEEN))
+        for number, (lane, own) in enumerate(lanes.items())
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Callers:
+    """Detectors of a light that call stages, as SUMO's expressions."""
+
+    areas: Sequence[CallArea]
+    places: Sequence[PlacedLoop]
+    buses: Sequence[BusArea]
+
+    def vehicles(self, shown: str, wanted: str) -> str:
+        """Say that a vehicle waits for what ``wanted`` shows and ``shown`` does not.
+
+        Both are states of the light. One that has to give way waits for its own green, too.
+        """
+        missing = {
+            n
+            for n, (now, then) in enumerate(zip(shown, wanted, strict=True))
+            if (then in "Gg" and now not in "Gg") or (then == "G" and now == "g")
+        }
+        seen = [(one.id, one.movements) for one in self.areas]
+        seen += [(one.id, one.movements) for one in self.buses]
+        return any_of(f"a:{name} > 0" for name, own in seen if missing & set(own))
+
+    def people(self, shown: str, wanted: str) -> str:
+        """Say that somebody waits at a crossing that has green in ``wanted`` only."""
+        missing = {
+            n
+            for n, (now, then) in enumerate(zip(shown, wanted, strict=True))
+            if then in "Gg" and now not in "Gg"
+        }
+        return any_of(f"w:{one.id} > 0" for one in self.places if missing & set(one.movements))
+
+    def stuck(self, shown: str) -> str:
+        """Say that a vehicle finds no gap in a green that gives way."""
+        yielding = {n for n, letter in enumerate(shown) if letter == "g"}
+        areas = (one for one in self.areas if yielding & set(one.movements))
+        return any_of(f"w:{one.id} > {STUCK:g}" for one in areas)
+
+
+def any_of(expressions: Iterable[str]) -> str:
+    """SUMO's expression for one of several; empty for none."""
+    return " or ".join(f"({one})" for one in expressions if one)
+
+
+def all_of(expressions: Iterable[str]) -> str:
+    """SUMO's expression for all of several; empty for none."""
+    return " and ".join(f"({one})" for one in expressions if one)
