@@ -8,7 +8,7 @@ export type Facts = Schemas["RemovalInfo"];
 export type Kind = Facts["kind"];
 /** Something in the wastebasket; bytes, and seconds since 1970. */
 export type Removed = Schemas["RemovedRow"];
-export type BrokenMap = Schemas["BrokenMap"];
+export type BrokenMap = Schemas["BrokenMapInfo"];
 
 export const removal = {
   facts: (kind: Kind, name: string): Promise<Facts> => {

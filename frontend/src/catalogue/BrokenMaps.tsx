@@ -11,10 +11,10 @@ export function BrokenMaps({ list, onRemove }: { list: BrokenMap[]; onRemove: (n
       <Text size="sm" mb={8}>
         Add its file again to repair a map, or remove it. Other maps are not affected.
       </Text>
-      {list.map(({ name, error }) => (
+      {list.map(({ name, problem }) => (
         <Group key={name} justify="space-between" wrap="nowrap" mt={6}>
           <Text size="sm" style={{ overflowWrap: "anywhere" }}>
-            <b>{name}</b>: {error}
+            <b>{name}</b>: {problem}
           </Text>
           <Button
             size="compact-sm"

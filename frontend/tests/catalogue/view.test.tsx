@@ -69,7 +69,7 @@ test("a map is only removed after a question with facts, and the notice undoes i
 test("a damaged map is named with a way out, beside those that can be used", async () => {
   server({
     "/scenarios": [],
-    "/broken-maps": [{ name: "Torn", error: "its map.json is damaged" }],
+    "/broken-maps": [{ name: "Torn", problem: "its map.json is damaged" }],
     "/removal": { kind: "map", name: "Torn", scenarios: 0, runs: 0, live: 0 },
     "/maps": [mapInfo("Town", 9)],
   });
