@@ -203,3 +203,22 @@ def test_a_limit_of_zero_is_refused(tmp_path, option):
     done = odscen("maps", "add", small, option, "0", "--workspace", tmp_path)
     assert done.code == 2
     assert f"{option} must be above 0" in done.err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
+def test_a_map_beyond_its_memory_ends_with_code_3_and_what_to_do(tmp_path):
+    lines = "".join(
+        f'<road name="" id="{k}" length="10000" junction="-1"><planView><geometry s="0" '
+        f'x="{10_000 * k}" y="0" hdg="0" length="10000"><line/></geometry></planView><lanes>'
+        '<laneSection s="0"><center><lane id="0" type="none"/></center><right>'
+        '<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+        "</right></laneSection></lanes></road>"
+        for k in range(40)
+    )
+    file = tmp_path / "long.xodr"
+    file.write_text(f'<OpenDRIVE><header revMajor="1" revMinor="6"/>{lines}</OpenDRIVE>')
+    done = odscen("maps", "add", file, "--build-memory", "0.25", "--workspace", tmp_path)
+    assert done.code == 3
+    assert "long.xodr: building the map needs more than 0.25 GB of memory" in done.err
+    assert "--build-memory 0.50" in done.err
+    assert odscen("maps", "list", "--json", "--workspace", tmp_path).json["maps"] == []

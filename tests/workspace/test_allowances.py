@@ -54,3 +54,11 @@ def test_a_passed_limit_says_how_to_allow_twice_as_much_and_ends_with_exit_code_
     for limit in ("time", "wall"):
         error = Allowance(1, 60.0, raise_it=True).passed("building the map", limit)
         assert "--build-minutes 2, or ODSCEN_BUILD_MINUTES=2" in str(error)
+
+
+def test_less_memory_than_the_libraries_need_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"--build-memory must be at least 0\.25 \(GB\), not 0\.1"):
+        BuildLimits(memory=0.1)
+    monkeypatch.setenv("ODSCEN_BUILD_MEMORY", "0.1")
+    with pytest.raises(InputError, match=r"ODSCEN_BUILD_MEMORY must be at least 0\.25"):
+        BY_SIZE.for_map(1_000, spacing=2.0)

@@ -18,6 +18,8 @@ MOST_MEMORY = 1_450_000_000
 """Bytes of memory for a map, for each byte of it, for each byte at a spacing of 2 m, and at most.
 A town of 3.4 MB needs 245 MB; what is known of a map by its size is the least that it needs: a file
 of 10 kB with 200 km of motorway needs 1.2 GB."""
+LEAST_MEMORY = 0.25
+"""Gigabytes below which the libraries fail on their own, in words of their own."""
 MAP_SECONDS = 15.0
 MAP_SECONDS_PER_MEGABYTE = 10.0
 """Computing time for a map, and for each megabyte at 2 m; the town needs 2.4 s of 49 s."""
@@ -102,7 +104,7 @@ class BuildLimits:
     Raises
     ------
     InputError
-        If a value is no number above zero.
+        If a value is no number above zero, or less memory than the libraries need.
     """
 
     memory: float | None = None
@@ -113,6 +115,8 @@ class BuildLimits:
             if value is not None and not 0.0 < value <= _MOST:
                 msg = f"--build-{what} must be above 0 and at most {_MOST:g}, not {value:g}"
                 raise InputError(msg)
+        if self.memory is not None and self.memory < LEAST_MEMORY:
+            raise InputError(_too_little("--build-memory", self.memory))
 
     def for_map(self, size: int, *, spacing: float) -> Allowance:
         """What a map may use.
@@ -162,10 +166,17 @@ def _from_environment(name: str) -> float | None:
         value = float(text)
     except ValueError:
         value = 0.0
+    if name == MEMORY_VARIABLE and 0.0 < value < LEAST_MEMORY:
+        raise InputError(_too_little(name, value))
     if not 0.0 < value <= _MOST:
         msg = f"{name}={text!r} must be a number above 0 and at most {_MOST:g}"
         raise InputError(msg)
     return value
+
+
+def _too_little(name: str, value: float) -> str:
+    least = f"{name} must be at least {LEAST_MEMORY:g} (GB), not {value:g}"
+    return f"{least}: the libraries need most of that before they read anything"
 
 
 def _gigabytes(count: int) -> str:
