@@ -32,13 +32,14 @@ def statuses(result):
 
 
 def test_an_unchanged_rerun_passes_and_writes_the_same_baseline(store, suite):
-    before = {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*")}
+    before = {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*.*")}
     assert len(before) == 2
+    assert len(list(suite.parent.glob("baselines/maps/*.xodr.gz"))) == 2
     result = run(store, suite)
     assert result.exit_code == 0
     assert [lines(case) for case in result.cases] == [[], []]
     run(store, suite, update=Update(True))
-    assert {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*")} == before
+    assert {path.name: path.read_bytes() for path in suite.parent.glob("baselines/*.*")} == before
 
 
 def test_a_longer_green_fails_naming_figure_junction_size_and_input(store, suite):
@@ -65,7 +66,10 @@ def test_a_lower_speed_limit_fails_naming_the_segment(store, suite):
     path.write_text(text.replace(road, slower))
     failed = case(run(store, suite), "t_junction_signs")
     assert failed.status == "failed"
-    assert failed.changed_inputs == ("the map",)
+    slower_roads = "the map: limit of road 2, s 0 to 120 m: 50 km/h -> 20 km/h"
+    assert failed.changed_inputs == (slower_roads,)
+    assert headline(failed).startswith(f"{slower_roads}: ")
+    assert f'message="{slower_roads.replace(">", "&gt;")}: ' in junit_xml(run(store, suite))
     changes = {change.key[1:]: change.difference for change in failed.verdict.places}
     assert changes["r2", "free_speed"].relative < -0.3
     told = next(line for line in lines(failed) if line.startswith("most changed"))
@@ -285,12 +289,23 @@ def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
     path.write_text(path.read_text() + "<!-- other -->\n")
     result = run(store, suite)
     assert (statuses(result), result.exit_code) == ({"one": "changed"}, 0)
+    # The map of this baseline is not kept beside it.
     assert headline(result.cases[0]) == "changed since the baseline: the map"
     assert result.touched == {"the map t_junction_signs": ("one",)}
     suite.write_text('map = "fail"\n' + suite.read_text())
     result = run(store, suite)
     assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
-    assert headline(result.cases[0]).startswith("map: the map has changed")
+    assert headline(result.cases[0]).startswith("the map: the map has changed")
+
+
+def test_a_map_that_is_only_written_otherwise_is_said_to_mean_the_same(store, tiny):
+    suite = tiny("one")
+    run(store, suite, update=Update(True))
+    path = suite.parent / "maps" / "t_junction_signs.xodr"
+    path.write_text(path.read_text() + "<!-- other -->\n")
+    (changed,) = run(store, suite).cases
+    same = "the map is written otherwise, but means the same"
+    assert headline(changed) == f"changed since the baseline: {same}"
 
 
 def test_demand_per_km_that_follows_a_changed_limit_is_put_down_to_the_map(store, tmp_path):

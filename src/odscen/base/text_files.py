@@ -1,4 +1,4 @@
-"""Writing a text file whole or not at all."""
+"""Writing a file whole or not at all."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 
 
 def write_text(path: Path, text: str) -> Path:
+    """Write a text file, UTF-8, as :func:`write_whole` does."""
+    return write_whole(path, text)
+
+
+def write_whole(path: Path, content: str | bytes) -> Path:
     """Write a file whole or not at all; its folder is made if need be.
 
     Returns
@@ -27,5 +32,5 @@ def write_text(path: Path, text: str) -> Path:
     """
     with disk_errors(str(path)):
         path.parent.mkdir(parents=True, exist_ok=True)
-        replace_by(path, path.with_name(f".{path.name}.{os.getpid()}.part"), text)
+        replace_by(path, path.with_name(f".{path.name}.{os.getpid()}.part"), content)
     return path

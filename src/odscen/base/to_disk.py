@@ -34,10 +34,10 @@ def write_whole(path: Path, text: str) -> None:
     replace_by(path, path.with_name(f".{path.name}.part"), text)
 
 
-def replace_by(path: Path, part: Path, text: str) -> None:
+def replace_by(path: Path, part: Path, content: str | bytes) -> None:
     """Replace a small file by another one beside it, written first; nothing is left of that."""
     try:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
         to_disk(part)
         part.replace(path)
     except OSError:

@@ -14,6 +14,7 @@ from odscen.base.errors import in_file
 from odscen.regression.baseline import baseline_of, seeds_that_hardly_vary, write_baseline
 from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
 from odscen.regression.causes import causes_between, likeliest_first
+from odscen.regression.kept_maps import change_words, changes_since, keep_map
 from odscen.regression.measure import measure
 from odscen.regression.own_figures import own_values
 from odscen.regression.suite import missing_case
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from odscen.base.errors import InputError
+    from odscen.changes.map_change import MapChange
     from odscen.regression.baseline import Baseline
+    from odscen.regression.causes import Cause
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Suite
     from odscen.regression.suite_loading import UnusableCase
@@ -45,6 +48,8 @@ class Update(NamedTuple):
 
 
 NO_UPDATE = Update()
+_MAP_CHANGES = 20
+"""Differences of a map that are listed; odscen maps diff has all."""
 
 
 def run_suite(
@@ -218,6 +223,8 @@ def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool
         return replace(result, notes=(note,))
     baseline = baseline_of(figures, result.made_of)
     write_baseline(baseline, file, scenario=result.name)
+    if result.entry is not None:
+        keep_map(file.parent, result.entry, result.made_of["map"])
     return replace(result, updated=True, notes=seeds_that_hardly_vary(baseline))
 
 
@@ -230,6 +237,9 @@ def _held(
     worst = sorted(verdict.failing, key=lambda change: -change.score)
     causes = likeliest_first(causes_between(baseline.fingerprint, loaded.made_of), worst)
     names = {cause.name for cause in causes}
+    changes = _map_changes(result, baseline) if "map" in names else None
+    if changes is not None:
+        causes = tuple(_in_words(cause, changes) for cause in causes)
     failures = [*result.failures, *(change.words for change in verdict.failing)]
     if case.map_fails and "map" in names:
         failures.append("the map has changed, which this suite does not allow")
@@ -240,8 +250,23 @@ def _held(
         failures=tuple(failures),
         missing=_seeds(baseline.seeds, figures, "the baseline has seed {}, which was not run"),
         new=_seeds(figures, baseline.seeds, "the baseline has no seed {}"),
-        notes=_notes(loaded, verdict.figures, names),
+        notes=(
+            *_notes(loaded, verdict.figures, names),
+            *(one.words for one in (changes or ())[:_MAP_CHANGES]),
+        ),
     )
+
+
+def _map_changes(result: CaseResult, baseline: Baseline) -> tuple[MapChange, ...] | None:
+    """What has changed on the map since the baseline, where its map is kept."""
+    file, digest = result.case.baseline, baseline.fingerprint.get("map", "")
+    if file is None or result.entry is None or digest == result.made_of["map"]:
+        return None
+    return changes_since(file.parent, digest, result.entry)
+
+
+def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:
+    return replace(cause, words=change_words(changes)) if cause.words == "the map" else cause
 
 
 def _seeds(there: Iterable[int], known: Iterable[int], words: str) -> tuple[str, ...]:

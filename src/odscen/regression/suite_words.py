@@ -38,7 +38,11 @@ def _cause(case: CaseResult) -> str:
     """``"map: "``; the figures' own behaviour if no input has changed, nothing without baseline."""
     if case.verdict is None:
         return ""
-    return f"{case.causes[0].name if case.causes else 'behaviour'}: "
+    if not case.causes:
+        return "behaviour: "
+    likeliest = case.causes[0]
+    # What has changed on a map is known by itself; of other inputs the name says more.
+    return f"{likeliest.words if likeliest.name == 'map' else likeliest.name}: "
 
 
 def _worst(case: CaseResult) -> list[str]:
