@@ -15,7 +15,6 @@ from odscen.base.checksums import (
     say_unchecked,
 )
 from odscen.base.errors import DamagedError, DamagedFile, in_file
-from odscen.convert.lane_table.table_json import table_from_json
 from odscen.convert.model.conversion_settings import ConversionSettings
 
 if TYPE_CHECKING:
@@ -157,6 +156,8 @@ class MapEntry:
 
     def lane_table(self) -> LaneTable:
         """The table between OpenDRIVE lanes and SUMO lanes."""
+        from odscen.convert.lane_table.table_json import table_from_json
+
         return table_from_json(self.read("lane_table"))
 
     def drawing(self) -> MapDrawing:
