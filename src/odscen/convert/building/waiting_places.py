@@ -121,17 +121,27 @@ def inner_junctions(
 ) -> tuple[NetJunction, ...]:
     """SUMO's internal junctions of a junction.
 
+    SUMO sees vehicles on the internal lane of another path only if the two centre lines cross, or
+    lead to one lane. Of paths that only come near each other, as of two opposing turns, the lane
+    that leads out is therefore one to give way to as well, like the lanes that lead in.
+
     Parameters
     ----------
     beyond
         Lane after the waiting place, by movement.
     """
+    lines = [shapely.LineString(movement.shape[:, :2]) for movement in movements]
     result = []
     for number, lane in beyond.items():
         right = rights[number]
-        towards = dict.fromkeys(
-            lane_id(*movements[n].source) for n in sorted(right.yields_to) if n < len(movements)
-        )
+        before = [n for n in sorted(right.yields_to) if n < len(movements)]
+        leading_out = [
+            beyond[n].id if n in beyond else lane_id(internal_edge_id(name, n))
+            for n in before
+            if movements[n].target != movements[number].target
+            and not lines[number].intersects(lines[n])
+        ]
+        towards = dict.fromkeys([*(lane_id(*movements[n].source) for n in before), *leading_out])
         paths = [
             lane_id(internal_edge_id(name, n)) for n in sorted(right.foes) if n < len(movements)
         ]
