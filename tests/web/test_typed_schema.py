@@ -19,7 +19,6 @@ from odscen.results.measures.registry import COUNTS
 from odscen.results.records.run_records import Event, EventKind, event_row
 from odscen.sumo.folder import layout
 from odscen.web.application import create_app
-from odscen.web.run_messages import IncidentInfo, ReplayColumns
 from odscen.web.wire.live_messages import LiveMessage
 from odscen.web.wire.map_messages import (
     ConversionInfo,
@@ -28,6 +27,7 @@ from odscen.web.wire.map_messages import (
     MapDetails,
     SemanticsInfo,
 )
+from odscen.web.wire.run_messages import IncidentInfo, ReplayColumns
 from odscen.web.wire.summary_messages import RunSummary, SummaryCounts
 from odscen.workspace.store import Workspace
 from tests.cli.conftest import odscen

@@ -29,7 +29,7 @@ from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
 from odscen.web.kept_runs import KeptRuns
-from odscen.web.run_messages import RunForecast, RunInfo, RunProgress, RunState
+from odscen.web.wire.run_messages import RunForecast, RunInfo, RunProgress, RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.carla.client import Address
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
-    from odscen.web.run_messages import GoOn, NewRun, RunControl
+    from odscen.web.wire.run_messages import GoOn, NewRun, RunControl
     from odscen.workspace.store import Workspace
     from odscen.workspace.wastebasket import RemovedItem
 

@@ -16,7 +16,14 @@ from odscen.sumo.folder.ended import read_summary
 from odscen.sumo.folder.run_status import going, read_status, unfinished, unfinished_words
 from odscen.sumo.folder.run_sums import REPAIR, check_run_files
 from odscen.sumo.runner.long_runs import about
-from odscen.web.run_messages import RunContent, RunFile, RunInfo, RunProgress, RunSlices, RunState
+from odscen.web.wire.run_messages import (
+    RunContent,
+    RunFile,
+    RunInfo,
+    RunProgress,
+    RunSlices,
+    RunState,
+)
 from odscen.web.wire.summary_messages import RunSummary
 from odscen.workspace.store import check_name
 

@@ -15,7 +15,6 @@ import orjson
 from starlette.websockets import WebSocketDisconnect
 
 from odscen.sumo.worker.snapshots import origin
-from odscen.web.run_messages import IncidentInfo
 from odscen.web.wire.live_messages import (
     LiveActor,
     LiveEnd,
@@ -23,6 +22,7 @@ from odscen.web.wire.live_messages import (
     LiveLights,
     LiveState,
 )
+from odscen.web.wire.run_messages import IncidentInfo
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket

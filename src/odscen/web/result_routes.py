@@ -11,9 +11,9 @@ from odscen.app import demands
 from odscen.app.scenarios import read_scenario
 from odscen.scenario.demand.count_stations import place_points
 from odscen.sumo.folder.layout import SCENARIO_FILE
-from odscen.web.run_messages import FitRow, RunFile, RunFit
 from odscen.web.services import Shared
 from odscen.web.wire.media_types import ANY_FILE
+from odscen.web.wire.run_messages import FitRow, RunFile, RunFit
 
 router = APIRouter(prefix="/api/runs/{run}")
 

@@ -22,7 +22,9 @@ from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.recorded import read_trajectories
 from odscen.web.live_view import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
-from odscen.web.run_messages import (
+from odscen.web.services import Shared
+from odscen.web.wire.media_types import HTML
+from odscen.web.wire.run_messages import (
     GoOn,
     IncidentInfo,
     NewRun,
@@ -39,8 +41,6 @@ from odscen.web.run_messages import (
     RunSpeeds,
     RunStarted,
 )
-from odscen.web.services import Shared
-from odscen.web.wire.media_types import HTML
 from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:

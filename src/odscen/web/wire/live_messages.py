@@ -12,7 +12,7 @@ from pydantic import Field
 
 from odscen.base.categories import Category
 from odscen.web.messages import Answer
-from odscen.web.run_messages import IncidentInfo, RunState
+from odscen.web.wire.run_messages import IncidentInfo, RunState
 
 
 class LiveActor(Answer):
