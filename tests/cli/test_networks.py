@@ -58,3 +58,11 @@ def test_compare_prints_both_converters_beside_each_other(workspace: Path) -> No
     wrong = odscen("maps", "compare", "t_junction_signs", "--levels", "x", "--workspace", workspace)
     assert wrong.code == 2
     assert "--levels takes numbers" in wrong.err
+
+
+def test_a_device_is_no_network(tmp_path: Path) -> None:
+    odscen("maps", "add", CROSSING, "--workspace", tmp_path)
+    call = ("maps", "network", "signal_crossing", "--workspace", tmp_path, "--from", "/dev/zero")
+    done = odscen(*call)
+    assert done.code == 2
+    assert "/dev/zero: this is a pipe, device or socket, not a regular file" in done.err

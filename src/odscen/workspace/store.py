@@ -18,6 +18,7 @@ from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
 from odscen.base.folder_locks import locked
+from odscen.base.given_files import read_given
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
@@ -308,10 +309,7 @@ class Workspace:
         from odscen.workspace.converters import GivenNetwork
 
         entry = self.map(name)
-        try:
-            given = GivenNetwork(source.read_bytes(), source.name)
-        except OSError as error:
-            raise InputError(error.strerror or str(error), file=str(source)) from error
+        given = GivenNetwork(read_given(source), source.name)
         settings = replace(entry.conversion, converter="file")
         content, file = entry.read("xodr"), str(entry.info["source"])
         with _workspace_errors(self.root), self._lock(name):
