@@ -6,16 +6,15 @@ Run in place of :mod:`odscen.sumo.worker.completer` by ``killed_worker``: before
 
 from __future__ import annotations
 
-import itertools
 import os
 import sys
+from pathlib import Path
 
 from odscen.sumo.worker.completer import main
-from tests.sumo.killed_worker import kill_before_change
+from tests.sumo.killed_worker import kill_before_change, reached
 
 if __name__ == "__main__":
     both = "KILL_BOTH_AT" in os.environ
-    number = int(os.environ["KILL_BOTH_AT" if both else "KILL_COMPLETER_AT"])
-    left = itertools.count(1)
-    kill_before_change(sys.argv[1], lambda: next(left) == number, both=both)
+    name = "KILL_BOTH_AT" if both else "KILL_COMPLETER_AT"
+    kill_before_change(sys.argv[1], reached(Path(sys.argv[1]), name), both=both)
     sys.exit(main())

@@ -4,11 +4,11 @@ Run in place of :mod:`odscen.sumo.worker.simulate`. With ``KILL_AFTER_SLICE`` it
 after that slice is complete. ``KILL_COMPLETER_AT`` and ``KILL_BOTH_AT`` are about the process that
 completes slices, see ``killed_completer``. ``FILE_LIMIT`` makes every file longer than so many
 bytes fail as on a full disk; with ``MEMORY_LEFT`` it gets so many bytes more than it has at first.
+Changes are counted in a file beside the run folder, as each slice has processes of its own.
 """
 
 from __future__ import annotations
 
-import itertools
 import os
 import resource
 import signal
@@ -37,11 +37,22 @@ def kill_before_change(run: str, due: Callable[[], bool], *, both: bool = False)
     sys.addaudithook(hook)
 
 
+def reached(run: Path, name: str) -> Callable[[], bool]:
+    """Return what counts the changes, and says whether the one named by a variable is there."""
+    count = run.parent / f"{name}.count"
+
+    def reach() -> bool:
+        with count.open("ab") as file:
+            file.write(b".")
+            return file.tell() == int(os.environ[name])
+
+    return reach
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1]).parent
     if "KILL_AT" in os.environ:
-        left = itertools.count(1)
-        kill_before_change(str(folder), lambda: next(left) == int(os.environ["KILL_AT"]))
+        kill_before_change(str(folder), reached(folder, "KILL_AT"))
     if "KILL_AFTER_SLICE" in os.environ:
         last = slice_folder(folder, int(os.environ["KILL_AFTER_SLICE"]))
         kill_before_change(str(folder), last.is_dir)

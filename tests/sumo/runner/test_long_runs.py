@@ -9,6 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from bench.kills import traffic
+from odscen.app.runs import check_file, prepare_run
 from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
 from odscen.results.measures.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
@@ -25,7 +27,11 @@ from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.long_runs import resume, run_lock
 from odscen.sumo.runner.run_jobs import PreparedRun, run_prepared
 from odscen.sumo.worker.protocol import Command, Pace, Progress
+from odscen.workspace.store import Workspace
 from tests.sumo.conftest import SLICE, TYPES, UNTIL
+
+TOWN = Path(__file__).parents[3] / "maps" / "town_5x5.xodr"
+TOWN_SLICE, TOWN_SLICES = 120.0, 3
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +133,25 @@ def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_
     assert results(run) == whole
     assert all(whole[f"trajectories/{name}"] == content for name, content in before.items())
     assert len(told) == 1
+
+
+def test_a_town_resumed_after_any_slice_ends_with_the_bytes_of_the_run_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Inside a junction SUMO decides by the order of addresses in memory who yields to whom."""
+    workspace = Workspace.open(tmp_path / "workspace")
+    name = workspace.add_map(TOWN).name
+    file = traffic(workspace, name, hours=TOWN_SLICES * TOWN_SLICE / 3600.0)
+    settings = RunSettings(slice_length=TOWN_SLICE)
+    town = prepare_run(check_file(workspace, file, settings=settings))
+    alone = results(run_prepared(town, tmp_path / "alone").folder)
+    assert sum(name.startswith("trajectories") for name in alone) == TOWN_SLICES
+    for after in range(1, TOWN_SLICES):
+        run = tmp_path / f"after{after}"
+        killed(town, run, monkeypatch, KILL_AFTER_SLICE=after)
+        assert checkpoint.last_number(run) == after
+        resume(run)
+        assert results(run) == alone
 
 
 @pytest.mark.parametrize("change", [8, 40, 59])

@@ -92,15 +92,9 @@ def part_folder(run: Path, number: int) -> Path:
     return folder
 
 
-def written_folder(run: Path, number: int) -> Path:
-    """Folder of a slice that is complete, or that is being completed."""
-    part = run / SLICES_FOLDER / f"{_PART}{number:04d}"
-    return part if part.is_dir() else slice_folder(run, number)
-
-
 def slice_size(run: Path, number: int) -> int:
     """Bytes that a slice takes, what it has recorded included."""
-    files = [*written_folder(run, number).iterdir()]
+    files = [*slice_folder(run, number).iterdir()]
     files += [recorded_part(run, file, number) for file in RECORDED]
     return sum(file.stat().st_size for file in files if file.is_file())
 

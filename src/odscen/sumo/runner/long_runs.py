@@ -86,7 +86,8 @@ def run_long(
         _write_settings(prepared, folder)
         write_status(folder, prepared.plan, None)
         seal_start(folder)
-    return _resume_from(prepared, out, lock, progress, finish, live)
+    with disk_errors(f"run folder {out}", advice=_again(out)):
+        return _resume_from(prepared, out, lock, progress, finish, live)
 
 
 def resume(
@@ -119,8 +120,7 @@ def resume(
         If what it starts from is not as it was written.
     """
     _refuse_absent(folder)
-    again = f"then: odscen resume {folder}"
-    with disk_errors(f"run folder {folder}", advice=again), run_lock(folder) as lock:
+    with disk_errors(f"run folder {folder}", advice=_again(folder)), run_lock(folder) as lock:
         _refuse_absent(folder)
         clear_leftovers(folder.parent)
         check_run_files(folder)
@@ -211,6 +211,10 @@ def _resume_from(
         seal_run(folder)
         _clear(folder)
     return Run(folder, summary)
+
+
+def _again(folder: Path) -> str:
+    return f"then: odscen resume {folder}"
 
 
 def _refuse_absent(folder: Path) -> None:

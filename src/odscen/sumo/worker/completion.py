@@ -19,7 +19,7 @@ COMPLETER = "odscen.sumo.worker.completer"
 
 
 class Completion:
-    """Completes each slice while the next one runs."""
+    """Completes a slice; what it needs to know of those before it reads while SUMO simulates."""
 
     def __init__(self, run: Path) -> None:
         self._connection, theirs = Pipe()
@@ -32,74 +32,42 @@ class Completion:
             close_fds=False,
         )
         theirs.close()
-        self._written: Written | None = None
-        self._busy = False
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            self.begin()
-            self.wait()
-        finally:
-            self._connection.close()
-            self._process.wait()
+        self._connection.close()
+        self._process.wait()
 
-    def take(self, written: Written) -> None:
-        """Take a slice, once the one before is complete.
-
-        Raises
-        ------
-        SimulationError, OSError
-            If the one before could not be completed.
-        """
-        self.wait()
-        self._written = written
-
-    def begin(self) -> None:
-        """Begin: SUMO has read the state, so that it may be moved."""
-        if self._written is not None:
-            written, self._written = self._written, None
-            self._ask(written)
-
-    def wait(self) -> None:
-        """Wait until the slice that has been begun is complete.
+    def complete(self, written: Written) -> None:
+        """Complete a slice.
 
         Raises
         ------
         SimulationError, OSError
             If it could not be completed.
         """
-        if not self._busy:
-            return
-        self._busy = False
-        try:
-            error = self._connection.recv()
-        except (EOFError, OSError):
-            raise self._gone() from None
-        if error is not None:
-            raise error
+        self._ask(written)
 
     def write_results(self) -> None:
-        """Complete the last slice and write the outcome of every actor.
+        """Write the outcome of every actor.
 
         Raises
         ------
         SimulationError, OSError
             If that could not be done.
         """
-        self.begin()
-        self.wait()
         self._ask(None)
-        self.wait()
 
     def _ask(self, what: Written | None) -> None:
         try:
             self._connection.send(what)
-        except OSError:
+            error = self._connection.recv()
+        except (EOFError, OSError):
             raise self._gone() from None
-        self._busy = True
+        if error is not None:
+            raise error
 
     def _gone(self) -> SimulationError:
         code = self._process.wait()

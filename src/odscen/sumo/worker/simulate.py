@@ -2,17 +2,21 @@
 
 libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
 run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
-beside it, steps until no road user is left or the end is reached (in slices, see
-:mod:`odscen.sumo.worker.slices`, if the plan says so), writes ``events.json`` and ``actors.json``,
-and sends :mod:`odscen.sumo.worker.protocol` messages to its stdout. Whatever SUMO says goes to
-``sumo.log``. With a :class:`~odscen.sumo.worker.protocol.Pace` as second argument the run can be
-watched and takes commands on its stdin; with a :class:`~odscen.sumo.worker.protocol.Lockstep` it
-makes each step when it is asked to.
+beside it, steps until no road user is left or the end is reached, writes ``events.json`` and
+``actors.json``, and sends :mod:`odscen.sumo.worker.protocol` messages to its stdout. Whatever SUMO
+says goes to ``sumo.log``. With a :class:`~odscen.sumo.worker.protocol.Pace` as second argument the
+run can be watched and takes commands on its stdin; with a
+:class:`~odscen.sumo.worker.protocol.Lockstep` it makes each step when it is asked to.
+
+If the plan says so, it makes one slice of the run (see :mod:`odscen.sumo.worker.slices`) and then
+begins anew for the next one: ``exec`` gives it a fresh memory under the same number, with the same
+files open. Commands that it has heard and not obeyed follow the pace as arguments.
 """
 
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import time
 from pathlib import Path
@@ -36,15 +40,24 @@ from odscen.sumo.outputs.output_tables import outputs_to, tidy_outputs, trips_in
 from odscen.sumo.outputs.signal_log import tidy_signals
 from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.output_capture import captured_output
-from odscen.sumo.worker.protocol import Done, Failed, Lockstep, Message, Pace, decode, encode
+from odscen.sumo.worker.protocol import (
+    Command,
+    Done,
+    Failed,
+    Lockstep,
+    Message,
+    Pace,
+    decode,
+    encode,
+)
 from odscen.sumo.worker.session import open_session
-from odscen.sumo.worker.slices import run_slices
+from odscen.sumo.worker.slices import run_slice
 from odscen.sumo.worker.steering import Steering
 from odscen.sumo.worker.stepping import Stepper
 from odscen.sumo.worker.watch import Watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 
 def main() -> int:
@@ -58,10 +71,14 @@ def main() -> int:
             stdout.buffer.flush()
 
         try:
+            gc.disable()  # takes as long as the reading itself
             plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
             gc.freeze()  # the plan stays, and need not be gone through again and again
-            watch = _watch(plan, sys.argv[2], send) if len(sys.argv) > 2 else None
-            send(simulate(plan, folder, send, watch))
+            gc.enable()
+            watch = _watch(plan, sys.argv[2:], send) if len(sys.argv) > 2 else None
+            done = simulate(plan, folder, send, watch)
+            if done is not None:
+                send(done)
         except OdscenError as error:
             send(Failed(str(error)))
             return 3
@@ -71,6 +88,8 @@ def main() -> int:
         except MemoryError:
             send(Failed(NO_MEMORY))
             return 3
+    if done is None:
+        _begin_anew(watch)
     return 0
 
 
@@ -79,8 +98,12 @@ def simulate(
     folder: Path,
     send: Callable[[Message], None],
     watch: Watch | LockstepWatch | None = None,
-) -> Done:
+) -> Done | None:
     """Run the simulation in ``folder`` and write its events and actors.
+
+    Returns
+    -------
+    ``None`` if that was a slice, and others follow.
 
     Raises
     ------
@@ -89,13 +112,21 @@ def simulate(
     """
     stepper = Stepper(plan, send, watch)
     if plan.slice_length is not None:
-        return run_slices(plan, folder, stepper)
+        return run_slice(plan, folder, stepper)
     done = _in_one_piece(plan, folder, stepper)
     events = stepper.recorder.events
     outcomes = Outcomes(plan)
     outcomes.hear(events, trips_in(folder / TRIPS_FILE))
     write_results(folder, map(event_line, events), outcomes.rows())
     return done
+
+
+def _begin_anew(watch: Watch | LockstepWatch | None) -> None:
+    """Become a fresh process that runs the next slice."""
+    own = len(sys.orig_argv) - len(sys.argv) + 2  # as it was started, up to the plan
+    how = watch.steering.hand_over() if isinstance(watch, Watch) else []
+    arguments = [sys.executable, *sys.orig_argv[1:own], *map(encode, how)]
+    os.execv(sys.executable, arguments)  # noqa: S606 - no shell is wanted
 
 
 def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
@@ -112,14 +143,17 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)
 
 
-def _watch(plan: Plan, how: str, send: Callable[[Message, bytes], None]) -> Watch | LockstepWatch:
-    start = decode(how)
+def _watch(
+    plan: Plan, how: Sequence[str], send: Callable[[Message, bytes], None]
+) -> Watch | LockstepWatch:
+    start, *heard = map(decode, how)
     if isinstance(start, Lockstep):
         return LockstepWatch(plan, start, sys.stdin.fileno(), send)
     steering = Steering(
         sys.stdin.fileno(),
         start if isinstance(start, Pace) else Pace(),
         step_length=plan.step_length,
+        heard=[command for command in heard if isinstance(command, Command)],
     )
     return Watch(plan, steering, send)
 

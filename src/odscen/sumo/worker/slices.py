@@ -1,10 +1,13 @@
 """A long run: a chain of slices, each started from the state that the one before has saved.
 
 Going on after loading a state is not what SUMO would have done without saving: so every long run
-goes through the same reloads, interrupted or not, and one that goes on from slice ``k`` ends with
-the same results as one that was never interrupted. At each boundary SUMO closes its outputs.
+goes through the same reloads, interrupted or not. Nor does SUMO do the same with the same state in
+every process: who yields inside a junction depends on the order of addresses in memory, which a
+network that was loaded before has disturbed. So each slice has a process of its own, interrupted or
+not (see :mod:`odscen.sumo.worker.simulate`), and a run that goes on from slice ``k`` ends with the
+same results as one that was never interrupted. At each boundary SUMO closes its outputs.
 
-A slice is tidied and completed while the next one runs, in another process.
+Another process tidies and completes the slice.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ from odscen.sumo.folder.checkpoint import (
     last_number,
     part_folder,
     read_checkpoint,
-    written_folder,
+    slice_folder,
 )
 from odscen.sumo.folder.parts import check_room
 from odscen.sumo.outputs.output_tables import outputs_to
@@ -46,8 +49,8 @@ _SAVING = (
 )  # fmt: skip
 
 
-def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
-    """Run what is left of a long run, from its last complete slice on, and write its results.
+def run_slice(plan: Plan, run: Path, stepper: Stepper) -> Done | None:
+    """Run the next slice of a long run; ``None`` if others follow, else the results are written.
 
     Raises
     ------
@@ -63,10 +66,12 @@ def run_slices(plan: Plan, run: Path, stepper: Stepper) -> Done:
         stepper.steps = done.steps
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
     with Completion(run) as completion:
-        while done is None or not done.last:
-            written = _RunningSlice(plan, run, done, routes).run(stepper, completion)
-            completion.take(written)
+        if done is None or not done.last:
+            written = _RunningSlice(plan, run, done, routes).run(stepper)
+            completion.complete(written)
             done = written.checkpoint
+        if not done.last:
+            return None
         completion.write_results()
     return Done(done.time, done.steps, done.wall_seconds, done.stopped)
 
@@ -85,8 +90,8 @@ class _RunningSlice:
         length = plan.slice_length or plan.until
         self._end = min(self._number * length, plan.until)
 
-    def run(self, stepper: Stepper, completion: Completion) -> Written:
-        """Simulate it; the one before is completed meanwhile."""
+    def run(self, stepper: Stepper) -> Written:
+        """Simulate it."""
         before, start = self._before, time.perf_counter()
         if before is not None:
             check_room(self._run, before.number)
@@ -95,7 +100,6 @@ class _RunningSlice:
         offset = self._routes.cut(before.routes if before else 0, self._end, routes)
         more = self._end < self._plan.until and self._routes.more(offset)
         with _session(self._arguments(part), self._number) as session:
-            completion.begin()
             self._compare(session, stepper)
             now = stepper.run(session, self._end, more=more)
             last = self._is_last(session, stepper, now, more=more)
@@ -131,7 +135,7 @@ class _RunningSlice:
         arguments += ["--route-files", str(part / layout.ROUTES_FILE), *_SAVING]
         arguments += outputs_to(part, sumo)
         if self._before is not None:
-            state = written_folder(self._run, self._before.number) / STATE_FILE
+            state = slice_folder(self._run, self._before.number) / STATE_FILE
             arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]
         return arguments
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import threading
 import time
 from queue import Empty, SimpleQueue
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from odscen.sumo.worker.protocol import Command, Pace, decode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 MAX_LAG = 0.2
 """Wall seconds that a run may be behind its pace and still try to catch up."""
@@ -33,6 +34,8 @@ class Steering:
         How to start.
     step_length
         Simulated seconds of a step.
+    heard
+        What another process of the run has handed over: commands that come before all others.
 
     Attributes
     ----------
@@ -42,7 +45,9 @@ class Steering:
         Whether a frame is awaited; its maker takes the wish back.
     """
 
-    def __init__(self, commands: int, pace: Pace, *, step_length: float) -> None:
+    def __init__(
+        self, commands: int, pace: Pace, *, step_length: float, heard: Sequence[Command] = ()
+    ) -> None:
         self.paused = pace.paused
         self.speed = pace.speed
         self.stopped = False
@@ -51,7 +56,22 @@ class Steering:
         self._step_length = step_length
         self._due = time.monotonic()
         self._queue: SimpleQueue[Command] = SimpleQueue()
-        threading.Thread(target=self._listen, args=(commands,), daemon=True).start()
+        for command in heard:
+            self._queue.put(command)
+        self._enough, self._no_more = os.pipe()
+        self._ear = threading.Thread(target=self._listen, args=(commands,), daemon=True)
+        self._ear.start()
+
+    def hand_over(self) -> list[Pace | Command]:
+        """Stop listening; how another process of the run is to go on, its pace first."""
+        os.close(self._no_more)
+        self._ear.join()
+        os.close(self._enough)
+        heard = [Command("frame")] * self.frame_wanted + [Command("pause")] * self.paused
+        heard += [Command("step")] * self._steps
+        while not self._queue.empty():
+            heard.append(self._queue.get())
+        return [Pace(speed=self.speed), *heard]
 
     @property
     def pace(self) -> Pace:
@@ -120,10 +140,12 @@ class Steering:
         # os.read and not a file object: its lock, held by a thread that waits, would end the
         # interpreter with a fatal error.
         rest = b""
-        while block := os.read(commands, _BLOCK):
+        while rest or self._enough not in select.select([commands, self._enough], [], [])[0]:
+            if not (block := os.read(commands, _BLOCK)):
+                self._queue.put(Command("stop"))
+                return
             *lines, rest = (rest + block).split(b"\n")
             for line in lines:
                 command = decode(line)
                 if isinstance(command, Command):
                     self._queue.put(command)
-        self._queue.put(Command("stop"))
