@@ -10,7 +10,7 @@ from odscen.app.removal import RemovalFacts, removal_facts, remove, removed_map
 from odscen.app.runs import carry_out, check_file, prepare_run, run
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import ConflictError, NotFoundError
-from odscen.sumo.folder.run_status import locked
+from odscen.base.folder_locks import locked
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
 from odscen.workspace.wastebasket import Wastebasket
@@ -49,7 +49,7 @@ def test_removing_a_map_says_what_was_made_on_it_by_name_or_by_content(
     live = long_run(own, "one-1", about={"map": "a former name", "map_sha256": sha256})
     long_run(own, "one-2", about={"map": name})
     long_run(own, "other-1", about={"map": "other"})
-    with locked(live):
+    with locked(live, what="run"):
         found = removal_facts(own, "map", name)
         assert found == RemovalFacts("map", name, scenarios=1, runs=2, live=1)
         assert removal_facts(own, "scenario", "one").live == 1

@@ -1908,7 +1908,9 @@ export interface components {
             style: "cautious" | "normal" | "sporty";
             /** Parameters */
             parameters: {
-                [key: string]: number | components["schemas"]["Uniform-Output"] | components["schemas"]["Normal-Output"] | components["schemas"]["Choice-Output"];
+                [key: string]: number | {
+                    [key: string]: string | number | number[];
+                };
             };
             /**
              * Car Following

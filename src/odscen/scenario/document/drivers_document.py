@@ -8,11 +8,8 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, field_serializer, model_validator
 
 from odscen.scenario.document.distributions import (
-    Choice,
     Constant,
     Distribution,
-    Normal,
-    Uniform,
     drawn_range,
 )
 from odscen.scenario.document.document_parts import Identifier, Label, Part
@@ -21,7 +18,8 @@ from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
 DrivingStyle = Literal["cautious", "normal", "sporty"]
 DRIVING_STYLES: tuple[DrivingStyle, ...] = get_args(DrivingStyle)
 
-_Written = float | Uniform | Normal | Choice
+_Table = dict[str, str | float | list[float]]
+"""A distribution as it is written, with its kind."""
 
 
 class DriverSet(Part):
@@ -47,10 +45,12 @@ class DriverSet(Part):
         return self
 
     @field_serializer("parameters")
-    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, _Written]:
-        """Write a constant as the number that it is."""
+    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, float | _Table]:
+        """Write a constant as the number that it is, and of others the kind, default or not."""
         return {
-            name: one.value if isinstance(one, Constant) else one
+            name: one.value
+            if isinstance(one, Constant)
+            else one.model_dump(mode="json", exclude_none=True)
             for name, one in parameters.items()
         }
 
