@@ -38,7 +38,7 @@ def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
     assert '"id": "K1L"' in back.read_text()
     wrong = odscen("signals", "import", file, file, "--workspace", space, "--json")
     assert wrong.code != 0
-    assert "not XML" in wrong.json["error"]["message"]
+    assert "not well-formed XML" in wrong.json["error"]["message"]
 
 
 def placed(space: Path, one: Scenario, name: str, file: Path) -> Path:

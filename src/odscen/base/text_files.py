@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text file, UTF-8, as :func:`write_whole` does."""
-    return write_whole(path, text)
+    """Write a text file, UTF-8, as :func:`write_file` does."""
+    return write_file(path, text)
 
 
-def write_whole(path: Path, content: str | bytes) -> Path:
+def write_file(path: Path, content: str | bytes) -> Path:
     """Write a file whole or not at all; its folder is made if need be.
 
     Returns

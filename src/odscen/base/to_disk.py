@@ -6,10 +6,7 @@ Without this, a power cut after a rename can leave a file of the right name and 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 
 def to_disk(path: Path) -> None:
@@ -25,8 +22,8 @@ def all_to_disk(folder: Path) -> None:
     """Wait until everything in a folder and below is on the disk: files, then their folders."""
     for place, _, files in os.walk(folder, topdown=False):
         for name in files:
-            to_disk(folder / place / name)
-        to_disk(folder / place)
+            to_disk(Path(place) / name)
+        to_disk(Path(place))
 
 
 def write_whole(path: Path, text: str) -> None:

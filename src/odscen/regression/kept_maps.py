@@ -7,7 +7,7 @@ import zlib
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError
-from odscen.base.text_files import write_whole
+from odscen.base.text_files import write_file
 from odscen.changes.map_differences import map_differences
 from odscen.opendrive.parse import parse
 from odscen.opendrive.parse_rules import MAX_BYTES
@@ -27,7 +27,7 @@ def keep_map(baselines: Path, entry: MapEntry, digest: str) -> None:
     """Keep the OpenDRIVE text of a map, compressed; a map that is kept already is left alone."""
     file = _file(baselines, digest)
     if not file.is_file():
-        write_whole(file, gzip.compress(entry.read("xodr"), mtime=0))
+        write_file(file, gzip.compress(entry.read("xodr"), mtime=0))
 
 
 def changes_since(baselines: Path, digest: str, entry: MapEntry) -> tuple[MapChange, ...] | None:
