@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from odscen.app.reports import renew_report
 from odscen.app.runs import run
-from odscen.base.errors import InputError
+from odscen.base.checksums import SUMS_FILE
+from odscen.base.errors import DamagedError, InputError
 from odscen.regression.compare import read_runs
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
@@ -21,40 +23,62 @@ def finished(workspace: Workspace, sampled: Path, tmp_path_factory: pytest.TempP
 DAMAGE = (b"", b"\xff" * 40, b"[" * 100_000, b"[]", b'{"status": "completed", "seed": 1}')
 
 
-@pytest.mark.parametrize(
-    ("name", "compared"),
-    [
-        ("summary.json", True),
-        ("plan.json", False),
-        ("actors.json", True),
-        ("events.json", False),
-        ("signals.json", False),
-        ("trajectories.parquet", True),
-        ("signal_states.parquet", False),
-        ("lane_places.json", True),
-        ("figures/segments.csv", True),
-    ],
-)
-def test_a_report_or_a_comparison_of_a_damaged_run_names_the_run(
-    workspace: Workspace, finished: Path, tmp_path: Path, name: str, compared: bool
+USED = {
+    "summary.json": True,
+    "plan.json": False,
+    "actors.json": True,
+    "events.json": False,
+    "signals.json": False,
+    "trajectories.parquet": True,
+    "signal_states.parquet": False,
+    "lane_places.json": True,
+    "figures/segments.csv": True,
+}
+"""Files of a run, and whether a comparison reads them."""
+
+
+@pytest.mark.parametrize("name", USED)
+def test_a_report_or_a_comparison_of_a_damaged_run_names_the_run_and_the_file(
+    workspace: Workspace, finished: Path, tmp_path: Path, name: str
 ) -> None:
-    file = finished / name
-    whole = file.read_bytes()
-    said: dict[str, list[str]] = {"report": [], "comparison": []}
-    try:
-        for damaged in (*DAMAGE, whole[: len(whole) // 2]):
-            file.write_bytes(damaged)
-            for what, found in said.items():
-                try:
-                    if what == "report":
-                        renew_report(workspace, finished, out=tmp_path / "report.html")
-                    else:
-                        read_runs(finished)
-                except InputError as error:
-                    found.append(str(error))
-    finally:
-        file.write_bytes(whole)
-    assert bool(said["comparison"]) == compared
+    run_folder = shutil.copytree(finished, tmp_path / "run")
+    said = _refusals(workspace, run_folder, name)
+    assert [len(found) for found in said.values()] == [len(DAMAGE) + 1] * 2
+    for error in (*said["report"], *said["comparison"]):
+        assert isinstance(error, DamagedError)
+        assert str(run_folder) in str(error)
+        assert [one.file for one in error.files] == [name]
+    renew_report(workspace, run_folder, out=tmp_path / "report.html")
+
+
+@pytest.mark.parametrize("name", USED)
+def test_a_report_or_a_comparison_of_a_damaged_run_without_checksums_names_the_run(
+    workspace: Workspace, finished: Path, tmp_path: Path, name: str
+) -> None:
+    run_folder = shutil.copytree(finished, tmp_path / "run")
+    (run_folder / SUMS_FILE).unlink()
+    said = _refusals(workspace, run_folder, name)
+    assert bool(said["comparison"]) == USED[name]
     assert bool(said["report"]) == (name != "lane_places.json")
-    assert [one for found in said.values() for one in found if str(finished) not in one] == []
-    renew_report(workspace, finished, out=tmp_path / "report.html")
+    every = [str(error) for found in said.values() for error in found]
+    assert [one for one in every if str(run_folder) not in one] == []
+    renew_report(workspace, run_folder, out=tmp_path / "report.html")
+
+
+def _refusals(workspace: Workspace, folder: Path, name: str) -> dict[str, list[InputError]]:
+    """What a report and a comparison say to each damage of a file, which is whole again then."""
+    file = folder / name
+    whole = file.read_bytes()
+    said: dict[str, list[InputError]] = {"report": [], "comparison": []}
+    for damaged in (*DAMAGE, whole[: len(whole) // 2]):
+        file.write_bytes(damaged)
+        for what, found in said.items():
+            try:
+                if what == "report":
+                    renew_report(workspace, folder, out=folder.with_name("report.html"))
+                else:
+                    read_runs(folder)
+            except InputError as error:
+                found.append(error)
+    file.write_bytes(whole)
+    return said

@@ -9,7 +9,7 @@ from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
 
 
-def test_a_full_disk_is_507_in_the_words_of_the_system_and_the_scenario_stays(
+def test_a_full_disk_is_507_with_what_to_do_and_the_scenario_stays(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
     before = client.get(f"/api/scenarios/{sampled}").json()
@@ -20,9 +20,9 @@ def test_a_full_disk_is_507_in_the_words_of_the_system_and_the_scenario_stays(
     edit = {"version": before["version"], "edits": [{"kind": "set_seed", "seed": 77}]}
     answer = client.post(f"/api/scenarios/{sampled}/edits", json=edit)
     assert answer.status_code == 507
-    assert "No space left on device" in answer.json()["error"]["message"]
+    assert answer.json()["error"]["message"] == f"{file}: the disk is full; free some room"
     assert file.read_bytes() == text
-    part.unlink()
+    part.unlink(missing_ok=True)
     assert client.post(f"/api/scenarios/{sampled}/edits", json=edit).status_code in (200, 409)
 
 
@@ -36,11 +36,16 @@ def test_a_folder_that_cannot_be_written_is_503_and_never_a_traceback(
     assert "Traceback" not in answer.text
 
 
-def test_files_of_a_map_that_are_gone_are_404(client: TestClient, workspace: Workspace) -> None:
+def test_files_of_a_map_that_are_gone_are_refused_with_what_to_do(
+    client: TestClient, workspace: Workspace
+) -> None:
     (workspace.root / "maps" / CROSSING / "preview.svg").unlink()
     answer = client.get(f"/api/maps/{CROSSING}/preview.svg")
-    assert answer.status_code == 404
-    assert "preview.svg" in answer.json()["error"]["message"]
+    assert answer.status_code == 422
+    message = answer.json()["error"]["message"]
+    assert "preview.svg" in message
+    assert "no such file" in message
+    assert f"odscen doctor --repair builds map {CROSSING!r} anew" in message
 
 
 @pytest.mark.parametrize("kind", ["od", "counts", "profile", "zones"])

@@ -18,10 +18,12 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from odscen.app.scenarios import generate
+from odscen.app.scenarios import generate, read_scenario
+from odscen.app.signal_plans import lights_of
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace
+from odscen.workspace.wastebasket import Wastebasket
 from tests.web.conftest import CROSSING
 
 CHECKS = [
@@ -44,12 +46,25 @@ async def _kept(_app: object) -> AsyncIterator[None]:
 
 
 @pytest.fixture(scope="module")
-def schema(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def kept(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     root = tmp_path_factory.mktemp("schema") / "workspace"
     shutil.copytree(built, root)
     workspace = Workspace.open(root)
-    generate(workspace, settings=GenerationSettings(map_name=CROSSING, seed=1, fill=0.1))
-    app = create_app(workspace, hosts=None)
+    for seed in (1, 2):
+        generate(workspace, settings=GenerationSettings(map_name=CROSSING, seed=seed, fill=0.1))
+    Wastebasket(workspace).put("scenario", f"{CROSSING}-0002")
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def light(kept: Workspace) -> str:
+    scenario = read_scenario(kept.scenarios / f"{CROSSING}-0001.scenario.json")
+    return lights_of(kept, scenario)[0].junctions[0]
+
+
+@pytest.fixture(scope="module")
+def schema(kept: Workspace) -> Iterator[Any]:
+    app = create_app(kept, hosts=None)
     app.router.lifespan_context = _kept  # schemathesis starts and ends the app for each request
     yield schemathesis.openapi.from_asgi("/api/openapi.json", app)
     app.state.services.close()
@@ -57,8 +72,17 @@ def schema(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
 
 @pytest.mark.filterwarnings("default")  # of schemathesis itself
 @pytest.mark.parametrize(("path", "method"), OPERATIONS)
-def test_the_server_keeps_to_its_schema(schema: Any, path: str, method: str) -> None:
-    known = {"name": f"{CROSSING}-0001", "run": "x-1", "job": "job-1"}
+def test_the_server_keeps_to_its_schema(
+    schema: Any, kept: Workspace, light: str, path: str, method: str
+) -> None:
+    item = next((one.id for one in Wastebasket(kept).items()), "scenario-20260101-000000-00000000")
+    known = {
+        "name": f"{CROSSING}-0001",
+        "run": "x-1",
+        "job": "job-1",
+        "junction": light,
+        "item": item,
+    }
     if path.startswith("/api/maps/"):
         known["name"] = CROSSING
     operation = schema[path][method]

@@ -14,6 +14,7 @@ from pydantic import BaseModel, TypeAdapter
 from starlette.testclient import TestClient
 
 from odscen.app.scenarios import SUFFIX
+from odscen.base.checksums import SUMS_FILE
 from odscen.lanegraph.map_statistics import MapStatistics
 from odscen.results.measures.registry import COUNTS
 from odscen.results.records.run_records import Event, EventKind, event_row
@@ -234,8 +235,10 @@ def test_a_run_of_an_earlier_version_still_opens_and_one_that_cannot_be_read_is_
     run = client.post("/api/runs", json={"scenario": sampled, "until": 5}).json()["run"]
     finished(client, run)
     old, broken = (shutil.copytree(workspace.runs / run, workspace.runs / n) for n in ("a", "b"))
+    for copied in (old, broken):
+        (copied / SUMS_FILE).unlink()  # earlier versions kept no checksums
     summary = json.loads((old / layout.SUMMARY_FILE).read_text(encoding="utf-8"))
-    for name in ("gridlock", "expectations", "notes", "meso", "map_sha256"):
+    for name in ("gridlock", "expectations", "notes", "meso"):
         del summary[name]
     summary["of_a_later_version"] = {"kept": True}
     (old / layout.SUMMARY_FILE).write_text(json.dumps(summary), encoding="utf-8")
@@ -243,7 +246,7 @@ def test_a_run_of_an_earlier_version_still_opens_and_one_that_cannot_be_read_is_
     rows = {row["run"]: row for row in client.get("/api/runs").json()}
     assert rows["a"]["state"] == rows[run]["state"] == "completed"
     assert rows["b"]["state"] == "failed"
-    assert "cannot be read" in rows["b"]["error"]
+    assert "summary.json: not the summary of a run" in rows["b"]["error"]
     told = client.get("/api/runs/a").json()["summary"]
     assert (told["gridlock"], told["notes"]) == (None, [])
     assert client.get("/api/runs/b/summary").status_code == 404

@@ -88,7 +88,7 @@ def _page(
     corridor: Corridor | None,
 ) -> str:
     def text(name: str) -> str:
-        return (folder / name).read_text(encoding="utf-8")
+        return (folder / name).read_text(encoding="utf-8", errors="replace")
 
     recorded = read_trajectories(folder, most=REPORT_ROWS)
     figures = read_tables(folder / layout.FIGURES_FOLDER)
@@ -120,7 +120,7 @@ def _lights(folder: Path) -> LightsOfRun | None:
     states = read_light_states(folder)
     if states is None or not file.is_file() or not table.is_file():
         return None
-    programs = programs_from_json(file.read_text(encoding="utf-8"))
+    programs = programs_from_json(file.read_text(encoding="utf-8", errors="replace"))
     return LightsOfRun(programs, states, read_signal_use_table(table))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shutil
 import threading
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,8 +20,8 @@ from odscen.base.errors import (
     InputError,
     NotFoundError,
     ScenarioError,
-    WorkspaceError,
 )
+from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.scenario.document.json_form import dumps
 from odscen.web import history
@@ -31,7 +31,7 @@ from odscen.workspace.store import check_name
 from odscen.workspace.wastebasket import HISTORY, Wastebasket
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from pathlib import Path
 
     from odscen.scenario.document.scenario_document import Scenario
@@ -73,7 +73,7 @@ class Drafts:
         ScenarioError
             If its file is not a scenario.
         """
-        with self._lock, _disk_errors():
+        with self._lock, disk_errors("scenarios"):
             path = self._path(name)
             if not path.is_file():
                 what = "scenario"
@@ -93,7 +93,7 @@ class Drafts:
         ConflictError
             If the name is taken.
         """
-        with self._lock, _disk_errors():
+        with self._lock, disk_errors("scenarios"):
             name = self._free_name(stem) if name is None else check_name(name, what="scenario")
             self._refuse_taken(name)
             text = dumps(scenario)
@@ -114,7 +114,7 @@ class Drafts:
         InputError
             If the edit is refused.
         """
-        with self._lock, _disk_errors():
+        with self._lock, disk_errors("scenarios"):
             old = self._of_version(name, version)
             scenario = edit(old.scenario)
             text = dumps(scenario)
@@ -131,7 +131,7 @@ class Drafts:
 
     def rename(self, name: str, new: str) -> Draft:
         """Give a scenario's file another name."""
-        with self._lock, _disk_errors():
+        with self._lock, disk_errors("scenarios"):
             draft = self.get(name)
             check_name(new, what="scenario")
             self._refuse_taken(new)
@@ -170,7 +170,7 @@ class Drafts:
         return self._open[name]
 
     def _move(self, name: str, version: int, step: int) -> Draft:
-        with self._lock, _disk_errors():
+        with self._lock, disk_errors("scenarios"):
             old = self._of_version(name, version)
             if (old.history.undo if step < 0 else old.history.redo) is None:
                 msg = f"there is nothing to {'undo' if step < 0 else 'redo'}"
@@ -234,12 +234,3 @@ def _is_name(name: str) -> bool:
     except InputError:
         return False
     return True
-
-
-@contextmanager
-def _disk_errors() -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        msg = f"scenarios: {error.strerror or error} ({error.filename or ''})"
-        raise WorkspaceError(msg) from error

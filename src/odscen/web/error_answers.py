@@ -15,6 +15,7 @@ from odscen.base.errors import (
     InputError,
     NotFoundError,
     OdscenError,
+    ResourceError,
     ScenarioError,
     WorkspaceError,
 )
@@ -131,9 +132,11 @@ def _status(error: OdscenError) -> int:
         return 422
     if not isinstance(error, WorkspaceError):
         return 500
-    if not isinstance(error.__cause__, OSError):  # what is there is damaged, and can be repaired
-        return 409
-    return 507 if error.__cause__.errno in _FULL else 503
+    cause = error.__cause__
+    if isinstance(cause, OSError):
+        return 507 if cause.errno in _FULL else 503
+    # else what is there is damaged, and can be repaired
+    return 503 if isinstance(error, ResourceError) else 409
 
 
 def _response(status: int, info: ErrorInfo) -> Response:

@@ -55,7 +55,7 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     file = run / layout.LANE_PLACES_FILE
     if lanes is None or not file.is_file():
         return None
-    places = LanePlaces.from_json(file.read_text(encoding="utf-8"))
+    places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
     files = trajectory_files(run)
     queues = None
     if files and not meso:
@@ -101,12 +101,14 @@ def read_signal_use(run: Path, *, end: float, meso: bool = False) -> pl.DataFram
     file = run / layout.LIGHTS_FILE
     if states is None or not file.is_file():
         return None
-    programs = programs_from_json(file.read_text(encoding="utf-8"))
+    programs = programs_from_json(file.read_text(encoding="utf-8", errors="replace"))
     files = trajectory_files(run)
     rows = pl.scan_parquet(files) if files and not meso else None
     places = run / layout.LANE_PLACES_FILE
     ways = (
-        LanePlaces.from_json(places.read_text(encoding="utf-8")).ways if places.is_file() else None
+        LanePlaces.from_json(places.read_text(encoding="utf-8", errors="replace")).ways
+        if places.is_file()
+        else None
     )
     return signal_use(programs, states, end=end, rows=rows, ways=ways)
 
