@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 
 from odscen.app.maps import load_map
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.stored_files import tables
 from odscen.base.text_files import write_text
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
@@ -76,7 +76,7 @@ def write_report(
     InputError
         If a file of the run is missing or torn.
     """
-    with tables(str(folder)):
+    with in_file(str(folder)), tables(str(folder)):
         page = _page(folder, summary, loaded, corridor)
     return write_text(out or folder / layout.REPORT_FILE, page)
 

@@ -98,9 +98,6 @@ def tables(place: str) -> Iterator[None]:
 
     try:
         yield
-    except UnicodeDecodeError as error:
-        msg = f"{place}: a file of the run is damaged: it is no text: {error.reason}"
-        raise InputError(msg) from error
     except (OSError, pl.exceptions.PolarsError) as error:
         msg = f"files of the run cannot be read: {_first_line(error)}"
         raise InputError(msg, file=place) from error

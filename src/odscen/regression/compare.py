@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, in_file
 from odscen.regression.measure import measure
 from odscen.results.measures.comparison import CONFIDENCE, compare_figure
 from odscen.results.measures.registry import SEGMENT_FIGURES
@@ -210,7 +210,8 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     maps: set[tuple[str, str]] = set()
     for path in folders:
         summary = _summary(path)
-        measured, figures = measure(path, summary), read_tables(path / FIGURES_FOLDER)
+        with in_file(str(path)):
+            measured, figures = measure(path, summary), read_tables(path / FIGURES_FOLDER)
         if summary["seed"] in runs:
             msg = f"seed {summary['seed']} is there twice; a folder to compare holds one run a seed"
             raise InputError(msg, file=str(path))

@@ -93,7 +93,7 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
     actors_file = folder / layout.ACTORS_FILE
     with tables(str(folder)):
         with in_file(str(actors_file)):
-            actors = actors_from_json(actors_file.read_text(encoding="utf-8"))
+            actors = actors_from_json(actors_file.read_text(encoding="utf-8", errors="replace"))
         for actor in actors:
             if actor.flow is None:
                 found |= {
