@@ -186,6 +186,6 @@ def test_a_network_that_cannot_be_used_leaves_the_map_as_it_was(place: Place) ->
     before = place.workspace.map(NAME)
     broken = place.folder / "broken.net.xml"
     broken.write_bytes(place.net[:9000])
-    with pytest.raises(InputError, match=r"^broken\.net\.xml: the SUMO network is not XML"):
+    with pytest.raises(InputError, match=r"^broken\.net\.xml: not well-formed XML: "):
         bring_in(place.workspace, NAME, broken)
     assert place.workspace.map(NAME) == before

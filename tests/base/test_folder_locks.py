@@ -49,10 +49,17 @@ def test_a_lock_is_gone_when_it_is_given_back(tmp_path):
 
 
 def test_a_folder_that_is_about_to_be_free_is_waited_for(tmp_path):
-    with holder(tmp_path / "x") as process:
-        process.kill()
-        with locked(tmp_path / "x", what="run"):
-            pass
+    # A process that the holder has started outlives it for a moment, with the lock.
+    code = (
+        "import os, subprocess, sys; from pathlib import Path\n"
+        "from odscen.base.folder_locks import locked\n"
+        "with locked(Path(sys.argv[1]), what='run') as lock:\n"
+        "    subprocess.Popen(['sleep', '1'], pass_fds=[lock]); os._exit(0)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, tmp_path / "x"], check=True)
+    assert is_locked(tmp_path / "x")
+    with locked(tmp_path / "x", what="run"):
+        pass
 
 
 def test_what_a_killed_process_leaves_is_cleared_and_what_a_living_one_builds_is_not(tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from odscen.base.checksums import sums_of, write_sums
 from tests.cli.conftest import SHIPPED, odscen
 
 STATISTICS = {
@@ -146,6 +147,7 @@ def test_verify_names_what_a_tampered_network_lost(workspace, tmp_path):
     west = r'netOffset="(-?[\d.]+)'
     moved = re.sub(west, lambda found: f'netOffset="{float(found[1]) + 0.3}', text, count=1)
     net.write_text(moved, encoding="utf-8")
+    write_sums(net.parent, sums_of(net.parent))
     sheet = tmp_path / "sheet.svg"
     done = odscen("maps", "verify", "t_junction_signs", "--drawing", sheet, "--workspace", tmp_path)
     assert done.code == 1
@@ -156,7 +158,12 @@ def test_verify_names_what_a_tampered_network_lost(workspace, tmp_path):
 
 def test_verify_refuses_a_network_that_is_none(workspace, tmp_path):
     shutil.copytree(workspace / "maps" / "t_junction_signs", tmp_path / "maps" / "t_junction_signs")
-    (tmp_path / "maps" / "t_junction_signs" / "net.net.xml").write_text("<net", encoding="utf-8")
+    net = tmp_path / "maps" / "t_junction_signs" / "net.net.xml"
+    net.write_text("<net", encoding="utf-8")
+    done = odscen("maps", "verify", "t_junction_signs", "--workspace", tmp_path)
+    assert done.code == 2
+    assert "net.net.xml: expected sha256" in done.err
+    write_sums(net.parent, sums_of(net.parent))
     done = odscen("maps", "verify", "t_junction_signs", "--json", "--workspace", tmp_path)
     assert done.code == 2
     assert done.json["error"]["file"] == "net.net.xml"

@@ -43,6 +43,8 @@ def test_a_baseline_is_read_by_figure_and_seed(tmp_path: Path) -> None:
         ({"rows": [{"figure": "mean_delay", "values": [1]}]}, "1 values for 2 seeds"),
         ({"rows": [{"figure": "mean_delay", "values": [int("9" * 400), 1]}]}, "infinity"),
         ({"rows": [{"figure": ["mean_delay"], "values": [1, 2]}]}, "unhashable"),
+        ({"rows": [{"segment": [], "flow": [1, 2]}]}, "unhashable"),
+        ({"rows": [[]]}, "row .* is of no figure"),
         ({"rows": [7]}, "not iterable"),
         ({"rows": None}, "not iterable"),
         ({"fingerprint": 3}, "not iterable"),
@@ -59,11 +61,23 @@ def test_a_damaged_baseline_is_refused_with_its_file(
     assert refused.value.file == str(file)
 
 
-def test_a_hundred_thousand_brackets_are_no_baseline(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[" * 100_000, "not a baseline: depth limit exceeded"),
+        ('{"format": ' + "9" * 5000 + "}", "not a baseline"),
+        ("null", "not a baseline"),
+    ],
+    ids=["brackets", "digits", "null"],
+)
+def test_what_is_no_baseline_is_refused_with_its_file(
+    tmp_path: Path, text: str, words: str
+) -> None:
     file = tmp_path / "x.json"
-    file.write_text("[" * 100_000, encoding="utf-8")
-    with pytest.raises(InputError, match="not a baseline: depth limit exceeded"):
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=words) as refused:
         read_baseline(file)
+    assert refused.value.file == str(file)
 
 
 def of_travel_times(*values: float | None) -> Baseline:

@@ -15,6 +15,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from odscen.base.atomic_folders import clear_leftovers
 from odscen.base.errors import LimitError, OpenDriveError, ScenarioError, ToolError
 from odscen.workspace.allowances import BuildLimits
 from odscen.workspace.guarded_build import read_scenario_in_child
@@ -183,7 +184,11 @@ def test_a_killed_command_leaves_no_process_and_no_folder(tmp_path: Path, motorw
         parent.send_signal(signal.SIGKILL)
     assert started
     wait_for(lambda: not any(one.is_running() for one in started))
-    wait_for(lambda: not [*(root / "maps").iterdir(), *scratch.iterdir()])
+    # The lock's file is nobody's any more, and goes with the next look for leftovers.
+    wait_for(lambda: {one.suffix for one in (root / "maps").iterdir()} <= {".lock"})
+    wait_for(lambda: not any(scratch.iterdir()))
+    clear_leftovers(root / "maps")
+    assert not any((root / "maps").iterdir())
 
 
 def test_a_fork_leaves_the_waiting_child_to_its_parent() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from odscen.app.runs import run
 from odscen.app.scenarios import check_scenario, generate
+from odscen.base.checksums import sums_of, write_sums
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.scenario.sampling.generation_settings import GenerationSettings
@@ -95,6 +96,7 @@ def test_a_map_without_a_mention_of_a_converter_is_odscens(tmp_path: Path) -> No
     info = json.loads((entry.folder / "map.json").read_text())
     del info["network"]
     (entry.folder / "map.json").write_text(json.dumps(info))
+    write_sums(entry.folder, sums_of(entry.folder))
     assert Workspace.open(tmp_path).map("signal_crossing").converter == "odscen"
 
 

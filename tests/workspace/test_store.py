@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from odscen.app.removal import remove
 from odscen.base.errors import (
     DamagedError,
     InputError,
@@ -150,7 +151,7 @@ def test_one_broken_map_hides_no_other_and_can_be_added_again_or_removed(tmp_pat
     assert store.add_map(SMALL, name="bad").sha256 == good.sha256
     (bad.folder / "map.json").unlink()
     assert [one.name for one in store.catalogue()[1]] == ["bad"]
-    store.remove_map("bad")
+    remove(store, "map", "bad")
     assert store.map_names() == ["good"]
 
 

@@ -119,14 +119,14 @@ def test_edges_for_walking_are_joined_over_crossings_or_where_they_meet() -> Non
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "is not XML"),
+        ("", "^not well-formed XML: "),
         ("<OpenDRIVE/>", "first element is <OpenDRIVE>"),
         ("<net/>", "<location> is missing"),
         (NET.replace('shape="100,0 110,0"', 'shape="100,0 nan,0"'), "lane a_0 has no usable shape"),
         (NET.replace('toLane="0"', 'toLane="7"'), "cannot be read"),
         (NET.replace('via=":j_0_0"', 'via=":j_9_0"'), "via :j_9_0, which is no lane"),
         (NET.replace('length="10"', 'length="nan"', 1), "no usable length, speed or width"),
-        (NET[: len(NET) // 2], "is not XML"),
+        (NET[: len(NET) // 2], "^not well-formed XML: "),
         (NET[: NET.index("<edge")] + "</net>", "no edges"),
     ],
 )

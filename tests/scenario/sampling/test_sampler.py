@@ -115,8 +115,13 @@ def test_speeds_follow_the_limit() -> None:
 
 
 @pytest.mark.parametrize("depart", ["1e18", "1e10"])
-def test_a_drawn_value_that_no_actor_can_have_is_refused_with_its_field(depart: str) -> None:
-    drawn = config(f'[behaviour]\ndepart = {{kind = "constant", value = {depart}}}')
+def test_a_value_that_nothing_can_have_is_refused_on_reading_with_its_field(depart: str) -> None:
+    with pytest.raises(ScenarioError, match=r"depart\.constant\.value: .*equal to 10{9}"):
+        config(f'[behaviour]\ndepart = {{kind = "constant", value = {depart}}}')
+
+
+def test_a_drawn_value_that_no_actor_can_have_is_refused_with_its_field() -> None:
+    drawn = config('[behaviour]\ndepart = {kind = "constant", value = -1}')
     with pytest.raises(ScenarioError, match=r"actor: depart: .*equal to"):
         sample_scenario(two_lane_road(), drawn, seed=1, name="x")
 
