@@ -120,12 +120,6 @@ def test_a_value_that_nothing_can_have_is_refused_on_reading_with_its_field(depa
         config(f'[behaviour]\ndepart = {{kind = "constant", value = {depart}}}')
 
 
-def test_a_drawn_value_that_no_actor_can_have_is_refused_with_its_field() -> None:
-    drawn = config('[behaviour]\ndepart = {kind = "constant", value = -1}')
-    with pytest.raises(ScenarioError, match=r"actor: depart: .*equal to"):
-        sample_scenario(two_lane_road(), drawn, seed=1, name="x")
-
-
 def test_nodes_that_the_simulator_cannot_use_are_left_alone() -> None:
     graph = GRAPHS["fork"]
     spawnable = np.ones(len(graph.lanes.x), dtype=bool)
