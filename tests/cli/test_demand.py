@@ -98,3 +98,12 @@ def test_a_day_of_a_whole_map_says_what_its_junctions_carry(workspace, tmp_path)
     assert 0 < done.json["trips"] <= 2000
     assert done.json["volume"] <= 0.71 * done.json["capacity"]
     assert odscen("check", out, "--workspace", workspace).code == 0
+
+
+@pytest.mark.parametrize("trips", ["1e8", "9" * 30])
+def test_a_day_of_endless_trips_is_refused_at_once(workspace, tmp_path, trips):
+    call = ("demand", "weekday", "--map", "signal_crossing", "--trips", trips)
+    done = odscen(*call, "-o", tmp_path / "day.json", "--workspace", workspace)
+    assert done.code == 2
+    assert "trips must be above 0 and at most 1e+07" in done.err
+    assert not (tmp_path / "day.json").exists()

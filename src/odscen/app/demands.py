@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from odscen.sumo.calibrate.town_day import Load
     from odscen.workspace.store import Workspace
 
+MOST_TRIPS = 1e7
+"""Of a day, as of a matrix of the document."""
+
 
 def import_table(
     workspace: Workspace,
@@ -155,8 +158,11 @@ def with_whole_day(
     ScenarioError
         If the map is in several pieces.
     InputError
-        If there is no such day, or no trips are possible.
+        If there is no such day, or no trips are possible, or so many.
     """
+    if not 0.0 < trips <= MOST_TRIPS:
+        msg = f"trips must be above 0 and at most {MOST_TRIPS:g}, not {trips:g}"
+        raise InputError(msg)
     graph = loaded.sumo.graph
     empty = edits.new_scenario(
         graph, name=scenario.name, roi=graph.segments.ids, seed=scenario.seed

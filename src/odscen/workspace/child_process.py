@@ -220,6 +220,9 @@ def _give_back(child: _Child) -> None:
 
 @atexit.register
 def _end_waiting() -> None:
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, signal.SIGINT):  # it is ending, whoever asks for it now
+            signal.signal(number, signal.SIG_IGN)
     with _lock:
         while _waiting:
             _waiting.pop().end()
