@@ -51,7 +51,7 @@ def test_the_message_is_the_likeliest_cause_with_few_figures_and_the_worst_place
     assert "; most at junction j10001: waiting_time is " in message
     assert message.count(" was ") == 3
     message = case_of(root, "t_junction_signs").find("failure").get("message")
-    assert message.startswith("map: ")
+    assert message.startswith("the map: ")
     assert "; most at segment r2: free_speed is 5." in message
     message = case_of(root, "broken").find("error").get("message")
     assert "'9.9.9.9'" in message

@@ -62,7 +62,7 @@ def test_the_summary_is_a_table_that_markdown_takes_as_it_stands(mixed):
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     assert len(rows) == 2 + 4
     assert all(len(re.findall(r"(?<!\\)\|", row)) == 4 for row in rows)
-    assert "| t\\_junction\\_signs | :x: failed | map: " in text
+    assert "| t\\_junction\\_signs | :x: failed | the map: " in text
     assert "- the map t\\_junction\\_signs: 1 of 4 scenarios" in text
 
 
