@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from odscen.changes.map_change import ChangedThing
-    from odscen.opendrive.road_model import Road, RoadObject, Signal, SignalReference
+    from odscen.opendrive.road_model import Road
 
-    Thing = Signal | SignalReference | RoadObject
 
 _MOVED = 0.01
 _NEAR = 0.5
@@ -30,11 +29,6 @@ def furniture_differences(old: Road, new: Road) -> Iterator[MapChange]:
     yield from _things(old, new, old.signals, new.signals, _signal_name)
     yield from _things(old, new, old.signal_references, new.signal_references, _reference_name)
     yield from _things(old, new, old.objects, new.objects, _object_name)
-
-
-def furniture_of(road: Road) -> list[Thing]:
-    """Everything that stands at a road."""
-    return [*road.signals, *road.signal_references, *road.objects]
 
 
 def _signal_name(one: Any) -> tuple[ChangedThing, str]:

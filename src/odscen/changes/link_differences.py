@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.base.shown import shown_id
 from odscen.changes.map_change import ChangePlace, MapChange, of_lane, of_road
 from odscen.changes.paired_lanes import SAME
+from odscen.opendrive.lanes import is_forward
 from odscen.opendrive.topology import lane_successors
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def _between(
             return None
         road = odr.roads[key.road]
         lane = road.sections[key.section].lanes[key.lane]
-        forward = ((lane.id < 0) == (road.rule == "RHT")) != (lane.direction == "reversed")
+        forward = is_forward(road, lane)
         number = len(pair.stretches) - 1 if forward == leaves else 0
         at = pair.before.length if forward == leaves else 0.0
         ends.append(_named(pair, number, key.lane, side, at))

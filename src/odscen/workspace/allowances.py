@@ -60,7 +60,7 @@ class Allowance(NamedTuple):
 
     @property
     def wall_seconds(self) -> float:
-        """Seconds by the clock on the wall."""
+        """Wall seconds."""
         return _PATIENCE * self.seconds
 
     def passed(self, what: str, limit: str) -> LimitError:

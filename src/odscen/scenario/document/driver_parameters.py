@@ -52,6 +52,3 @@ DRIVER_PARAMETERS: dict[str, DriverParameter] = {
     "lcOvertakeRight": DriverParameter(0.0, 1.0, "", "probability of overtaking on the right"),
 }
 """By name, in the order in which they are documented and written."""
-
-CAR_FOLLOWING = ("Krauss", "IDM")
-"""Car-following models of SUMO that take these parameters."""
