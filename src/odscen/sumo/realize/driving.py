@@ -185,6 +185,12 @@ def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) 
     return round(drawn.factor_mean + drawn.factor_deviation * z, 4)
 
 
+def factor_of(user: RoadUser, kind: DriverKind, seed: int) -> float:
+    """Speed factor of a road user: that of its driver set, else drawn by its style."""
+    own = kind.drawn.get("speedFactor")
+    return draw_factor(seed, user.id, kind.style, user.category) if own is None else own
+
+
 def driver(
     user: RoadUser,
     body: Body,

@@ -31,13 +31,12 @@ from odscen.sumo.folder.layout import (
     SIGNALS_FILE,
 )
 from odscen.sumo.realize.departures import demand_users, road_users
-from odscen.sumo.realize.driving import KINDS, draw_factor, driver, kind_of
+from odscen.sumo.realize.driving import KINDS, driver, factor_of, kind_of
 from odscen.sumo.realize.light_realization import realized_lights
 from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.recording import region_xml
-from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
@@ -316,15 +315,12 @@ class _Writer:
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])
-        seed, drivers = self._scenario.seed, self._scenario.drivers
-        kind = kind_of(user, drivers, seed)
-        factor = kind.drawn.get("speedFactor")
-        if factor is None:
-            factor = draw_factor(seed, user.id, kind.style, user.category)
+        drivers = self._scenario.drivers
+        kind = kind_of(user, drivers, self._scenario.seed)
         return driver(
             user,
             body,
-            factor=factor,
+            factor=factor_of(user, kind, self._scenario.seed),
             limit=limit if limit is not None and math.isfinite(limit) else None,
             weather=self._effect,
             electric=user.design.model is not None
