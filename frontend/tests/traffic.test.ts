@@ -19,7 +19,15 @@ import { fileGroups } from "../src/run/files";
 import { countMarks, countStations, worstFirst } from "../src/run/fit";
 import { bytes, hoursMinutes, longClock, span } from "../src/ui/words";
 
-const empty: Demand = { clock: 0, zones: [], profiles: [], matrices: [], counts: [], background: [] };
+const empty: Demand = {
+  clock: 0,
+  zones: [],
+  profiles: [],
+  inputs: [],
+  matrices: [],
+  counts: [],
+  background: [],
+};
 const background: Background = {
   id: "background",
   begin: 0,

@@ -107,3 +107,34 @@ def test_a_day_of_endless_trips_is_refused_at_once(workspace, tmp_path, trips):
     assert done.code == 2
     assert "trips must be above 0 and at most 1e+07" in done.err
     assert not (tmp_path / "day.json").exists()
+
+
+def test_vehicles_from_outside_are_added_where_they_can_enter(workspace, scenario, tmp_path):
+    listed = odscen("demand", "entries", scenario, "--json", "--workspace", workspace)
+    assert listed.code == 0, listed.err
+    entry = listed.json["entries"][0]
+    place = ("--segment", entry["segment"], "--direction", entry["direction"])
+    done = odscen(
+        *("demand", "inflow", scenario, *place, "--per-hour", 450, "--mix", "car=9,truck=1"),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert done.json["inputs"] == 1
+    table = tmp_path / "inputs.csv"
+    table.write_text(f"segment,direction,0,300\n{entry['segment']},{entry['direction']},20,30\n")
+    more = odscen(
+        *("demand", "import", scenario, "--inputs", table, "--id", "counted", "--json"),
+        *("--workspace", workspace),
+    )
+    assert more.code == 0, more.err
+    document = json.loads(Path(scenario).read_text(encoding="utf-8"))
+    inputs = document["demand"]["inputs"]
+    assert [one["id"] for one in inputs] == ["input-1", "counted-1"]
+    assert inputs[1]["volumes"] == [20, 30]
+    assert inputs[1]["interval"] == 300
+    wrong = odscen(
+        *("demand", "inflow", scenario, "--segment", "j10001", "--per-hour", 10),
+        *("--workspace", workspace),
+    )
+    assert wrong.code == 2
+    assert "no lane leads into the region of interest on 'j10001'" in wrong.err

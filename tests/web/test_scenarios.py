@@ -65,6 +65,7 @@ ALL = (
     ("set_matrix", {"matrix": "am", "trips": [["west", "east", 40]], "profile": "morning"}),
     ("set_counts", {"counts": "survey", "rows": [["r1>j10001", 0, 900, 12]]}),
     ("set_background", {"background": "some", "per_km": 2}),
+    ("set_input", {"inflow": "in", "segment": "r1", "direction": "forward", "per_hour": 300}),
     ("remove_demand", {"part": "survey"}),
 )
 

@@ -7,6 +7,9 @@ export type Demand = Schemas["Demand"];
 export type Zone = Schemas["Zone"];
 export type Matrix = Schemas["Matrix"];
 export type Counts = Schemas["Counts"];
+export type VehicleInput = Schemas["VehicleInput"];
+/** Where vehicles can drive into the region. */
+export type Entry = Schemas["EntryPlace"];
 /** One of the three amounts is not null. */
 export type Background = Schemas["Background"];
 /** Relative shares; they need not sum to one. */
@@ -24,6 +27,7 @@ export const demand = {
     >;
     return call("post", "/api/scenarios/{name}/demand/table", { path: { name }, body: form(fields) });
   },
+  entries: (name: string) => call("get", "/api/scenarios/{name}/demand/entries", { path: { name } }),
   day: (name: string, version: number, day: "weekday" | "weekend", trips: number) =>
     call("post", "/api/scenarios/{name}/demand/day", { path: { name }, body: { version, day, trips } }),
 };

@@ -504,6 +504,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/scenarios/{name}/demand/entries": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Entries
+         * @description Where vehicles can drive into the region of a scenario.
+         */
+        get: operations["entries_api_scenarios__name__demand_entries_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/scenarios/{name}/demand/day": {
         parameters: {
             query?: never;
@@ -1301,7 +1321,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "od" | "counts" | "profile" | "zones";
+            kind: "od" | "inputs" | "counts" | "profile" | "zones";
             /**
              * Part
              * @description Name of what is read in.
@@ -1768,6 +1788,11 @@ export interface components {
              */
             profiles: components["schemas"]["Profile"][];
             /**
+             * Inputs
+             * @default []
+             */
+            inputs: components["schemas"]["VehicleInput"][];
+            /**
              * Matrices
              * @default []
              */
@@ -1978,7 +2003,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -1988,6 +2013,21 @@ export interface components {
          * @enum {string}
          */
         ElementOutcome: "kept" | "repaired" | "guessed" | "lost";
+        /**
+         * EntryPlace
+         * @description Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first.
+         */
+        EntryPlace: {
+            /** Segment */
+            segment: string;
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "forward" | "backward";
+            /** Lanes */
+            lanes: number[];
+        };
         /**
          * Environment
          * @description Weather and time of day: a preset of the asset catalogue and single values that differ.
@@ -3125,7 +3165,7 @@ export interface components {
         };
         /**
          * RemoveDemandEdit
-         * @description Remove a zone, profile, matrix, set of counts or background traffic by its name.
+         * @description Remove a zone, profile, input, matrix, set of counts or background traffic by its name.
          */
         RemoveDemandEdit: {
             /**
@@ -3609,6 +3649,7 @@ export interface components {
              *       "clock": 0,
              *       "zones": [],
              *       "profiles": [],
+             *       "inputs": [],
              *       "matrices": [],
              *       "counts": [],
              *       "background": []
@@ -3855,6 +3896,53 @@ export interface components {
             actor: string;
             /** Goal */
             goal: string | null;
+        };
+        /**
+         * SetInputEdit
+         * @description Add vehicles that drive in at the boundary of the region, or change those of that name.
+         */
+        SetInputEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_input";
+            /** Id */
+            id?: string;
+            /** Begin */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /** Profile */
+            profile?: string | null;
+            mix?: {
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
+            };
+            /** Segment */
+            segment?: string;
+            /** Direction */
+            direction?: ("forward" | "backward") | null;
+            /** Lanes */
+            lanes?: number[];
+            /** Per Hour */
+            per_hour?: number | null;
+            /** Volumes */
+            volumes?: number[];
+            /** Interval */
+            interval?: number;
+            /** To */
+            to?: [
+                string,
+                number
+            ][];
+            /** Inflow */
+            inflow: string;
         };
         /**
          * SetMatrixEdit
@@ -4348,6 +4436,67 @@ export interface components {
             high: number;
         };
         /**
+         * VehicleInput
+         * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
+         *
+         *     They come on the lanes that begin on ``segment``, or on some of them: ``lanes`` are ids of
+         *     OpenDRIVE lanes. ``direction`` is needed where vehicles come in both ways, and is ``forward``
+         *     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
+         *     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
+         *     are zones or segments with their shares; without it, each draws one of the ends of the region.
+         */
+        VehicleInput: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /** Profile */
+            profile: string | null;
+            mix: {
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
+            };
+            /** Segment */
+            segment: string;
+            /** Direction */
+            direction: ("forward" | "backward") | null;
+            /**
+             * Lanes
+             * @default []
+             */
+            lanes: number[];
+            /** Per Hour */
+            per_hour: number | null;
+            /**
+             * Volumes
+             * @default []
+             */
+            volumes: number[];
+            /**
+             * Interval
+             * @default 900
+             */
+            interval: number;
+            /**
+             * To
+             * @default []
+             */
+            to: [
+                string,
+                number
+            ][];
+        };
+        /**
          * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
          *
@@ -4782,6 +4931,11 @@ export interface components {
              * @default []
              */
             profiles?: components["schemas"]["Profile-File"][];
+            /**
+             * Inputs
+             * @default []
+             */
+            inputs?: components["schemas"]["VehicleInput-File"][];
             /**
              * Matrices
              * @default []
@@ -5279,6 +5433,79 @@ export interface components {
             high: number;
         };
         /**
+         * VehicleInput
+         * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
+         *
+         *     They come on the lanes that begin on ``segment``, or on some of them: ``lanes`` are ids of
+         *     OpenDRIVE lanes. ``direction`` is needed where vehicles come in both ways, and is ``forward``
+         *     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
+         *     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
+         *     are zones or segments with their shares; without it, each draws one of the ends of the region.
+         */
+        "VehicleInput-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * Profile
+             * @default null
+             */
+            profile?: string | null;
+            mix?: {
+                car?: number;
+                van?: number;
+                truck?: number;
+                bus?: number;
+                motorcycle?: number;
+                bicycle?: number;
+                pedestrian?: number;
+            };
+            /** Segment */
+            segment: string;
+            /**
+             * Direction
+             * @default null
+             */
+            direction?: ("forward" | "backward") | null;
+            /**
+             * Lanes
+             * @default []
+             */
+            lanes?: number[];
+            /**
+             * Per Hour
+             * @default null
+             */
+            per_hour?: number | null;
+            /**
+             * Volumes
+             * @default []
+             */
+            volumes?: number[];
+            /**
+             * Interval
+             * @default 900
+             */
+            interval?: number;
+            /**
+             * To
+             * @default []
+             */
+            to?: [
+                string,
+                number
+            ][];
+        };
+        /**
          * Zone
          * @description Segments that demand calls by one name.
          */
@@ -5354,6 +5581,7 @@ export interface components {
              *       "clock": 0,
              *       "zones": [],
              *       "profiles": [],
+             *       "inputs": [],
              *       "matrices": [],
              *       "counts": [],
              *       "background": []
@@ -8583,6 +8811,118 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ScenarioState"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    entries_api_scenarios__name__demand_entries_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EntryPlace"][];
                 };
             };
             /** @description The request cannot be read. */

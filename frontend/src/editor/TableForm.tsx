@@ -15,6 +15,13 @@ const KINDS: Record<TableKind, { label: string; stem: string | null; text: strin
     stem: "trips",
     text: "How many trips go from one segment or zone to another. Columns “begin” and “end” may say when.",
   },
+  inputs: {
+    label: "Vehicle inputs",
+    stem: "input",
+    text:
+      "How many vehicles drive into the region on a segment in each slice of time; " +
+      "a column “direction” where both directions lead in.",
+  },
   counts: {
     label: "Counts",
     stem: "counts",

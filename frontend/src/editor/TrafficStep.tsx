@@ -3,6 +3,7 @@ import { useState } from "react";
 
 import type { Edit, ScenarioDocument } from "../api/types";
 import { BackgroundForm } from "./BackgroundForm";
+import { InputForm, NewInput } from "./InputForm";
 import { freeName, secondsOfDay, timeOfDay } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
 import type { Profiles } from "./DayProfiles";
@@ -10,7 +11,7 @@ import type { EditorStore } from "./store";
 import { TableForm } from "./TableForm";
 import { WholeDay } from "./WholeDay";
 
-type Adding = "day" | "table" | null;
+type Adding = "input" | "day" | "table" | null;
 
 /** All traffic besides the road users placed by hand: background, trips from tables, counts. */
 export function TrafficStep({
@@ -50,6 +51,16 @@ export function TrafficStep({
           if (event.key === "Enter") setClock(event.currentTarget.value);
         }}
       />
+      {demand.inputs.map((one) => (
+        <InputForm
+          key={one.id}
+          input={one}
+          profiles={profiles}
+          onEdit={onEdit}
+          onShow={onShow}
+          onRemove={() => remove(one.id)}
+        />
+      ))}
       {demand.background.map((one) => (
         <BackgroundForm
           key={one.id}
@@ -87,6 +98,20 @@ export function TrafficStep({
         >
           Add background traffic
         </Button>
+        <Button variant="default" aria-expanded={adding === "input"} onClick={() => toggle("input")}>
+          Add vehicles from outside
+        </Button>
+        {adding === "input" && (
+          <NewInput
+            store={store}
+            demand={demand}
+            onShow={onShow}
+            onEdit={(edit) => {
+              onEdit(edit);
+              setAdding(null);
+            }}
+          />
+        )}
         <Button variant="default" aria-expanded={adding === "day"} onClick={() => toggle("day")}>
           Whole day on the whole map
         </Button>

@@ -44,19 +44,20 @@ export const amountOf = (one: Background): Amount =>
   AMOUNTS.find(({ key }) => one[key] !== null) ?? AMOUNTS[0];
 
 /** Whether the demand of a scenario has trips to make. */
-export const bringsTraffic = ({ matrices, counts, background }: Demand): boolean =>
-  matrices.length + counts.length + background.length > 0;
+export const bringsTraffic = ({ inputs, matrices, counts, background }: Demand): boolean =>
+  inputs.length + matrices.length + counts.length + background.length > 0;
 
 export const tripsOf = (matrix: Matrix): number =>
   matrix.trips.reduce((sum, [, , number]) => sum + number, 0);
 
 /** What a scenario's traffic is, in a line. */
 export function trafficNote(demand: Demand): string {
-  const { matrices, counts, background } = demand;
+  const { inputs, matrices, counts, background } = demand;
   if (!bringsTraffic(demand)) return "Who else is on the road?";
   const trips = Math.round(matrices.reduce((sum, one) => sum + tripsOf(one), 0));
   const counted = counts.reduce((sum, one) => sum + one.rows.length, 0);
   return [
+    ...(inputs.length ? [count(inputs.length, "vehicle input")] : []),
     ...(matrices.length ? [count(trips, "trip")] : []),
     ...(counts.length ? [count(counted, "count")] : []),
     ...(background.length ? ["background traffic"] : []),
@@ -75,7 +76,7 @@ export function mixWords(mix: Mix): string {
 /** A name that no part of the demand has yet. */
 export function freeName(demand: Demand, stem: string): string {
   const taken = new Set(
-    [demand.zones, demand.profiles, demand.matrices, demand.counts, demand.background]
+    [demand.zones, demand.profiles, demand.inputs, demand.matrices, demand.counts, demand.background]
       .flat()
       .map(({ id }) => id),
   );
@@ -113,6 +114,10 @@ export function exampleTable(kind: TableKind, demand: Demand, roads: readonly st
   const rows: Record<TableKind, string[]> = {
     od: ["from,to,trips", `${a},${b},120`, `${b},${a},90`],
     counts: ["place,begin,end,count", `${a},${slice(0)},48`, `${a},${slice(1)},55`],
+    inputs: [
+      `segment,${timeOfDay(start)},${timeOfDay(start + 900)},${timeOfDay(start + 1800)}`,
+      `${a},110,125,140`,
+    ],
     profile: ["time,share", "0:00,1", "6:00,6", "12:00,5", "18:00,3"],
     zones: ["zone,segment", `centre,${a}`, ...(b === a ? [] : [`centre,${b}`])],
   };

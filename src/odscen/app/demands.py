@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import contextmanager
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -17,10 +18,13 @@ from odscen.scenario.demand.day_profiles import DAY
 from odscen.scenario.demand.demand_tables import (
     COLUMNS,
     read_counts,
+    read_inputs,
     read_matrix,
     read_profile,
     read_zones,
 )
+from odscen.scenario.demand.entries import entries
+from odscen.scenario.placing.region import Region
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
 from odscen.sumo.folder.layout import SCENARIO_FILE
@@ -31,6 +35,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.demand.entries import Entry
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.town_day import Load
@@ -55,10 +61,10 @@ def import_table(
     Parameters
     ----------
     kind
-        ``od``, ``counts``, ``profile`` or ``zones``.
+        ``od``, ``inputs``, ``counts``, ``profile`` or ``zones``.
     name
         Of the part of the demand; the kind's if not given. A matrix with times of its own becomes
-        one part for each slice, numbered from 1 on.
+        one part for each slice, and inputs one for each line, numbered from 1 on.
     day
         Day profile of a matrix without times.
     fields
@@ -111,6 +117,23 @@ def import_text(
         counted, own = read_counts(text, clock=clock), name or "counts"
         with _by_line(scenario, kind, own, counted.lines):
             return edits.set_counts(scenario, graph, counts=own, rows=counted.values, **fields)
+    if kind == "inputs":
+        for number, row in enumerate(read_inputs(text, clock=clock), start=1):
+            own = f"{name or 'input'}-{number}"
+            with _by_line(scenario, kind, own, (row.line,)):
+                scenario = edits.set_input(
+                    scenario,
+                    graph,
+                    inflow=own,
+                    segment=row.segment,
+                    direction=row.direction,
+                    begin=row.begin,
+                    end=row.begin + row.interval * len(row.volumes),
+                    interval=row.interval,
+                    volumes=row.volumes,
+                    **fields,
+                )
+        return scenario
     slices = read_matrix(text, clock=clock)
     for number, (when, trips) in enumerate(slices.items(), start=1):
         whole = when is None and len(slices) == 1
@@ -121,6 +144,25 @@ def import_text(
                 scenario, graph, matrix=own, trips=trips.values, profile=day, **window, **fields
             )
     return scenario
+
+
+def add_input(
+    workspace: Workspace, scenario: Scenario, *, name: str | None, **fields: Any
+) -> Scenario:
+    """Add vehicles that drive in at the boundary; ``fields`` are those of ``VehicleInput``.
+
+    Without a ``name`` they get a new one.
+    """
+    if name is None:
+        taken = {part.id for _, part in scenario.demand.parts}
+        name = next(one for n in count(1) if (one := f"input-{n}") not in taken)
+    graph = map_of(workspace, scenario).sumo.graph
+    return edits.set_input(scenario, graph, inflow=name, **fields)
+
+
+def find_entries(scenario: Scenario, graph: MapGraph) -> tuple[Entry, ...]:
+    """Where vehicles can drive into the region of a scenario."""
+    return entries(Region.of(graph, scenario.roi))
 
 
 def add_background(
@@ -206,7 +248,13 @@ def fit(workspace: Workspace, what: Path) -> CountFits:
     return run_fit(scenario, loaded.sumo, pl.scan_parquet(trajectories))
 
 
-_FIELDS = {"od": "matrices", "counts": "counts", "profile": "profiles", "zones": "zones"}
+_FIELDS = {
+    "od": "matrices",
+    "inputs": "inputs",
+    "counts": "counts",
+    "profile": "profiles",
+    "zones": "zones",
+}
 """Where in the document's demand the rows of a table come to stand, by its kind."""
 
 

@@ -41,10 +41,21 @@ def import_(
     scenario: ScenarioArgument,
     trips: Annotated[
         Path | None,
-        typer.Option("--od", help="Table of trips: from,to,trips[,begin,end].", metavar="CSV"),
+        typer.Option(
+            "--od", help="Table of trips: from,to,trips[,begin,end], or square.", metavar="CSV"
+        ),
+    ] = None,
+    inputs: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table of vehicle inputs: segment[,direction],7:00,7:15,...", metavar="CSV"
+        ),
     ] = None,
     counts: Annotated[
-        Path | None, typer.Option(help="Table of counts: place,begin,end,count.", metavar="CSV")
+        Path | None,
+        typer.Option(
+            help="Table of counts: place,begin,end,count, or place,7:00,7:15,...", metavar="CSV"
+        ),
     ] = None,
     profile: Annotated[
         Path | None,
@@ -60,7 +71,7 @@ def import_(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Read tables into a scenario: zones, day profiles, trips from where to where, counts.
+    """Read tables into a scenario: zones, day profiles, inputs, trips from where to where, counts.
 
     The scenario holds the values; the tables are not needed any more. What has the same name is
     replaced.
@@ -71,10 +82,16 @@ def import_(
     store = Workspace.open(workspace)
     document = scenarios.read_scenario(scenario)
     common: dict[str, Any] = {"mix": parse_mix(mix)} if mix else {}
-    tables = {"zones": zones, "profile": profile, "od": trips, "counts": counts}
+    tables = {
+        "zones": zones,
+        "profile": profile,
+        "inputs": inputs,
+        "od": trips,
+        "counts": counts,
+    }
     given = {kind: file for kind, file in tables.items() if file is not None}
     if not given:
-        msg = "name a table to import: --od, --counts, --profile or --zones"
+        msg = "name a table to import: --od, --inputs, --counts, --profile or --zones"
         raise InputError(msg)
     for kind, file in given.items():
         document = demands.import_table(
@@ -120,6 +137,73 @@ def add(
     document = demands.add_background(store, document, name=name or "background", **fields)
     path = scenarios.write_scenario(document, out or scenario)
     _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+
+
+@app.command()
+def inflow(
+    scenario: ScenarioArgument,
+    segment: Annotated[str, typer.Option(help="Segment on which they drive in.")],
+    per_hour: Annotated[float, typer.Option(min=0, help="Vehicles an hour, on all lanes.")],
+    direction: Annotated[
+        str | None, typer.Option(help="forward or backward, where both lead in.")
+    ] = None,
+    lanes: Annotated[
+        str | None, typer.Option(help="Ids of OpenDRIVE lanes. (default: all)", metavar="-1,-2")
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help="Zones or segments and their shares. (default: all ends)", metavar="r8=3,r9=1"
+        ),
+    ] = None,
+    name: NameOption = None,
+    mix: MixOption = None,
+    day: DayOption = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Add vehicles that drive into the region at its boundary, at the speed of traffic there.
+
+    Where they can: odscen demand entries.
+    """
+    from odscen.app import demands, scenarios
+    from odscen.workspace.store import Workspace
+
+    fields: dict[str, Any] = {"segment": segment, "per_hour": per_hour, "direction": direction}
+    if lanes:
+        fields["lanes"] = _lane_ids(lanes)
+    if to:
+        fields["to"] = tuple(parse_shares(to, example="r8=3,r9=1").items())
+    if mix:
+        fields["mix"] = parse_mix(mix)
+    if day:
+        fields["profile"] = day
+    store = Workspace.open(workspace)
+    document = scenarios.read_scenario(scenario)
+    document = demands.add_input(store, document, name=name, **fields)
+    path = scenarios.write_scenario(document, out or scenario)
+    _report(document.demand.model_dump(mode="json"), path, as_json=as_json)
+
+
+@app.command("entries")
+def list_entries(
+    scenario: ScenarioArgument, workspace: WorkspaceOption = None, as_json: JsonOption = False
+) -> None:
+    """List where vehicles can drive into the region of a scenario: segment, direction, lanes."""
+    from odscen.app import demands, maps, scenarios
+    from odscen.workspace.store import Workspace
+
+    document = scenarios.read_scenario(scenario)
+    graph = maps.map_of(Workspace.open(workspace), document).sumo.graph
+    found = demands.find_entries(document, graph)
+    rows = [(one.segment, one.direction, [lane.lane for lane in one.lanes]) for one in found]
+    if as_json:
+        keys = ("segment", "direction", "lanes")
+        print_json({"entries": [dict(zip(keys, row, strict=True)) for row in rows]})
+        return
+    listed = [(segment, way, ", ".join(map(str, lanes))) for segment, way, lanes in rows]
+    print_table("", ("segment", "direction", "lanes"), listed)
 
 
 @app.command()
@@ -213,21 +297,41 @@ def parse_mix(text: str) -> dict[str, float]:
     InputError
         If it is not written so; names of categories are checked with the document.
     """
+    return parse_shares(text, example="car=8,bus=1")
+
+
+def parse_shares(text: str, *, example: str) -> dict[str, float]:
+    """Shares by name from a text such as the example.
+
+    Raises
+    ------
+    InputError
+        If it is not written so.
+    """
     found: dict[str, float] = {}
     for part in text.split(","):
-        category, _, share = part.strip().partition("=")
+        name, _, share = part.strip().partition("=")
         try:
-            found[category.strip()] = float(share or "1")
+            found[name.strip()] = float(share or "1")
         except ValueError:
-            msg = f"a mix is written as car=8,bus=1, not {text!r}"
+            msg = f"shares are written as {example}, not {text!r}"
             raise InputError(msg) from None
     return found
+
+
+def _lane_ids(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        msg = f"lanes are written as -1,-2, not {text!r}"
+        raise InputError(msg) from None
 
 
 def _report(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:
     sizes = {
         "zones": len(demand["zones"]),
         "profiles": len(demand["profiles"]),
+        "inputs": len(demand["inputs"]),
         "trips": sum(row[2] for part in demand["matrices"] for row in part["trips"]),
         "counts": sum(len(part["rows"]) for part in demand["counts"]),
         "background": len(demand["background"]),

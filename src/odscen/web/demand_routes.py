@@ -10,13 +10,19 @@ from odscen.app import demands
 from odscen.base.errors import InputError
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.web.messages import DayMade, ScenarioState, Version, WholeDay
+from odscen.web.messages import DayMade, EntryPlace, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared
 
 router = APIRouter(prefix="/api/scenarios/{name}/demand")
 
-_WORDS = {"od": "trips", "counts": "counts", "profile": "a day profile", "zones": "zones"}
+_WORDS = {
+    "od": "trips",
+    "inputs": "vehicle inputs",
+    "counts": "counts",
+    "profile": "a day profile",
+    "zones": "zones",
+}
 
 
 @router.post("/table")
@@ -25,7 +31,7 @@ def table(
     shared: Shared,
     file: Annotated[UploadFile, File(description="Comma, semicolon or tab separated.")],
     version: Annotated[Version, Form()],
-    kind: Annotated[Literal["od", "counts", "profile", "zones"], Form()],
+    kind: Annotated[Literal["od", "inputs", "counts", "profile", "zones"], Form()],
     part: Annotated[Identifier | None, Form(description="Name of what is read in.")] = None,
     day: Annotated[Identifier | None, Form(description="Day profile of trips.")] = None,
 ) -> ScenarioState:
@@ -42,6 +48,21 @@ def table(
 
     label = f"Table of {_WORDS[kind]}"
     return state_of(shared, shared.drafts.change(name, version, label, change))
+
+
+@router.get("/entries")
+def entries(name: str, shared: Shared) -> list[EntryPlace]:
+    """Where vehicles can drive into the region of a scenario."""
+    scenario = shared.drafts.get(name).scenario
+    graph = shared.map_of(scenario).sumo.graph
+    return [
+        EntryPlace(
+            segment=one.segment,
+            direction=one.direction,
+            lanes=[lane.lane for lane in one.lanes],
+        )
+        for one in demands.find_entries(scenario, graph)
+    ]
 
 
 @router.post("/day")

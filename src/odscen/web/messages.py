@@ -201,6 +201,14 @@ class CarlaInfo(Answer):
     message: str
 
 
+class EntryPlace(Answer):
+    """Where vehicles can drive into the region: lanes are OpenDRIVE ids, the outermost first."""
+
+    segment: str
+    direction: Literal["forward", "backward"]
+    lanes: list[int]
+
+
 class DayMade(Answer):
     """A scenario that was given a day of traffic, and what that asks of the busiest junction.
 

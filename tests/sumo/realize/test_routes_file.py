@@ -17,7 +17,7 @@ from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.scenario_document import Scenario
-from odscen.scenario.edits.demand_edits import set_background, set_counts, set_matrix
+from odscen.scenario.edits.demand_edits import set_background, set_counts, set_input, set_matrix
 from odscen.scenario.placing.region import Region, place_of
 from odscen.sumo.calibrate.count_fit import planned_fit, run_fit
 from odscen.sumo.calibrate.town_day import approach_capacities, peak_share, town_day
@@ -135,6 +135,26 @@ def test_background_traffic_is_there_from_the_start_and_keeps_coming(tmp_path: P
     assert on_road["len"][0] == len(first)
     later = on_road.filter(pl.col("timestep_time") > 300)["len"].to_numpy()
     assert 0.5 * len(first) < np.mean(later) < 2.0 * len(first)
+
+
+@pytest.mark.parametrize("step_length", [0.5, 1.0])
+def test_each_lane_of_a_motorway_takes_what_hcm_gives_it(
+    step_length: float, tmp_path: Path
+) -> None:
+    name = "motorway_weave"
+    graph = built(name).sumo.graph
+    scenario = set_input(
+        empty(name), graph, inflow="west", segment="r1-0", per_hour=6900, to=(("r5-2", 1),)
+    )
+    scenario = edits.set_simulation(scenario, duration=900, step_length=step_length)
+    prepared = prepare(scenario, built(name).sumo, net_file(name, tmp_path))
+    run_prepared(prepared, tmp_path / "run")
+    trips = pl.read_parquet(tmp_path / "run" / "trips.parquet")
+    starts = {a.id: a.spawn.rsplit(".", 1)[0] for a in prepared.plan.actors}
+    inside = trips.filter(pl.col("depart").is_not_null())
+    per_lane = Counter(starts[one] for one in inside["id"])
+    assert len(per_lane) == 3
+    assert min(per_lane.values()) * 4 > 2100
 
 
 def surveyed(name: str, *, trips: float) -> tuple[Scenario, list[tuple[str, float, float, float]]]:

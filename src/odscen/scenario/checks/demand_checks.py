@@ -6,17 +6,17 @@ from collections import Counter, defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from odscen.scenario.checks.input_checks import input_problems
+from odscen.scenario.checks.window_checks import foot_problems, window_problems
 from odscen.scenario.demand.count_stations import contradictions, transitions
 from odscen.scenario.demand.day_profiles import BUILT_IN, known_profiles
 from odscen.scenario.demand.zones import PLACE_SEPARATOR, place_segments, segments_of
 from odscen.scenario.document.problems import Problem, error, warning
-from odscen.scenario.placing.region import on_foot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from odscen.base.categories import Category
-    from odscen.scenario.document.scenario_document import Counts, Demand, Matrix, Scenario, Window
+    from odscen.scenario.document.scenario_document import Counts, Demand, Matrix, Scenario
     from odscen.scenario.placing.region import Region
 
 MOST = 20
@@ -29,17 +29,18 @@ def demand_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     yield from _name_problems(demand, region)
     yield from _zone_problems(demand, region)
     yield from _profile_problems(scenario)
+    yield from input_problems(scenario, region)
     for index, matrix in enumerate(demand.matrices):
         where = f"demand.matrices[{index}]"
-        yield from _window_problems(scenario, matrix, where)
+        yield from window_problems(scenario, matrix, where)
         yield from _limited(matrix_problems(demand, matrix, region, where), where)
     for index, counts in enumerate(demand.counts):
         where = f"demand.counts[{index}]"
         yield from _limited(counts_problems(counts, region, where), where)
     for index, background in enumerate(demand.background):
         where = f"demand.background[{index}]"
-        yield from _window_problems(scenario, background, where)
-        yield from _foot_problems(background.mix, background.id, where, "background traffic")
+        yield from window_problems(scenario, background, where)
+        yield from foot_problems(background.mix, background.id, where, "background traffic")
 
 
 def matrix_problems(
@@ -73,7 +74,7 @@ def matrix_problems(
 
 def counts_problems(counts: Counts, region: Region, where: str) -> Iterator[Problem]:
     """Yield what is wrong with counts: each on its own, then those that contradict each other."""
-    yield from _foot_problems(counts.mix, counts.id, where, "counts of vehicles")
+    yield from foot_problems(counts.mix, counts.id, where, "counts of vehicles")
     found = [*_place_problems(counts, region, where), *_slice_problems(counts, where)]
     yield from found
     if not found:
@@ -119,26 +120,6 @@ def _profile_problems(scenario: Scenario) -> Iterator[Problem]:
         if profile is not None and profile not in known:
             message = f"{one.id!r} has day profile {profile!r}; there are {', '.join(known)}"
             yield error("unknown_profile", f"{where}.profile", message)
-
-
-def _window_problems(scenario: Scenario, part: Window, where: str) -> Iterator[Problem]:
-    duration = scenario.simulation.duration
-    if part.end is not None and part.end <= part.begin:
-        message = f"{part.id!r} ends at {part.end:g} s, not after it begins ({part.begin:g} s)"
-        yield error("flow_window_empty", f"{where}.end", message)
-    elif part.begin >= duration:
-        message = (
-            f"{part.id!r} begins at {part.begin:g} s, but the run ends at {duration:g} s; begin "
-            "earlier or run longer"
-        )
-        severity = error if part.end is None else warning
-        yield severity("departs_too_late", f"{where}.begin", message)
-
-
-def _foot_problems(mix: Iterable[Category], name: str, where: str, what: str) -> Iterator[Problem]:
-    if any(on_foot(category) for category in mix):
-        message = f"{name!r} has pedestrians; {what} are of vehicles: use a matrix for them"
-        yield error("wrong_graph", f"{where}.mix", message)
 
 
 def _place_problems(counts: Counts, region: Region, where: str) -> Iterator[Problem]:

@@ -37,10 +37,29 @@ COLUMNS = {
     "counts": ("place", "begin", "end", "count"),
     "profile": ("share",),
     "zones": ("segment",),
+    "inputs": ("segment",),
 }
 """Columns that the values of a row come from, by the kind of table."""
 
 _Row = TypeVar("_Row")
+
+
+class InputRow(NamedTuple):
+    """A line of a table of vehicle inputs; times in seconds after the start of the run."""
+
+    segment: str
+    direction: str | None
+    begin: float
+    interval: float
+    volumes: tuple[float, ...]
+    line: int
+
+
+class _WideTable(NamedTuple):
+    """Lines of a table with a column for each slice of time, and those columns."""
+
+    lines: Iterator[_TableLine]
+    slices: list[tuple[str, TimeSlice]]
 
 
 class Rows(NamedTuple, Generic[_Row]):
@@ -53,7 +72,9 @@ class Rows(NamedTuple, Generic[_Row]):
 def read_matrix(text: str, *, clock: float = 0.0) -> dict[TimeSlice | None, Rows[MatrixTrip]]:
     """Read an origin-destination matrix: columns ``from``, ``to``, ``trips``.
 
-    Columns ``begin`` and ``end`` may say when; the trips are then those of each slice.
+    Columns ``begin`` and ``end`` may say when; the trips are then those of each slice. Or a square
+    table: origins in the first column, whose title is empty, ``from`` or ``from/to``, destinations
+    as titles of the others; empty cells are no trips.
 
     Returns
     -------
@@ -64,6 +85,8 @@ def read_matrix(text: str, *, clock: float = 0.0) -> dict[TimeSlice | None, Rows
     InputError
         With the line and the value that cannot be used.
     """
+    if square := _square(text):
+        return {None: _rows(square)}
     found: dict[TimeSlice | None, list[tuple[MatrixTrip, int]]] = {}
     for line in _lines(text, COLUMNS["od"], ("begin", "end")):
         slice_ = line.slice(clock) if line.has("begin") else None
@@ -75,14 +98,52 @@ def read_matrix(text: str, *, clock: float = 0.0) -> dict[TimeSlice | None, Rows
 def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
     """Read counts: columns ``place``, ``begin``, ``end``, ``count``.
 
+    Or a wide table, as counters write it: a column ``place``, then one for each slice of time, with
+    its begin as title.
+
     Raises
     ------
     InputError
         With the line and the value that cannot be used.
     """
+    if wide := _wide(text, ("place",), clock):
+        return _rows(
+            ((line["place"].replace(" ", ""), *slice_, line.number(column)), line.line)
+            for line in wide.lines
+            for column, slice_ in wide.slices
+        )
     return _rows(
         ((line["place"].replace(" ", ""), *line.slice(clock), line.number("count")), line.line)
         for line in _lines(text, COLUMNS["counts"])
+    )
+
+
+def read_inputs(text: str, *, clock: float = 0.0) -> tuple[InputRow, ...]:
+    """Read vehicle inputs: ``segment``, perhaps ``direction``, then a column for each time slice.
+
+    The title of such a column is the begin of its slice; slices are equally long.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    names = ("segment", "direction")
+    wide = _wide(text, names, clock) or _wide(text, names[:1], clock)
+    if wide is None:
+        msg = "the columns needed are segment [, direction] and the begins of slices of time"
+        raise InputError(msg, element="line 1")
+    begin, end = wide.slices[0][1]
+    return tuple(
+        InputRow(
+            line["segment"],
+            line["direction"].lower() if line.has("direction") else None,
+            begin,
+            end - begin,
+            tuple(line.number(column) for column, _ in wide.slices),
+            line.line,
+        )
+        for line in wide.lines
     )
 
 
@@ -127,6 +188,42 @@ def _rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
     return Rows(values, lines)
 
 
+def _square(text: str) -> list[tuple[MatrixTrip, int]]:
+    """Rows of a square origin-destination table with their lines; empty if it is none."""
+    columns, lines = _table(text, exact=True)
+    corner, *ends = columns
+    if corner.lower() not in ("", "from", "from/to", "o/d") or {"to", "trips"} & set(ends):
+        return []
+    rows = [
+        ((line[corner], end, line.number(end)), line.line)
+        for line in lines
+        for end in ends
+        if line.filled(end)
+    ]
+    return [row for row in rows if row[0][2] > 0]
+
+
+def _wide(text: str, names: Sequence[str], clock: float) -> _WideTable | None:
+    """Read a table with these columns, and times as titles of all others; ``None`` if it is not."""
+    columns, lines = _table(text)
+    titles = columns[len(names) :]
+    if tuple(columns[: len(names)]) != tuple(names) or len(titles) < 2:
+        return None
+    head = _TableLine(1, dict(zip(titles, titles, strict=True)))
+    if not all(_TIME_OF_DAY.fullmatch(title) or title.isdecimal() for title in titles):
+        return None
+    begins = [head.time(title, clock) for title in titles]
+    length = begins[1] - begins[0]
+    for title, begin, expected in zip(
+        titles, begins, (begins[0] + k * length for k in range(len(begins))), strict=True
+    ):
+        if length <= 0 or begin != expected or begin < 0:
+            msg = f"the slice that begins at {title} is not as long as the first, or too early"
+            raise InputError(msg, element="line 1")
+    slices = [(t, (begin, begin + length)) for t, begin in zip(titles, begins, strict=True)]
+    return _WideTable(lines, slices)
+
+
 class _TableLine:
     def __init__(self, number: int, cells: dict[str, str]) -> None:
         self.line = number
@@ -135,6 +232,9 @@ class _TableLine:
 
     def has(self, column: str) -> bool:
         return column in self._cells
+
+    def filled(self, column: str) -> bool:
+        return bool(self._cells[column])
 
     def __getitem__(self, column: str) -> str:
         value = self._cells[column]
@@ -190,13 +290,8 @@ def _csv_rows(reader: _csv.Reader) -> Iterator[list[str]]:
 
 
 def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> Iterator[_TableLine]:
-    """Yield the lines of a CSV file; comma, semicolon or tab, as its first line shows."""
-    text = text.removeprefix("\ufeff")
-    head = text.split("\n", 1)[0]
-    delimiter = max(",;\t", key=head.count)
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
-    rows = _csv_rows(reader)
-    columns = [name.strip().lower() for name in next(rows, [])]
+    """Yield the lines of a table with these columns."""
+    columns, rows = _table(text)
     missing = [name for name in needed if name not in columns]
     unknown = [name for name in columns if name not in (*needed, *optional)]
     given = [name for name in optional if name in columns]
@@ -205,6 +300,26 @@ def _lines(text: str, needed: Sequence[str], optional: Sequence[str] = ()) -> It
         names = printable(", ".join(columns)) or "missing"
         msg = f"the columns are {names:.200}; needed are {listed}"
         raise InputError(msg, element="line 1")
+    yield from rows
+
+
+def _table(text: str, *, exact: bool = False) -> tuple[list[str], Iterator[_TableLine]]:
+    """Columns and lines of a CSV file; comma, semicolon or tab, as its first line shows.
+
+    Names of columns are in small letters, unless they are to be ``exact``.
+    """
+    text = text.removeprefix("\ufeff")
+    head = text.split("\n", 1)[0]
+    delimiter = max(",;\t", key=head.count)
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    rows = _csv_rows(reader)
+    columns = [name.strip() if exact else name.strip().lower() for name in next(rows, [])]
+    return columns, _table_lines(reader, rows, columns)
+
+
+def _table_lines(
+    reader: _csv.Reader, rows: Iterator[list[str]], columns: Sequence[str]
+) -> Iterator[_TableLine]:
     found = False
     for cells in rows:
         if not any(cell.strip() for cell in cells):

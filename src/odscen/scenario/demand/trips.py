@@ -58,6 +58,8 @@ class Trips:
         Seconds.
     unmet
         Trips that have no place to start or no path, and why.
+    entering
+        Whether they drive in at the boundary, instead of setting off from a standstill.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Trips:
     departs: FloatArray
     unmet: int = 0
     why: str = ""
+    entering: bool = False
 
 
 def matrix_trips(scenario: Scenario, ground: TripEnds, matrix: Matrix) -> Iterable[Trips]:

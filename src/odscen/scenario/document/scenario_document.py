@@ -29,6 +29,8 @@ Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
 """How many road users; a fraction is a probability."""
+Share = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+"""Relative to the others."""
 Mix = dict[Category, Annotated[float, Field(gt=0)]]
 """Share of each category; shares are relative, they need not sum to one."""
 
@@ -175,22 +177,52 @@ class Background(Window):
         return self
 
 
+class VehicleInput(Window):
+    """Vehicles that drive into the region at its boundary, at the speed of those before them.
+
+    They come on the lanes that begin on ``segment``, or on some of them: ``lanes`` are ids of
+    OpenDRIVE lanes. ``direction`` is needed where vehicles come in both ways, and is ``forward``
+    with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
+    or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
+    are zones or segments with their shares; without it, each draws one of the ends of the region.
+    """
+
+    segment: Label
+    direction: Literal["forward", "backward"] | None = None
+    lanes: Annotated[tuple[int, ...], Field(max_length=40)] = ()
+    per_hour: Annotated[float, Field(gt=0, le=40_000)] | None = None
+    volumes: Annotated[tuple[Number, ...], Field(max_length=10_000)] = ()
+    interval: Annotated[float, Field(ge=1, le=86_400)] = 900.0
+    to: Annotated[tuple[tuple[Label, Share], ...], Field(max_length=1000)] = ()
+
+    @model_validator(mode="after")
+    def _one_volume(self) -> Self:
+        if (self.per_hour is None) == (not self.volumes):
+            msg = f"give one of per_hour and volumes, not {'both' if self.volumes else 'none'}"
+            raise ValueError(msg)
+        if self.volumes and self.profile is not None:
+            msg = f"volumes say when vehicles come; leave profile {self.profile!r} out"
+            raise ValueError(msg)
+        return self
+
+
 class Demand(Part):
     """Traffic around the placed actors; ``clock`` is the time of day at the start, seconds."""
 
     clock: Annotated[float, Field(ge=0, lt=86_400)] = 0.0
     zones: tuple[Zone, ...] = ()
     profiles: tuple[Profile, ...] = ()
+    inputs: tuple[VehicleInput, ...] = ()
     matrices: tuple[Matrix, ...] = ()
     counts: tuple[Counts, ...] = ()
     background: tuple[Background, ...] = ()
 
     @property
-    def parts(self) -> tuple[tuple[str, Matrix | Counts | Background], ...]:
+    def parts(self) -> tuple[tuple[str, VehicleInput | Matrix | Counts | Background], ...]:
         """All that puts road users on the road, with its place in the document."""
         return tuple(
             (f"demand.{kind}[{index}]", part)
-            for kind in ("matrices", "counts", "background")
+            for kind in ("inputs", "matrices", "counts", "background")
             for index, part in enumerate(getattr(self, kind))
         )
 
@@ -244,7 +276,7 @@ class Scenario(Part):
     flows
         Road users that keep coming, per hour.
     demand
-        Traffic from matrices, day profiles, counts and background.
+        Traffic from inputs, matrices, day profiles, counts and background.
     signals
         How traffic lights are run.
     simulation

@@ -16,6 +16,7 @@ from odscen.scenario.document.scenario_document import (
     Matrix,
     Profile,
     Scenario,
+    VehicleInput,
     Zone,
 )
 from odscen.scenario.document.validation import validated
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from odscen.lanegraph.graphs import MapGraph
 
-_Part = TypeVar("_Part", bound=Zone | Profile | Matrix | Counts | Background)
+_Part = TypeVar("_Part", bound=Zone | Profile | VehicleInput | Matrix | Counts | Background)
 
 
 @edit("Change the time of day at the start")
@@ -52,6 +53,35 @@ def set_profile(
     """Give the scenario a day profile of its own; one of that name is replaced."""
     part = validated(Profile, {"id": profile, "shares": tuple(shares)})
     return _checked(_changed(scenario, profiles=_put(scenario.demand.profiles, part)), graph)
+
+
+@edit("Vehicle input {inflow}")
+def set_input(
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    inflow: Identifier,
+    **fields: Annotated[Any, VehicleInput],
+) -> Scenario:
+    """Add vehicles that drive in at the boundary of the region, or change those of that name.
+
+    Parameters
+    ----------
+    fields
+        Fields of a :class:`~odscen.scenario.document.scenario_document.VehicleInput`,
+        such as ``segment``; those not given stay as they are, except that ``per_hour`` takes the
+        place of ``volumes`` and the other way round.
+
+    Raises
+    ------
+    ScenarioError
+        If no lane leads into the region there, or to where the vehicles go, or the name is taken.
+    """
+    old = scenario.demand.inputs
+    if {"per_hour", "volumes"} & fields.keys():
+        fields = {"per_hour": None, "volumes": (), **fields}
+    part = _part(VehicleInput, old, inflow, fields)
+    return _checked(_changed(scenario, inputs=_put(old, part)), graph)
 
 
 @edit("Trips {matrix}")
@@ -128,7 +158,7 @@ def set_background(
 
 @edit("Remove {part}")
 def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario:
-    """Remove a zone, profile, matrix, set of counts or background traffic by its name.
+    """Remove a zone, profile, input, matrix, set of counts or background traffic by its name.
 
     Raises
     ------
@@ -137,7 +167,7 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
     ScenarioError
         If another part of the demand, or a flow, uses it.
     """
-    kinds = ("zones", "profiles", "matrices", "counts", "background")
+    kinds = ("zones", "profiles", "inputs", "matrices", "counts", "background")
     for kind in kinds:
         ones = getattr(scenario.demand, kind)
         left = tuple(one for one in ones if one.id != part)

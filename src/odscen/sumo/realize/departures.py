@@ -14,6 +14,7 @@ import numpy as np
 from odscen.scenario.checks.goals import flow_goals, resolve_goals
 from odscen.scenario.demand.count_stations import observations
 from odscen.scenario.demand.day_profiles import curve
+from odscen.scenario.demand.inflow import input_trips
 from odscen.scenario.demand.trips import background_trips, matrix_trips
 from odscen.scenario.demand.zones import TripEnds
 from odscen.scenario.document.named_random import stream
@@ -133,6 +134,8 @@ def demand_users(
             if trips.unmet:
                 unmet.append(f"{trips.name}: {trips.unmet} trips left out: {trips.why}")
 
+    for inflow in scenario.demand.inputs:
+        add(input_trips(scenario, ground, inflow))
     for matrix in scenario.demand.matrices:
         add(matrix_trips(scenario, ground, matrix))
     for background in scenario.demand.background:
@@ -164,6 +167,7 @@ def trip_users(trips: Trips, *, until: float) -> list[RoadUser]:
             depart=depart,
             flow=trips.part,
             trip=True,
+            entering=trips.entering,
         )
         for number, (category, start, goal, depart) in enumerate(rows)
         if depart < until

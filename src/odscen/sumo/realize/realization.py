@@ -376,7 +376,8 @@ class _Writer:
     ) -> float | None:
         """Seconds along the path at the speed the actor wants, from standing.
 
-        ``sum(ds / v) + v0 / (2 a)``: the second term is what getting up to the first speed costs.
+        ``sum(ds / v) + v0 / (2 a)``: the second term is what getting up to the first speed costs;
+        vehicles that drive in at the boundary do not have it.
         """
         if len(path) < 2:
             return None
@@ -385,7 +386,8 @@ class _Writer:
         limit = self._graph.lanes.speed_limit[path[:-1]]
         limit = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
         speed = np.minimum(limit * behaviour.speed_factor, behaviour.max_speed)
-        return float(np.sum(steps / speed) + speed[0] / (2.0 * behaviour.accel))
+        set_off = 0.0 if user.entering else speed[0] / (2.0 * behaviour.accel)
+        return float(np.sum(steps / speed) + set_off)
 
 
 def _effect(environment: Environment, assets: ModelSizes | None) -> WeatherEffect:

@@ -19,6 +19,8 @@ class RoadUser:
     ``flow`` is the flow or the part of the demand that it belongs to. ``trip`` is set for members
     of the demand: many share a goal, so their paths are found from there.
 
+    ``entering`` is set for those who drive in at the boundary of the region, at speed.
+
     ``design`` is the actor as the document has it, for what is not decided here but acted on as it
     is: model, style and the like. Members of flows and demand have the defaults.
     """
@@ -31,6 +33,7 @@ class RoadUser:
     speed: float | None = None
     flow: str | None = None
     trip: bool = False
+    entering: bool = False
     design: Actor = _DEFAULT_DESIGN
 
     @property

@@ -1,0 +1,136 @@
+import { Button, Group, Select, Text } from "@mantine/core";
+import { useEffect, useState } from "react";
+
+import { type Demand, demand as api, type Entry, type VehicleInput } from "../api/demand";
+import type { Edit, FieldsOf } from "../api/types";
+import { reasonOf } from "../ui/reason";
+import { count } from "../ui/words";
+import { Committed } from "./Committed";
+import { ProfileChoice, type Profiles } from "./DayProfiles";
+import { freeName } from "./demand";
+import { MixFold, PartCard, WindowFields } from "./DemandParts";
+import type { EditorStore } from "./store";
+
+/** Vehicles an hour and lane that a new input begins with. */
+const PER_LANE = 600;
+
+/** Vehicles that drive in at the boundary of the region: how many, when, and their mix. */
+export function InputForm({
+  input,
+  profiles,
+  onEdit,
+  onShow,
+  onRemove,
+}: {
+  input: VehicleInput;
+  profiles: Profiles;
+  onEdit: (edit: Edit) => void;
+  onShow: (segments: readonly string[]) => void;
+  onRemove: () => void;
+}) {
+  const change = (fields: FieldsOf<"set_input", "inflow">): void =>
+    onEdit({ kind: "set_input", inflow: input.id, ...fields });
+  const lanes = input.lanes.length ? ` on ${count(input.lanes.length, "lane")}` : "";
+  const note = `on ${input.segment}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
+  return (
+    <PartCard name={input.id} what="Vehicles from outside" note={note} onRemove={onRemove}>
+      {input.per_hour === null ? (
+        <Text size="sm">
+          {count(Math.round(input.volumes.reduce((sum, one) => sum + one, 0)), "vehicle")} in{" "}
+          {count(input.volumes.length, "slice")} of {input.interval / 60} min
+        </Text>
+      ) : (
+        <>
+          <Committed
+            label="Vehicles per hour"
+            suffix=""
+            min={1}
+            max={40_000}
+            digits={0}
+            value={input.per_hour}
+            onCommit={(per_hour) => {
+              if (per_hour !== null) change({ per_hour });
+            }}
+          />
+          <WindowFields begin={input.begin} end={input.end} onChange={change} />
+          <ProfileChoice
+            value={input.profile}
+            profiles={profiles}
+            onChange={(profile) => change({ profile })}
+          />
+        </>
+      )}
+      <MixFold mix={input.mix} onChange={(mix) => change({ mix })} />
+      <Group>
+        <Button size="compact-sm" variant="default" onClick={() => onShow([input.segment])}>
+          Show where
+        </Button>
+      </Group>
+    </PartCard>
+  );
+}
+
+/** Chooses the place of a new input among those where lanes lead into the region. */
+export function NewInput({
+  store,
+  demand,
+  onEdit,
+  onShow,
+}: {
+  store: EditorStore;
+  demand: Demand;
+  onEdit: (edit: Edit) => void;
+  onShow: (segments: readonly string[]) => void;
+}) {
+  const { name } = store();
+  const [entries, setEntries] = useState<readonly Entry[] | null>(null);
+  const [reason, setReason] = useState<string | null>(null);
+  const [chosen, setChosen] = useState<string | null>(null);
+  useEffect(() => {
+    api.entries(name).then(setEntries, (error: unknown) => setReason(reasonOf(error)));
+  }, [name]);
+  if (reason) return <Text size="sm">{reason}</Text>;
+  if (!entries) return <Text size="sm">Looking for lanes that lead into the region ...</Text>;
+  if (!entries.length) return <Text size="sm">No lane leads into the region: it has no open end.</Text>;
+  const both = (segment: string): boolean => entries.filter((one) => one.segment === segment).length > 1;
+  const entry = entries.find((one) => keyOf(one) === chosen);
+  return (
+    <div className="fold">
+      <Select
+        label="Where they drive in"
+        placeholder="Choose a segment"
+        data={entries.map((one) => ({
+          value: keyOf(one),
+          label:
+            `${one.segment}, ${count(one.lanes.length, "lane")}` +
+            (both(one.segment) ? `, ${one.direction}` : ""),
+        }))}
+        value={chosen}
+        searchable
+        onChange={(key) => {
+          setChosen(key);
+          const found = entries.find((one) => keyOf(one) === key);
+          if (found) onShow([found.segment]);
+        }}
+      />
+      <Button
+        mt={6}
+        disabled={!entry}
+        onClick={() => {
+          if (entry)
+            onEdit({
+              kind: "set_input",
+              inflow: freeName(demand, "input"),
+              segment: entry.segment,
+              direction: both(entry.segment) ? entry.direction : null,
+              per_hour: PER_LANE * entry.lanes.length,
+            });
+        }}
+      >
+        Add
+      </Button>
+    </div>
+  );
+}
+
+const keyOf = ({ segment, direction }: Entry): string => `${segment} ${direction}`;

@@ -1,0 +1,191 @@
+"""Vehicles that drive into the region at its boundary: when, on which lane, where to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import Category
+from odscen.scenario.demand.day_profiles import curve
+from odscen.scenario.demand.entries import entries, entries_of, entry_lanes
+from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories, window
+from odscen.scenario.demand.zones import segments_of
+from odscen.scenario.document.named_random import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.scenario.demand.zones import TripEnds
+    from odscen.scenario.document.scenario_document import Scenario, VehicleInput
+
+SLICE = 900.0
+"""Seconds of the slices in which the vehicles of ``per_hour`` are drawn."""
+
+LEAST_HEADWAY = 0.8
+"""Seconds between two vehicles on a lane at least; on a lane with more than 2,250 vehicles an hour
+half of their mean headway."""
+
+SLOW = frozenset({Category.TRUCK, Category.BUS, Category.BICYCLE})
+"""Categories that come on the outermost lane of an input."""
+
+
+class _Slice(NamedTuple):
+    """Slice of time, seconds, and vehicles to come in it."""
+
+    begin: float
+    end: float
+    number: float
+
+
+class _Ends(NamedTuple):
+    """Where the vehicles of an input may go to: nodes, and the share of each."""
+
+    nodes: Int32Array
+    shares: FloatArray
+
+
+def input_trips(scenario: Scenario, ground: TripEnds, part: VehicleInput) -> Iterator[Trips]:
+    """Yield the trips of an input, one for each slice of time.
+
+    In each slice as many vehicles come as it says (a fraction is a probability), on all lanes
+    alike, those of :data:`SLOW` on the outermost. Headways on a lane are exponential beyond
+    :data:`LEAST_HEADWAY`.
+    """
+    lanes = _depart_lanes(ground, part)
+    for number, piece in enumerate(_slices(scenario, part)):
+        rng = stream(scenario.seed, "input", part.id, str(number))
+        yield _drawn(scenario, ground, part, piece, lanes, rng, name=f"{part.id}.{number}")
+
+
+def _slices(scenario: Scenario, part: VehicleInput) -> Iterator[_Slice]:
+    """Whole slices, whenever the run ends: a shorter one has the same vehicles up to its end."""
+    begin, end = window(scenario, part)
+    day = curve(scenario.demand, part.profile)
+    length = part.interval if part.volumes else SLICE
+    for number, start in enumerate(np.arange(begin, end, length).tolist()):
+        stop = start + length
+        if not part.volumes:
+            passed = day.amount(stop) - day.amount(start)
+            yield _Slice(start, stop, (part.per_hour or 0.0) * passed / 3600.0)
+        elif number < len(part.volumes):
+            yield _Slice(start, stop, part.volumes[number])
+
+
+def _depart_lanes(ground: TripEnds, part: VehicleInput) -> dict[Category, Int32Array]:
+    """First node with room for a body on each lane of the input, from the outer lane inwards."""
+    mine = entries_of(part, entries(ground.region))
+    lanes = ground.region.graph.lanes
+    found: dict[Category, Int32Array] = {}
+    for category in part.mix:
+        starts = ground.starts(category)
+        nodes: list[int] = []
+        for one in entry_lanes(part, mine[0]) if mine else ():
+            here = starts[(lanes.lane[starts] == lanes.lane[one.node]) & (starts >= one.node)]
+            nodes += here[:1].tolist()
+        outermost = nodes[:1] if category in SLOW else nodes
+        found[category] = np.array(outermost, dtype=np.int32)
+    return found
+
+
+def _drawn(
+    scenario: Scenario,
+    ground: TripEnds,
+    part: VehicleInput,
+    piece: _Slice,
+    lanes: dict[Category, Int32Array],
+    rng: np.random.Generator,
+    *,
+    name: str,
+) -> Trips:
+    count = int(piece.number) + int(rng.random() < piece.number % 1.0)
+    categories = drawn_categories(part.mix, rng.random(count))
+    starts = _dealt(categories, lanes, rng)
+    departs = _spread(starts, piece, rng)
+    goals = _goals(scenario, ground, part, categories, starts, rng.random(count))
+    in_time = departs < window(scenario, part)[1]
+    met = np.flatnonzero((goals >= 0) & in_time)
+    order = met[np.lexsort((met, departs[met]))]
+    unmet = int(np.sum((goals < 0) & in_time))
+    return Trips(
+        name=name,
+        part=part.id,
+        categories=[categories[index] for index in order.tolist()],
+        starts=starts[order],
+        goals=goals[order],
+        departs=departs[order],
+        unmet=unmet,
+        why="" if not unmet else "there is no place to enter or no path",
+        entering=True,
+    )
+
+
+def _dealt(
+    categories: Sequence[Category],
+    lanes: dict[Category, Int32Array],
+    rng: np.random.Generator,
+) -> Int32Array:
+    """Start of each vehicle; -1 without any. Each goes where fewest have been sent so far."""
+    sent: dict[int, int] = {}
+    starts = np.full(len(categories), -1, dtype=np.int32)
+    slow_first = sorted(range(len(categories)), key=lambda index: categories[index] not in SLOW)
+    ties = rng.random((len(categories), 1 + max(map(len, lanes.values()), default=0)))
+    for index in slow_first:
+        nodes = lanes[categories[index]].tolist()
+        if nodes:
+            tie = ties[index].tolist()
+            lane = min(range(len(nodes)), key=lambda at: (sent.get(nodes[at], 0), tie[at]))
+            starts[index] = nodes[lane]
+            sent[nodes[lane]] = sent.get(nodes[lane], 0) + 1
+    return starts
+
+
+def _spread(starts: Int32Array, piece: _Slice, rng: np.random.Generator) -> FloatArray:
+    """Departures in a slice, lane by lane: random, with a least headway."""
+    departs = np.zeros(len(starts))
+    length = piece.end - piece.begin
+    for start in np.unique(starts).tolist():
+        mine = np.flatnonzero(starts == start)
+        headway = min(LEAST_HEADWAY, 0.5 * length / len(mine))
+        free = np.sort(rng.random(len(mine))) * (length - headway * len(mine))
+        departs[rng.permutation(mine)] = piece.begin + free + headway * np.arange(len(mine))
+    return np.maximum(np.round(departs, 2), FIRST)
+
+
+def _goals(
+    scenario: Scenario,
+    ground: TripEnds,
+    part: VehicleInput,
+    categories: Sequence[Category],
+    starts: Int32Array,
+    uniform: FloatArray,
+) -> Int32Array:
+    """Goal of each vehicle: an end of the region, or of the input's destinations; else -1."""
+    goals = np.full(len(starts), -1, dtype=np.int32)
+    kinds = np.array([list(Category).index(one) for one in categories], dtype=np.intp)
+    for start in np.unique(starts[starts >= 0]).tolist():
+        reached = ground.router.reachable(start)
+        for kind in np.unique(kinds[starts == start]).tolist():
+            mine = (starts == start) & (kinds == kind)
+            ends = _ends(scenario, ground, part, list(Category)[kind], start)
+            shares = np.where(reached[ends.nodes] & (ends.nodes != start), ends.shares, 0.0)
+            sums = np.cumsum(shares)
+            if len(sums) and sums[-1] > 0:
+                picked = np.searchsorted(sums, uniform[mine] * sums[-1], side="right")
+                goals[mine] = ends.nodes[np.minimum(picked, len(sums) - 1)]
+    return goals
+
+
+def _ends(
+    scenario: Scenario, ground: TripEnds, part: VehicleInput, category: Category, start: int
+) -> _Ends:
+    if not part.to:
+        candidates = ground.router.goal_candidates(start)
+        return _Ends(candidates, np.ones(len(candidates)))
+    ends = [ground.ends(category, segments_of(scenario.demand, name)) for name, _ in part.to]
+    shares = [
+        np.full(len(nodes), share / max(len(nodes), 1))
+        for nodes, (_, share) in zip(ends, part.to, strict=True)
+    ]
+    return _Ends(np.concatenate(ends), np.concatenate(shares))
