@@ -46,6 +46,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   actors,
   flows,
   demand: { clock: 0, zones: [], profiles: [], inputs: [], matrices: [], counts: [], background: [] },
+  transit: { stops: [], lines: [] },
   signals: { control: "fixed", bus_priority: false, junctions: [] },
   simulation: {
     duration: 60,

@@ -67,6 +67,9 @@ ALL = (
     ("set_background", {"background": "some", "per_km": 2}),
     ("set_input", {"inflow": "in", "segment": "r1", "direction": "forward", "per_hour": 300}),
     ("remove_demand", {"part": "survey"}),
+    ("set_stop", {"stop": "market", "node": "SPAWN3", "length": 12}),
+    ("set_line", {"line": "7", "start": "SPAWN2", "stops": [{"stop": "market"}], "headway": 60}),
+    ("remove_transit", {"part": "7"}),
 )
 
 

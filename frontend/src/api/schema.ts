@@ -2003,7 +2003,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -3190,6 +3190,19 @@ export interface components {
             flow: string;
         };
         /**
+         * RemoveTransitEdit
+         * @description Remove a stop or a line by its name.
+         */
+        RemoveTransitEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_transit";
+            /** Part */
+            part: string;
+        };
+        /**
          * RemovedInfo
          * @description Something in the wastebasket; ``removed`` and ``until`` are seconds since 1970.
          */
@@ -3658,6 +3671,13 @@ export interface components {
             demand: components["schemas"]["Demand"];
             /**
              * @default {
+             *       "stops": [],
+             *       "lines": []
+             *     }
+             */
+            transit: components["schemas"]["Transit"];
+            /**
+             * @default {
              *       "control": "fixed",
              *       "bus_priority": false,
              *       "junctions": []
@@ -3744,6 +3764,38 @@ export interface components {
             stop_lines: components["schemas"]["StopLineInfo"][];
             /** Signals */
             signals: components["schemas"]["SignalInfo"][];
+        };
+        /**
+         * ServedStop
+         * @description A stop on a line.
+         *
+         *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
+         *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
+         */
+        "ServedStop-Input": {
+            /** Stop */
+            stop: string;
+            /** After */
+            after?: number | null;
+            /** Dwell */
+            dwell?: (components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"]) | null;
+        };
+        /**
+         * ServedStop
+         * @description A stop on a line.
+         *
+         *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
+         *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
+         */
+        "ServedStop-Output": {
+            /** Stop */
+            stop: string;
+            /** After */
+            after: number | null;
+            /** Dwell */
+            dwell: number | {
+                [key: string]: string | number | number[];
+            } | null;
         };
         /**
          * SetBackgroundEdit
@@ -3945,6 +3997,40 @@ export interface components {
             inflow: string;
         };
         /**
+         * SetLineEdit
+         * @description Add a line, or change that of this name.
+         */
+        SetLineEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_line";
+            /** Id */
+            id?: string;
+            /** Start */
+            start?: string;
+            /** Goal */
+            goal?: string | null;
+            /** Stops */
+            stops?: components["schemas"]["ServedStop-Input"][];
+            /** Headway */
+            headway?: number | null;
+            /** Begin */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /** Departures */
+            departures?: number[];
+            /** Dwell */
+            dwell?: components["schemas"]["Constant-Input"] | components["schemas"]["Uniform-Input"] | components["schemas"]["Normal-Input"] | components["schemas"]["Choice-Input"];
+            category?: components["schemas"]["Category"];
+            /** Model */
+            model?: string | null;
+            /** Line */
+            line: string;
+        };
+        /**
          * SetMatrixEdit
          * @description Add trips from where to where, or change those of that name.
          */
@@ -4049,6 +4135,29 @@ export interface components {
              * @enum {string}
              */
             pedestrians?: "striping" | "nonInteracting";
+        };
+        /**
+         * SetStopEdit
+         * @description Add a stop, or change that of this name.
+         */
+        SetStopEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_stop";
+            /** Id */
+            id?: string;
+            /** Name */
+            name?: string;
+            /** Node */
+            node?: string;
+            /** Length */
+            length?: number;
+            /** Bay */
+            bay?: boolean;
+            /** Stop */
+            stop: string;
         };
         /**
          * SetTimingEdit
@@ -4404,6 +4513,91 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * Transit
+         * @description Stops and lines of a scenario.
+         */
+        Transit: {
+            /**
+             * Stops
+             * @default []
+             */
+            stops: components["schemas"]["TransitStop"][];
+            /**
+             * Lines
+             * @default []
+             */
+            lines: components["schemas"]["TransitLine"][];
+        };
+        /**
+         * TransitLine
+         * @description A line: trips from the node ``start`` by its stops to the node ``goal``.
+         *
+         *     Trips depart every ``headway`` seconds from ``begin`` until before ``end`` (``None``: the end of
+         *     the run), or at the times ``departures``. Dwell times (s) are drawn for each trip and stop.
+         */
+        TransitLine: {
+            /** Id */
+            id: string;
+            /** Start */
+            start: string;
+            /** Goal */
+            goal: string | null;
+            /** Stops */
+            stops: components["schemas"]["ServedStop-Output"][];
+            /** Headway */
+            headway: number | null;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * Departures
+             * @default []
+             */
+            departures: number[];
+            /**
+             * Dwell
+             * @default 20
+             */
+            dwell: number | {
+                [key: string]: string | number | number[];
+            };
+            /** @default bus */
+            category: components["schemas"]["Category"];
+            /** Model */
+            model: string | null;
+        };
+        /**
+         * TransitStop
+         * @description A place where vehicles of lines stop; ``node`` is in the middle of its ``length`` (metres).
+         *
+         *     In a ``bay`` they stand beside the lane and hold up no other vehicle.
+         */
+        TransitStop: {
+            /** Id */
+            id: string;
+            /**
+             * Name
+             * @default
+             */
+            name: string;
+            /** Node */
+            node: string;
+            /**
+             * Length
+             * @default 15
+             */
+            length: number;
+            /**
+             * Bay
+             * @default false
+             */
+            bay: boolean;
+        };
         /**
          * Uniform
          * @description Any number from ``low`` to ``high``.
@@ -5320,6 +5514,27 @@ export interface components {
             on_call?: boolean;
         };
         /**
+         * ServedStop
+         * @description A stop on a line.
+         *
+         *     ``after`` is the scheduled departure there, seconds after the departure of the trip; without it
+         *     the vehicle goes on after its dwell time. ``dwell`` ``None`` is that of the line.
+         */
+        "ServedStop-File": {
+            /** Stop */
+            stop: string;
+            /**
+             * After
+             * @default null
+             */
+            after?: number | null;
+            /**
+             * Dwell
+             * @default null
+             */
+            dwell?: (components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"]) | null;
+        };
+        /**
          * SignalDetector
          * @description A loop in the road, and the stages that it prolongs.
          *
@@ -5416,6 +5631,104 @@ export interface components {
              * @enum {string}
              */
             pedestrians?: "striping" | "nonInteracting";
+        };
+        /**
+         * Transit
+         * @description Stops and lines of a scenario.
+         */
+        "Transit-File": {
+            /**
+             * Stops
+             * @default []
+             */
+            stops?: components["schemas"]["TransitStop-File"][];
+            /**
+             * Lines
+             * @default []
+             */
+            lines?: components["schemas"]["TransitLine-File"][];
+        };
+        /**
+         * TransitLine
+         * @description A line: trips from the node ``start`` by its stops to the node ``goal``.
+         *
+         *     Trips depart every ``headway`` seconds from ``begin`` until before ``end`` (``None``: the end of
+         *     the run), or at the times ``departures``. Dwell times (s) are drawn for each trip and stop.
+         */
+        "TransitLine-File": {
+            /** Id */
+            id: string;
+            /** Start */
+            start: string;
+            /**
+             * Goal
+             * @default null
+             */
+            goal?: string | null;
+            /** Stops */
+            stops: components["schemas"]["ServedStop-File"][];
+            /**
+             * Headway
+             * @default null
+             */
+            headway?: number | null;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * Departures
+             * @default []
+             */
+            departures?: number[];
+            /**
+             * Dwell
+             * @default {
+             *       "kind": "constant",
+             *       "value": 20
+             *     }
+             */
+            dwell?: components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"];
+            /** @default bus */
+            category?: components["schemas"]["Category-File"];
+            /**
+             * Model
+             * @default null
+             */
+            model?: string | null;
+        };
+        /**
+         * TransitStop
+         * @description A place where vehicles of lines stop; ``node`` is in the middle of its ``length`` (metres).
+         *
+         *     In a ``bay`` they stand beside the lane and hold up no other vehicle.
+         */
+        "TransitStop-File": {
+            /** Id */
+            id: string;
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
+            /** Node */
+            node: string;
+            /**
+             * Length
+             * @default 15
+             */
+            length?: number;
+            /**
+             * Bay
+             * @default false
+             */
+            bay?: boolean;
         };
         /**
          * Uniform
@@ -5588,6 +5901,13 @@ export interface components {
              *     }
              */
             demand?: components["schemas"]["Demand-File"];
+            /**
+             * @default {
+             *       "stops": [],
+             *       "lines": []
+             *     }
+             */
+            transit?: components["schemas"]["Transit-File"];
             /**
              * @default {
              *       "control": "fixed",

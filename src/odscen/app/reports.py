@@ -25,7 +25,12 @@ from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.recorded import read_conflicts, read_light_states, read_trajectories
+from odscen.sumo.folder.recorded import (
+    read_conflicts,
+    read_light_states,
+    read_trajectories,
+    read_visits,
+)
 from odscen.sumo.folder.run_status import unfinished
 from odscen.sumo.folder.run_sums import damaged_in, seal_again, whole_summary
 from odscen.sumo.outputs.corridor_traces import corridor_traces
@@ -111,6 +116,7 @@ def _page(
         corridor=followed,
         conflicts=read_conflicts(folder),
         lights=_lights(folder),
+        visits=read_visits(folder),
     )
 
 

@@ -21,9 +21,12 @@ _SINGULAR = {
     "flows": "flow",
     "zones": "zone",
     "profiles": "profile",
+    "inputs": "vehicle input",
     "matrices": "matrix",
     "counts": "counts",
     "background": "background demand",
+    "lines": "line",
+    "stops": "stop",
 }
 
 

@@ -41,6 +41,7 @@ class Basis(StrEnum):
     TRIPS = "trips"
     CONFLICTS = "conflicts"
     SIGNALS = "signals"
+    STOPS = "stops"
 
 
 class SummaryPart(StrEnum):
@@ -58,6 +59,7 @@ class ReportSection(StrEnum):
     PEDESTRIANS = "pedestrians"
     CONFLICTS = "conflicts"
     SIGNALS = "traffic lights"
+    TRANSIT = "public transport"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,9 @@ class RunData:
     signals
         One row per signal group, from :func:`odscen.results.measures.signal_use.signal_use`;
         ``None`` if the map has no lights.
+    visits
+        One row per visit of a stop, from :func:`odscen.sumo.folder.recorded.read_visits`; ``None``
+        if the scenario has no lines of public transport.
     """
 
     outcomes: Sequence[ActorOutcome] = ()
@@ -108,6 +113,7 @@ class RunData:
     conflicts: pl.DataFrame | None = None
     end: float | None = None
     signals: pl.DataFrame | None = None
+    visits: pl.DataFrame | None = None
 
     @cached_property
     def vehicles(self) -> Sequence[ActorOutcome]:
@@ -132,6 +138,7 @@ class RunData:
             Basis.TRIPS: self.trips is not None,
             Basis.CONFLICTS: self.conflicts is not None,
             Basis.SIGNALS: self.signals is not None,
+            Basis.STOPS: self.visits is not None,
         }[basis]
 
 

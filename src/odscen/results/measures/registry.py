@@ -18,6 +18,7 @@ from odscen.results.measures import (
     signal_use,
     table_columns,
     throughput,
+    timetable,
     travel,
 )
 from odscen.results.measures.figure import (
@@ -43,6 +44,7 @@ RUN_FIGURES: tuple[RunFigure, ...] = (
     *throughput.FIGURES,
     *safety.FIGURES,
     *signal_use.FIGURES,
+    *timetable.FIGURES,
 )
 """Figures of a whole run, in the order in which ``summary.json`` has them."""
 
@@ -52,6 +54,8 @@ COLUMN_UNITS = {column.name: column.unit for column in table_columns.COLUMNS}
 """Units of the columns of :class:`odscen.results.by_place.traffic.TrafficFigures`."""
 
 COUNTS = tuple(figure.name for figure in RUN_FIGURES if figure.count)
+
+_ON_DEMAND = (Basis.CONFLICTS, Basis.STOPS)
 
 _BY_NAME: dict[tuple[FigureKind, str], Figure] = {
     (figure.kind, figure.name): figure for figure in ALL_FIGURES
@@ -97,10 +101,10 @@ def figure_values(
     """Values of the figures of one part of the summary.
 
     Those for which the run has not recorded the basis are ``None``; those of conflicts, which are
-    measured on demand, are left out.
+    measured on demand, and of public transport, which few scenarios have, are left out.
     """
     return {
         figure.name: figure.compute(data) if data.has(figure.basis) else None
         for figure in figures
-        if figure.part is part and (figure.basis is not Basis.CONFLICTS or data.has(figure.basis))
+        if figure.part is part and (figure.basis not in _ON_DEMAND or data.has(figure.basis))
     }

@@ -31,6 +31,7 @@ from odscen.results.report.report_tables import (
     event_list,
     expectation_table,
 )
+from odscen.results.report.report_transit import transit_section
 from odscen.results.report.report_walking import walking_section
 from odscen.results.report.report_words import duration
 
@@ -64,6 +65,7 @@ def render_report(
     corridor: CorridorTraces | str | None = None,
     conflicts: pl.DataFrame | None = None,
     lights: LightsOfRun | None = None,
+    visits: pl.DataFrame | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -94,6 +96,8 @@ def render_report(
         Traffic conflicts, if they were measured.
     lights
         Programs of traffic lights and what they showed, if the map has any.
+    visits
+        Visits of stops, if the scenario has lines of public transport.
 
     Returns
     -------
@@ -105,7 +109,7 @@ def render_report(
     end = _end(summary, traces)
     incidents = find_incidents(plan, actors, events, end=end)
     title = plan.scenario or "Run"
-    run = RunData(actors, figures, conflicts=conflicts)
+    run = RunData(actors, figures, conflicts=conflicts, visits=visits)
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
     body = [
@@ -117,6 +121,7 @@ def render_report(
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
         corridor_section(corridor) if corridor is not None else None,
         signal_section(lights, given, drawing=drawing) if lights is not None else None,
+        transit_section(visits, given) if visits is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
         conflict_section(conflicts) if conflicts is not None else None,

@@ -14,6 +14,7 @@ from odscen.scenario.checks.actor_checks import (
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.checks.start_overlaps import start_overlaps
+from odscen.scenario.checks.transit_checks import transit_problems
 from odscen.scenario.document.problems import Problem, error, warning
 from odscen.scenario.placing.region import Region
 
@@ -64,6 +65,7 @@ def check(
     for index in range(len(scenario.flows)):
         found += flow_problems(scenario, region, index)
     found += demand_problems(scenario, region)
+    found += transit_problems(scenario, region)
     if lights is not None:
         clock, until = scenario.demand.clock, scenario.simulation.duration
         found += signal_problems(scenario.signals, lights, clock=clock, until=until)
@@ -118,7 +120,8 @@ def duplicate_ids(scenario: Scenario) -> Iterator[Problem]:
         for kind in ("actors", "flows")
         for index, one in enumerate(getattr(scenario, kind))
     ]
-    for place, one in (*placed, *scenario.demand.parts):
+    lines = [(f"transit.lines[{n}]", line) for n, line in enumerate(scenario.transit.lines)]
+    for place, one in (*placed, *scenario.demand.parts, *lines):
         where = f"{place}.id"
         if one.id in seen:
             message = f"id {one.id!r} is taken by {seen[one.id]}; give one of them another"
@@ -145,7 +148,8 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
             " that are closer from colliding; raise the headway or shorten the step"
         )
         yield error("headway_below_step", "drivers.headway", message)
-    if not scenario.actors and not scenario.flows and not scenario.demand.parts:
+    traffic = scenario.flows, scenario.demand.parts, scenario.transit.lines
+    if not scenario.actors and not any(traffic):
         yield warning(
             "no_actors", "actors", "there are neither actors nor flows; nothing will move"
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from odscen.scenario.document.document_parts import Part
 
@@ -108,6 +108,23 @@ Distribution = Annotated[
     BeforeValidator(_from_number),
 ]
 """A number, or a table with ``kind`` constant, uniform, normal or choice."""
+
+
+DistributionTable = dict[str, str | float | list[float]]
+"""A distribution as it is written, with its kind."""
+
+
+def as_written(
+    one: Constant | Uniform | Normal | Choice,
+) -> float | DistributionTable:
+    """Give a constant as the number that it is, and of others the kind, default or not."""
+    if isinstance(one, Constant):
+        return one.value
+    return one.model_dump(mode="json", exclude_none=True)
+
+
+WrittenDistribution = Annotated[Distribution, PlainSerializer(as_written)]
+"""A :data:`Distribution` of a document, which is written as briefly as it can be read."""
 
 
 def drawn_range(distribution: Constant | Uniform | Normal | Choice) -> tuple[float, float]:

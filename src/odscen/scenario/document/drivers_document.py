@@ -5,21 +5,14 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Annotated, Literal, Self, get_args
 
-from pydantic import Field, field_serializer, model_validator
+from pydantic import Field, model_validator
 
-from odscen.scenario.document.distributions import (
-    Constant,
-    Distribution,
-    drawn_range,
-)
+from odscen.scenario.document.distributions import WrittenDistribution, drawn_range
 from odscen.scenario.document.document_parts import Identifier, Label, Part
 from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
 
 DrivingStyle = Literal["cautious", "normal", "sporty"]
 DRIVING_STYLES: tuple[DrivingStyle, ...] = get_args(DrivingStyle)
-
-_Table = dict[str, str | float | list[float]]
-"""A distribution as it is written, with its kind."""
 
 
 class DriverSet(Part):
@@ -32,7 +25,7 @@ class DriverSet(Part):
 
     id: Identifier
     style: DrivingStyle = "normal"
-    parameters: dict[Label, Distribution] = Field(default_factory=dict)
+    parameters: dict[Label, WrittenDistribution] = Field(default_factory=dict)
     car_following: Literal["Krauss", "IDM"] = "Krauss"
 
     @model_validator(mode="after")
@@ -43,16 +36,6 @@ class DriverSet(Part):
         for name, value in self.parameters.items():
             _check_parameter(name, *drawn_range(value))
         return self
-
-    @field_serializer("parameters")
-    def _plain(self, parameters: dict[str, Distribution]) -> dict[str, float | _Table]:
-        """Write a constant as the number that it is, and of others the kind, default or not."""
-        return {
-            name: one.value
-            if isinstance(one, Constant)
-            else one.model_dump(mode="json", exclude_none=True)
-            for name, one in parameters.items()
-        }
 
 
 def _check_parameter(name: str, low: float, high: float) -> None:

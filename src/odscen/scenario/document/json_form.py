@@ -12,7 +12,7 @@ from odscen.base.errors import ScenarioError
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
 from odscen.scenario.document.validation import validation_problems
 
-OPTIONAL = ("drivers", "demand", "signals")
+OPTIONAL = ("drivers", "demand", "transit", "signals")
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
 """Fields of the simulation that are written always."""
@@ -76,7 +76,7 @@ def schema() -> dict[str, Any]:
 
 
 def _layout(key: str, value: object) -> str:
-    if key == "demand" and isinstance(value, dict):
+    if key in ("demand", "transit") and isinstance(value, dict):
         fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key == "signals" and isinstance(value, dict) and _has_programs(value):

@@ -16,6 +16,7 @@ from odscen.base.categories import Category
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.signals_document import Signals
+from odscen.scenario.document.transit_document import Transit
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
@@ -277,6 +278,8 @@ class Scenario(Part):
         Road users that keep coming, per hour.
     demand
         Traffic from inputs, matrices, day profiles, counts and background.
+    transit
+        Stops and lines of public transport.
     signals
         How traffic lights are run.
     simulation
@@ -297,5 +300,6 @@ class Scenario(Part):
     actors: tuple[Actor, ...] = ()
     flows: tuple[Flow, ...] = ()
     demand: Demand = Demand()
+    transit: Transit = Transit()
     signals: Signals = Signals()
     simulation: Simulation = Simulation()

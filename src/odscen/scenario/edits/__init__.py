@@ -42,6 +42,7 @@ from odscen.scenario.edits.settings_edits import (
     set_simulation,
     set_timing,
 )
+from odscen.scenario.edits.transit_edits import remove_transit, set_line, set_stop
 
 __all__ = [
     "add_actor",
@@ -59,6 +60,7 @@ __all__ = [
     "remove_actors",
     "remove_demand",
     "remove_flow",
+    "remove_transit",
     "rename",
     "set_background",
     "set_clock",
@@ -68,11 +70,13 @@ __all__ = [
     "set_environment",
     "set_goal",
     "set_input",
+    "set_line",
     "set_matrix",
     "set_profile",
     "set_seed",
     "set_signal_control",
     "set_simulation",
+    "set_stop",
     "set_timing",
     "set_zone",
     "shrink_roi",

@@ -51,7 +51,7 @@ _One = TypeVar("_One", bound=Actor | Flow)
 GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
-_JSON = ("roi", "environment", "drivers", "demand", "signals", "simulation")
+_JSON = ("roi", "environment", "drivers", "demand", "transit", "signals", "simulation")
 """Graph attributes that hold JSON."""
 
 

@@ -10,6 +10,8 @@ ROUTES_FILE = "routes.rou.xml"
 """In the SUMO folder."""
 SIGNALS_FILE = "signals.add.xml"
 """In the SUMO folder, where the scenario changes the programs of traffic lights."""
+STOPS_FILE = "stops.add.xml"
+"""In the SUMO folder, where the scenario has lines of public transport."""
 REGION_FILE = "region.add.xml"
 """In the SUMO folder, where trajectories are recorded in one region only."""
 MEASURES_FILE = "measures.add.xml"
@@ -30,6 +32,10 @@ TRIPS_FILE = "trips.parquet"
 TRIPS_FOLDER = "trips"
 TRIPINFO_FILE = "tripinfo.xml"
 """SUMO's own; what is in it goes into the trips."""
+STOPINFO_FILE = "stopinfo.xml"
+"""SUMO's own; what is in it goes into the visits of stops."""
+VISITS_FILE = "stop_visits.parquet"
+VISITS_FOLDER = "stop_visits"
 SSM_FILE = "ssm.xml"
 """SUMO's own; what is in it goes into the conflicts."""
 CONFLICTS_FILE = "conflicts.parquet"
@@ -49,6 +55,7 @@ RECORDED = {
     CONFLICTS_FILE: CONFLICTS_FOLDER,
     LIGHT_STATES_FILE: LIGHT_STATES_FOLDER,
     CALLS_FILE: CALLS_FOLDER,
+    VISITS_FILE: VISITS_FOLDER,
 }
 """What is recorded: the file of a run in one piece, the folder of one in slices."""
 EVENTS_FILE = "events.json"

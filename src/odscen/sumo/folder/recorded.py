@@ -13,6 +13,7 @@ from odscen.sumo.folder.layout import (
     RECORDED,
     TRAJECTORIES_FILE,
     TRIPS_FILE,
+    VISITS_FILE,
 )
 
 if TYPE_CHECKING:
@@ -143,6 +144,16 @@ def read_calls(run: Path) -> pl.DataFrame | None:
     is in two rows.
     """
     return _read(run, CALLS_FILE)
+
+
+def read_visits(run: Path) -> pl.DataFrame | None:
+    """Read who was at which stop when: columns of :mod:`odscen.sumo.outputs.stop_table`.
+
+    Returns
+    -------
+    In order of departure; ``None`` if the scenario has no lines.
+    """
+    return _read(run, VISITS_FILE)
 
 
 def _read(run: Path, file: str) -> pl.DataFrame | None:

@@ -18,6 +18,7 @@ from odscen.sumo.folder.recorded import (
     read_lanes,
     read_light_states,
     read_trips,
+    read_visits,
     trajectory_files,
 )
 
@@ -80,6 +81,7 @@ def read_run_data(
         conflicts=read_conflicts(run),
         end=end,
         signals=read_signal_use(run, end=end, meso=meso),
+        visits=read_visits(run),
     )
 
 

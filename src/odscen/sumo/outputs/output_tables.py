@@ -16,10 +16,13 @@ from odscen.sumo.folder.layout import (
     EMISSIONS_FILE,
     EVENTS_FILE,
     LANES_FILE,
+    STOPINFO_FILE,
     TRIPINFO_FILE,
     TRIPS_FILE,
+    VISITS_FILE,
 )
 from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.stop_table import stop_table
 from odscen.sumo.outputs.trip_table import trip_table
 
 if TYPE_CHECKING:
@@ -45,7 +48,7 @@ def tidy_outputs(
     present: Mapping[str, int],
     last: bool,
 ) -> None:
-    """Replace SUMO's lane data, emissions and tripinfo by ``lanes.parquet`` and ``trips.parquet``.
+    """Replace SUMO's lane data, emissions, tripinfo and stops by our tables.
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ def tidy_outputs(
     from polars.exceptions import PolarsError
 
     lanes, emissions = folder / LANES_FILE, folder / EMISSIONS_FILE
-    tripinfo = folder / TRIPINFO_FILE
+    tripinfo, stopinfo = folder / TRIPINFO_FILE, folder / STOPINFO_FILE
     try:
         if lanes.is_file():
             rows = lane_table(lanes, emissions if emissions.is_file() else None, lengths, present)
@@ -76,6 +79,9 @@ def tidy_outputs(
             if trips.height:
                 trips.write_parquet(folder / TRIPS_FILE)
             tripinfo.unlink()
+        if stopinfo.is_file():
+            stop_table(stopinfo).write_parquet(folder / VISITS_FILE)
+            stopinfo.unlink()
     except (etree.XMLSyntaxError, PolarsError) as error:
         msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
         raise SimulationError(msg) from error

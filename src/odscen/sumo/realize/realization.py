@@ -29,6 +29,7 @@ from odscen.sumo.folder.layout import (
     REGION_FILE,
     ROUTES_FILE,
     SIGNALS_FILE,
+    STOPS_FILE,
 )
 from odscen.sumo.realize.departures import demand_users, road_users
 from odscen.sumo.realize.driving import KINDS, driver, factor_of, kind_of
@@ -42,12 +43,14 @@ from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumocfg import SSM_PARAMETER, SumocfgSettings, sumo_config
+from odscen.sumo.realize.transit.line_vehicles import line_users
+from odscen.sumo.realize.transit.stop_places import left_out, stop_places, stops_xml
 from odscen.sumo.realize.usable import usable_places
 from odscen.sumo.realize.walk_planner import Walk, WalkPlanner
 from odscen.sumo.realize.weather_effects import NO_EFFECT, weather_effect
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.base.arrays import Int32Array
     from odscen.results.records.light_programs import LightProgram
@@ -57,6 +60,7 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.realize.sumo_map import SumoMap
+    from odscen.sumo.realize.transit.stop_places import StopPlace
     from odscen.sumo.realize.weather_effects import WeatherEffect
 
 UNKNOWN_LIMIT = 13.89
@@ -127,7 +131,8 @@ def realize(
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
     demand = RoutesFile((SSM_PARAMETER,) if recording.criticality else ())
-    writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length)
+    stops = stop_places(scenario, sumo_map)
+    writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length, stops)
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -145,7 +150,8 @@ def realize(
     signals = signals_xml(lights, buses=demand.types_of(Category.BUS))
     files = {
         ROUTES_FILE: demand.to_xml(),
-        **_run_files(plan, settings, scenario.simulation, signals, lights),
+        **({STOPS_FILE: stops_xml(stops)} if stops else {}),
+        **_run_files(plan, settings, scenario.simulation, signals, lights, stops=bool(stops)),
     }
     return Realization(
         files,
@@ -162,8 +168,13 @@ def _run_files(
     own: Simulation,
     signals: str | None,
     lights: Sequence[RealizedLight],
+    *,
+    stops: bool,
 ) -> dict[str, str]:
-    """What SUMO reads beside network and routes; ``signals`` are programs that differ."""
+    """What SUMO reads beside network and routes; ``signals`` are programs that differ.
+
+    ``stops`` says whether there is a file of them.
+    """
     recording = settings.recorded
     sumocfg = SumocfgSettings(
         until=plan.until,
@@ -171,6 +182,7 @@ def _run_files(
         seed=plan.seed,
         elevation=plan.elevation,
         signals=signals is not None,
+        stops=stops,
         recording=recording,
         measures=True,
         meso=settings.meso,
@@ -220,11 +232,17 @@ def all_road_users(
         With every actor and flow whose spawn or goal is not usable.
     """
     users = road_users(scenario, sumo_map.graph, region, until=until)
+    if scenario.transit.lines:
+        users = _in_order((*users, *line_users(scenario, region, until=until)))
     if not scenario.demand.parts:
         return users, []
     usable = usable_places(sumo_map)
     more, unmet = demand_users(scenario, region, usable, users, until=until)
-    return tuple(sorted((*users, *more), key=lambda user: (user.depart, user.id))), unmet
+    return _in_order((*users, *more)), unmet
+
+
+def _in_order(users: Iterable[RoadUser]) -> tuple[RoadUser, ...]:
+    return tuple(sorted(users, key=lambda user: (user.depart, user.id)))
 
 
 class _PlannedRoute(NamedTuple):
@@ -248,6 +266,7 @@ class _Writer:
         effect: WeatherEffect,
         demand: RoutesFile,
         step_length: float,
+        stops: Mapping[str, StopPlace],
     ) -> None:
         graph = sumo_map.graph
         self.demand = demand
@@ -258,6 +277,8 @@ class _Writer:
         self._assets = assets
         self._scenario = scenario
         self._step_length = step_length
+        self._stops = stops
+        self._bays = {name for name, stop in stops.items() if stop.bay}
         self._effect = effect
         self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
@@ -297,6 +318,10 @@ class _Writer:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
         route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        missed = left_out((self._stops[visit.stop] for visit in user.visits), route.edges)
+        if missed is not None:
+            msg = f"its route on the SUMO network does not pass stop {missed.id!r}"
+            raise NoRouteError(msg)
         # A trip ends in a segment, not on a lane of it: no vehicle has to stop for a lane change.
         return replace(route, arrival_lane=None) if user.trip else route
 
@@ -309,7 +334,7 @@ class _Writer:
             if isinstance(planned.route, Walk):
                 self.demand.add_walk(user, behaviour, planned.route)
             else:
-                self.demand.add_vehicle(user, behaviour, planned.route)
+                self.demand.add_vehicle(user, behaviour, planned.route, bays=self._bays)
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
         return self._planned(user, body, behaviour, planned)
 

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from odscen.base.categories import Category
 from odscen.scenario.document.scenario_document import Actor
 
 _DEFAULT_DESIGN = Actor(id="any", category=Category.CAR, spawn="any")
 """Its optional fields have the document's defaults; the others mean nothing."""
+
+
+class StopVisit(NamedTuple):
+    """A stop of a vehicle of a line: ``node`` of the lane graph, seconds it stays at least.
+
+    ``scheduled`` is when it departs there at the earliest, seconds; ``None`` without a timetable.
+    """
+
+    stop: str
+    node: int
+    dwell: float
+    scheduled: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +33,8 @@ class RoadUser:
     of the demand: many share a goal, so their paths are found from there.
 
     ``entering`` is set for those who drive in at the boundary of the region, at speed.
+
+    ``visits`` are the stops of a vehicle of a line, in their order.
 
     ``design`` is the actor as the document has it, for what is not decided here but acted on as it
     is: model, style and the like. Members of flows and demand have the defaults.
@@ -34,7 +49,13 @@ class RoadUser:
     flow: str | None = None
     trip: bool = False
     entering: bool = False
+    visits: tuple[StopVisit, ...] = ()
     design: Actor = _DEFAULT_DESIGN
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Nodes that it goes to one after the other, the goal last."""
+        return (*(visit.node for visit in self.visits), self.goal)
 
     @property
     def person(self) -> bool:

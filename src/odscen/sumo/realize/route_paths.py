@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -65,7 +66,7 @@ def each_path(
             by_spawn[user.person, user.spawn].append(index)
     leads = _Leads(region.graph.lanes)
     for (person, spawn), group in by_spawn.items():
-        goals = {index: users[index].goal for index in group}
+        goals = {index: users[index].places[0] for index in group}
         paths: dict[int, Int32Array] = {}
         if person:
             paths = {index: region.walk_router.path(spawn, goal) for index, goal in goals.items()}
@@ -74,7 +75,8 @@ def each_path(
                 rest = {index: goal for index, goal in goals.items() if index not in paths}
                 paths |= _from_spawn(spawn, rest, bodies, router, leads)
         for index in group:
-            yield index, paths.get(index, _NOWHERE)
+            path = paths.get(index, _NOWHERE)
+            yield index, _through(path, users[index].places, drivable) if len(path) else path
     for (person, goal), group in by_goal.items():
         there = (region.walk_router if person else drivable).paths_to(goal)
         for first in range(0, len(group), TOGETHER):
@@ -85,6 +87,16 @@ def each_path(
                 for index, spawn in zip(part, spawns, strict=True)
             ]
             yield from zip(part, _to_goal(goal, begun, there), strict=True)
+
+
+def _through(path: Int32Array, places: Sequence[int], router: Router) -> Int32Array:
+    """A path to the first of some places, and on to the others; empty if there is none."""
+    for here, there in pairwise(places):
+        further = router.path(here, there)
+        if not len(further):
+            return _NOWHERE
+        path = np.concatenate([path, further[1:]])
+    return path
 
 
 class _Lead(NamedTuple):

@@ -9,10 +9,10 @@ from odscen.base.categories import Category
 from odscen.sumo.realize.driving import number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from odscen.sumo.realize.driving import Driver
-    from odscen.sumo.realize.road_user import RoadUser
+    from odscen.sumo.realize.road_user import RoadUser, StopVisit
     from odscen.sumo.realize.route_planner import Route
     from odscen.sumo.realize.walk_planner import Walk
 
@@ -37,8 +37,16 @@ class RoutesFile:
         self._on_foot: set[str] = set()
         self._lines: list[tuple[float, str, list[str]]] = []
 
-    def add_vehicle(self, user: RoadUser, driver: Driver, route: Route) -> None:
-        """Add a vehicle that drives ``route``."""
+    def add_vehicle(
+        self, user: RoadUser, driver: Driver, route: Route, *, bays: Collection[str] = ()
+    ) -> None:
+        """Add a vehicle that drives ``route``.
+
+        Parameters
+        ----------
+        bays
+            Stops at which vehicles stand beside the lane.
+        """
         attributes = [
             ("id", user.id),
             ("type", self._type(user.category.value, driver)),
@@ -58,6 +66,7 @@ class RoutesFile:
         lines = [
             f"    <vehicle{_xml(attributes)}>",
             f'        <route edges="{" ".join(route.edges)}"/>',
+            *(_stop(visit, bay=visit.stop in bays) for visit in user.visits),
             "    </vehicle>",
         ]
         self._lines.append((user.depart, user.id, lines))
@@ -114,6 +123,15 @@ class RoutesFile:
             if category == Category.PEDESTRIAN:
                 self._on_foot.add(name)
         return name
+
+
+def _stop(visit: StopVisit, *, bay: bool) -> str:
+    attributes = [("busStop", visit.stop), ("duration", number(visit.dwell))]
+    if visit.scheduled is not None:
+        attributes.append(("until", number(visit.scheduled)))
+    if bay:
+        attributes.append(("parking", "true"))
+    return f"        <stop{_xml(attributes)}/>"
 
 
 def _xml(attributes: Iterable[tuple[str, str]]) -> str:

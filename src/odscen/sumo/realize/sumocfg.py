@@ -16,6 +16,8 @@ from odscen.sumo.folder.layout import (
     ROUTES_FILE,
     SIGNALS_FILE,
     SSM_FILE,
+    STOPINFO_FILE,
+    STOPS_FILE,
     TRAJECTORIES_FILE,
     TRIPINFO_FILE,
 )
@@ -61,6 +63,8 @@ class SumocfgSettings:
         Whether the network has heights, so that z is recorded.
     signals
         Whether there are programs of traffic lights beside the network's own.
+    stops
+        Whether there are stops of lines, and what vehicles do there is recorded.
     recording
         What is recorded.
     measures
@@ -78,6 +82,7 @@ class SumocfgSettings:
     pedestrians: str = "striping"
     elevation: bool = False
     signals: bool = False
+    stops: bool = False
     recording: Recording = field(default_factory=Recording)
     measures: bool = False
     meso: bool = False
@@ -88,6 +93,8 @@ def sumo_config(settings: SumocfgSettings) -> str:
     recording = settings.recording
     inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
     additional = [SIGNALS_FILE] if settings.signals else []
+    if settings.stops:
+        additional.append(STOPS_FILE)
     if recording.region is not None:
         additional.append(REGION_FILE)
     if settings.measures:
@@ -154,6 +161,8 @@ def _outputs(settings: SumocfgSettings) -> dict[str, str]:
         "tripinfo-output.write-unfinished": "true",
         "precision": "4",
     }
+    if settings.stops:
+        trips = {"stop-output": STOPINFO_FILE, **trips}
     if not recording.trajectories:
         return trips
     outputs = {

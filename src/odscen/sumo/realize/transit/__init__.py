@@ -1,0 +1,1 @@
+"""Public transport as SUMO sees it: vehicles of lines, and stops."""
