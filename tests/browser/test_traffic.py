@@ -52,6 +52,24 @@ def background(user: OdscenPage) -> Locator:
     return user.page.get_by_role("region", name="Background traffic background", exact=True)
 
 
+def test_vehicles_from_outside_are_added_where_lanes_lead_in(
+    user: OdscenPage, crossing: str
+) -> None:
+    open_traffic(user, crossing)
+    user.page.get_by_role("button", name="Add vehicles from outside").click()
+    user.choose("Where they drive in", "r2, 2 lanes")
+    with user.changing():
+        user.page.get_by_role("button", name="Add", exact=True).click()
+    card = user.page.get_by_role("region", name="Vehicles from outside input", exact=True)
+    with user.changing():
+        card.get_by_label("Vehicles per hour").fill("950")
+        user.page.keyboard.press("Enter")
+    (inflow,) = user.document()["demand"]["inputs"]
+    assert (inflow["segment"], inflow["per_hour"]) == ("r2", 950)
+    card.get_by_role("button", name="Remove input").click()
+    expect(card).to_have_count(0)
+
+
 def test_background_traffic_is_added_changed_and_taken_back(
     user: OdscenPage, crossing: str
 ) -> None:
