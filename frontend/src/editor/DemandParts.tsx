@@ -71,7 +71,7 @@ export function WindowFields({
         min={0.1}
         max={1e5}
         digits={1}
-        placeholder="the end of the run"
+        placeholder="the end"
         value={end === null ? "" : end / 60}
         onCommit={(value) => onChange({ end: value === null ? null : value * 60 })}
       />
