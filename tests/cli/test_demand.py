@@ -138,3 +138,16 @@ def test_vehicles_from_outside_are_added_where_they_can_enter(workspace, scenari
     )
     assert wrong.code == 2
     assert "no lane leads into the region of interest on 'j10001'" in wrong.err
+
+
+def test_a_feed_without_its_tables_is_refused_and_changes_nothing(workspace, scenario, tmp_path):
+    before = Path(scenario).read_bytes()
+    (tmp_path / "stops.txt").write_text("stop_id,stop_lat,stop_lon\n")
+    done = odscen("transit", "import", scenario, tmp_path, "--workspace", workspace)
+    assert done.code == 2
+    assert "the feed has no routes.txt" in done.err
+    wrong = odscen(
+        *("transit", "import", scenario, tmp_path, "--day", "tomorrow", "--workspace", workspace)
+    )
+    assert "a day is written as 2026-11-23" in wrong.err
+    assert Path(scenario).read_bytes() == before

@@ -31,6 +31,7 @@ from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
+from odscen.cli.transit_commands import app as transit
 
 app = typer.Typer(
     name="odscen",
@@ -48,6 +49,7 @@ app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
 app.add_typer(demand, name="demand")
 app.add_typer(signals, name="signals")
+app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
 app.command()(generate)
 app.command()(check)

@@ -1,0 +1,128 @@
+"""Public transport from GTFS feeds."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from typing import TYPE_CHECKING
+
+from odscen.app.maps import map_of
+from odscen.base.errors import InputError, in_file
+from odscen.base.given_files import MOST, read_given, read_given_text
+from odscen.interchange.gtfs_feed import CALENDARS, NEEDED, read_feed
+from odscen.interchange.gtfs_lines import place_feed
+from odscen.opendrive.parse import parse
+from odscen.scenario.checks.transit_checks import transit_problems
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.placing.region import Region
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from datetime import date
+    from pathlib import Path
+
+    from odscen.base.arrays import FloatArray
+    from odscen.interchange.gtfs_lines import PlacedFeed
+    from odscen.opendrive.road_model import Header
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.workspace.store import Workspace
+
+WITHIN = 30.0
+"""Metres that a stop of a feed may be from its lane."""
+
+
+def import_feed(
+    workspace: Workspace,
+    scenario: Scenario,
+    file: Path,
+    *,
+    day: date | None = None,
+    routes: Sequence[str] = (),
+    within: float = WITHIN,
+) -> tuple[Scenario, PlacedFeed]:
+    """Replace the public transport of a scenario by the bus trips of a feed on a day.
+
+    Parameters
+    ----------
+    file
+        A zip archive, or the folder of its tables.
+    routes, within
+        As of :func:`odscen.interchange.gtfs_lines.place_feed`.
+
+    Raises
+    ------
+    InputError
+        If the map has no georeference, or the feed cannot be read.
+    """
+    entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
+    header = parse(entry.read("xodr"), file=entry.path("xodr").name).header
+    project = projection(header)
+    with in_file(str(file)):
+        feed = read_feed(_tables(file), day=day)
+        placed = place_feed(
+            feed,
+            region := Region.of(map_of(workspace, scenario).sumo.graph, scenario.roi),
+            project,
+            clock=scenario.demand.clock,
+            duration=scenario.simulation.duration,
+            within=within,
+            routes=routes,
+        )
+    changed = scenario.model_copy(update={"transit": placed.transit})
+    refuse_errors(transit_problems(changed, region))
+    return changed, placed
+
+
+def projection(
+    header: Header,
+) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """From degrees of longitude and latitude to metres of the map.
+
+    Raises
+    ------
+    InputError
+        If the map has no georeference that is understood, or turns it.
+    """
+    import pyproj
+
+    if header.crs is None:
+        msg = "the map has no georeference that is understood, so stops cannot be placed on it"
+        raise InputError(msg, element="geoReference")
+    x, y, _, hdg = header.offset
+    if hdg:
+        msg = f"the map is turned by {hdg:g} rad against its georeference, which is not supported"
+        raise InputError(msg, element="offset")
+    transformer = pyproj.Transformer.from_crs("EPSG:4326", header.crs, always_xy=True)
+
+    def project(lon: FloatArray, lat: FloatArray) -> tuple[FloatArray, FloatArray]:
+        east, north = transformer.transform(lon, lat)
+        return east - x, north - y
+
+    return project
+
+
+def _tables(file: Path) -> dict[str, str]:
+    """Tables of a feed by name; of an archive, wherever in it they are."""
+    names = (*NEEDED, *CALENDARS)
+    if file.is_dir():
+        return {name: read_given_text(file / name) for name in names if (file / name).is_file()}
+    try:
+        with zipfile.ZipFile(io.BytesIO(read_given(file))) as archive:
+            found = {}
+            for member in archive.infolist():
+                name = member.filename.rpartition("/")[2]
+                if name in names:
+                    if member.file_size > MOST:
+                        msg = f"{name} has {member.file_size} bytes; the limit is {MOST}"
+                        raise InputError(msg)
+                    found[name] = archive.read(member).decode("utf-8")
+            return found
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        msg = f"this is no zip archive that can be read: {error}"
+        raise InputError(msg) from error
+    except UnicodeDecodeError as error:
+        msg = (
+            f"a table is not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}"
+        )
+        raise InputError(msg) from error
