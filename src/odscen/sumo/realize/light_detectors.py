@@ -261,10 +261,16 @@ def _placed(
 def _upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
     """Lane and position so many metres before the end of a lane; the start of the last one else."""
     while (rest := net.lanes[lane].length - max(ahead, 0.0)) < _LEAST:
-        before = [link.source for link in net.links_to.get(lane, ())]
-        if not before:
+        before = lane_before(net, lane)
+        if before is None:
             return lane, min(_LEAST, net.lanes[lane].length)
         ahead -= net.lanes[lane].length
-        same = net.lanes[lane].index
-        lane = min(before, key=lambda one: (abs(net.lanes[one].index - same), one))
+        lane = before
     return lane, rest
+
+
+def lane_before(net: RoadNet, lane: str) -> str | None:
+    """Lane that leads onto a lane, of several the one beside the fewest others; else ``None``."""
+    same = net.lanes[lane].index
+    sources = (link.source for link in net.links_to.get(lane, ()))
+    return min(sources, key=lambda one: (abs(net.lanes[one].index - same), one), default=None)
