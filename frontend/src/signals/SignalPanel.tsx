@@ -111,7 +111,7 @@ function Program({ light, now, occupied }: ProgramProps) {
           onChange={setChosen}
         />
       )}
-      {now && <Now plan={plan} cursor={cursor} now={now} />}
+      {now && <Now light={light} plan={plan} cursor={cursor} now={now} />}
       <Drawn className="signal-ground" svg={light.ground} />
       <h3>Signal timing plan</h3>
       <TimeBar plan={plan} cursor={cursor} />
@@ -161,9 +161,16 @@ function Fact({ word, children }: { word: string; children: ReactNode }) {
 }
 
 /** The state now in words, as the cursor says it to the eye. */
-function Now({ plan, cursor, now }: { plan: DayPlan; cursor: Cursor | null; now: SignalNow }) {
+interface NowProps {
+  light: LightProgram;
+  plan: DayPlan;
+  cursor: Cursor | null;
+  now: SignalNow;
+}
+
+function Now({ light, plan, cursor, now }: NowProps) {
   const stage = cursor?.stage == null ? undefined : plan.stages[cursor.stage];
-  const what = stage ? `stage ${stage.id}` : betweenWords(now.state);
+  const what = stage ? `stage ${stage.id}` : betweenWords(light, now.state);
   return (
     <p className="signal-now">
       Now: <b>{what}</b>
@@ -172,8 +179,12 @@ function Now({ plan, cursor, now }: { plan: DayPlan; cursor: Cursor | null; now:
   );
 }
 
-const betweenWords = (state: string): string =>
-  state.includes("y") ? "yellow" : /[gG]/.test(state) ? "between stages" : "all red";
+/** What is shown that is no stage of the plan: between two, or a stage without its crossings. */
+function betweenWords({ groups }: LightProgram, state: string): string {
+  if (state.includes("y")) return "yellow";
+  const green = groups.filter(({ links }) => links.some((link) => /[gG]/.test(state[link] ?? "")));
+  return green.length > 0 ? `green for ${green.map(({ id }) => id).join(" ")}` : "all red";
+}
 
 function TimeBar({ plan, cursor }: { plan: DayPlan; cursor: Cursor | null }) {
   const [begin, end] = plan.plot;

@@ -47,6 +47,10 @@ test("in a run the stage that is shown is marked, in words and for screen reader
   again(part({ ...now, time: 116, state: "yr", since: 115, before: "gr" }));
   expect(screen.getByText(/^Now/).textContent).toBe("Now: yellow, for 1 s");
   expect(document.querySelector("[aria-current]")).toBeNull();
+  again(part({ ...now, time: 118, state: "rr", since: 118, before: "yr" }));
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: all red, for 0 s");
+  again(part({ ...now, time: 120, state: "GG", since: 119, before: "rr" }));
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: green for K1 K2");
   expect(load).toHaveBeenCalledTimes(1);
 });
 

@@ -33,7 +33,7 @@ _COLORS = """\
     --paper: #16191d; --ink: #e8eaec; --soft: #a5afb8; --line: #3a4149; --land: #1b1f24;
     --paved: #343b43; --walked: #2a2d2e; --paint: #aeb5bc; --closed: #6d7680; --go: #4cc27d;
     --go-soft: #2f6d49; --amber: #e8b93a; --stop: #8a4a45; --detector: #7fb2ea; --span: #3a424b;
-    --bus: #c9a0dc;
+    --bus-area: #f5a344;
   }
 }
 .sheet { font-family: system-ui, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif; }
