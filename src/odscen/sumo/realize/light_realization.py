@@ -142,7 +142,7 @@ class _Realizing:
         *,
         buses: bool = False,
     ) -> None:
-        self._buses = bus_areas(light, view) if buses else ()
+        self._buses = bus_areas(light, view, sumo_map.net) if buses else ()
         self._light = light
         self._view = view
         self._timing = timing

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from odscen.results.records.light_programs import ShownDetector
-from odscen.sumo.realize.light_detectors import BUS_AREA, lane_before
+from odscen.sumo.realize.light_detectors import lane_before
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -53,7 +53,7 @@ def shown_bus_areas(
             stage for stage, state in green.items() if any(state[n] in "Gg" for n in area.movements)
         )
         admits = sumo_map.net.lanes[area.lane].allows("bus")
-        place = _area_place(area.lane, BUS_AREA, sumo_map) if stages and admits else ()
+        place = _area_place(area.lane, area.length, sumo_map) if stages and admits else ()
         if place:
             yield ShownDetector(area.id, "", stages, place=place, bus=True)
 
