@@ -12,6 +12,7 @@ ALL = (
     "startup",
     "lane_graph",
     "maps_add",
+    "netconvert_maps",
     "capacity",
     "saturation",
     "signal_timing",

@@ -16,7 +16,9 @@ from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.app.signal_plans import export_signals, import_signals, lights_of
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.convert.model.conversion_settings import ConversionSettings
+from odscen.results.records.light_programs import programs_from_json, stage_spans
 from odscen.scenario.document.scenario_document import MapReference
+from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from odscen.workspace.netconvert import NetconvertLimits, run_netconvert
 from odscen.workspace.store import Workspace
 from tests.signal_case import MAP, one_plan, program, scenario
@@ -263,6 +265,33 @@ def test_the_program_of_the_guide_runs_on_a_network_by_netconvert_too(
     assert [set(group.movements) for group in timing.groups] == [
         set(group.movements) for group in own.groups
     ]
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        Signals(control="actuated"),
+        Signals(bus_priority=True),
+        Signals(junctions=(JunctionTiming(junction="10001", green=(20.0, 12.0), offset=5.0),)),
+    ],
+)
+def test_stages_by_netconvert_are_timed_anew_called_and_prolonged(
+    by_netconvert: Workspace, tmp_path: Path, signals: Signals
+) -> None:
+    one = placed(by_netconvert, scenario(None)).model_copy(update={"signals": signals})
+    done = run(by_netconvert, one, name="stages", out=tmp_path / "runs")
+    assert done.status == "completed", done.summary["error"]
+    log = (done.folder / "sumo.log").read_text()
+    assert "tlLogic" not in log
+    assert "etector" not in log
+    (light,) = programs_from_json((done.folder / "signals.json").read_text())
+    first, second = stage_spans(light.plans[0])
+    if signals.control == "actuated":
+        assert [(one.least, one.most) for one in (first, second)] == [(8.0, 70.0)] * 2
+        loops = [one for one in light.detectors if not one.call]
+        assert {one.stages for one in loops} == {("1",), ("2",)}
+    if signals.junctions:
+        assert (first.seconds, second.seconds, light.plans[0].offset) == (20.0, 12.0, 5.0)
 
 
 def test_lights_by_netconvert_show_movements_by_segments(by_netconvert: Workspace) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
 from odscen.app.scenarios import SUFFIX
+from odscen.base.categories import Category
 from odscen.scenario.document.json_form import dumps
 from odscen.scenario.document.scenario_document import MapReference
+from odscen.sumo.folder.recorded import read_calls
 from odscen.web.wire.map_messages import MapDetails
 from odscen.web.wire.signal_messages import LightProgramInfo, RunSignals
 from tests.signal_case import JUNCTION, program, scenario
@@ -19,6 +22,7 @@ from tests.web.conftest import CROSSING, finished
 if TYPE_CHECKING:
     from starlette.testclient import TestClient
 
+    from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
 
 EVENING = 18.5 * 3600.0 - 60.0
@@ -27,12 +31,61 @@ EVENING = 18.5 * 3600.0 - 60.0
 @pytest.fixture
 def own(workspace: Workspace) -> str:
     """Name of a scenario with the program of the guide, a minute before its evening plan."""
-    one = scenario(program(), control="actuated", clock=EVENING, until=120.0)
+    return saved(
+        workspace, scenario(program(), control="actuated", clock=EVENING, until=120.0), "own"
+    )
+
+
+@pytest.fixture
+def buses(workspace: Workspace) -> str:
+    """The same, and every third vehicle is a bus with priority."""
+    one = scenario(program(bus_priority=True), control="actuated", clock=EVENING, until=120.0)
+    mix = {Category.CAR: 0.67, Category.BUS: 0.33}
+    flows = tuple(
+        flow if Category.PEDESTRIAN in flow.mix else flow.model_copy(update={"mix": mix})
+        for flow in one.flows
+    )
+    return saved(workspace, one.model_copy(update={"flows": flows}), "buses")
+
+
+def saved(workspace: Workspace, one: Scenario, name: str) -> str:
     sha256 = workspace.map(CROSSING).info["sha256"]
     one = one.model_copy(update={"map": MapReference(name=CROSSING, sha256=sha256)})
     workspace.scenarios.mkdir(exist_ok=True)
-    (workspace.scenarios / f"own{SUFFIX}").write_text(dumps(one))
-    return "own"
+    (workspace.scenarios / f"{name}{SUFFIX}").write_text(dumps(one))
+    return name
+
+
+class Watched(NamedTuple):
+    """A run seen step by step: at the time of each frame who was on the road, and the detectors."""
+
+    run: str
+    rows: dict[float, set[str]]
+    occupied: dict[float, set[str]]
+
+
+def watched(client: TestClient, name: str, *, until: float) -> Watched:
+    run = client.post("/api/runs", json={"scenario": name, "until": until, "paused": True})
+    seen = Watched(run.json()["run"], {}, {})
+    now: dict[str, bool] = {}
+    ids: list[str] = []
+    with client.websocket_connect(f"/api/runs/{seen.run}/live") as socket:
+        while (message := socket.receive())["type"] != "websocket.close":
+            if message.get("text") is None:
+                frame = np.frombuffer(message["bytes"], "<f4")
+                time = round(float(frame[1]), 2)
+                seen.rows[time] = {ids[int(row[0])] for row in frame[5:].reshape(-1, 6)}
+                seen.occupied[time] = {one for one, on in now.items() if on}
+                socket.send_text("ack")
+                client.post(f"/api/runs/{seen.run}/control", json={"action": "step"})
+                continue
+            text = json.loads(message["text"])
+            if text["type"] == "hello":
+                ids = [f"{one['category']} {one['id']}" for one in text["actors"]]
+            if text["type"] == "detectors":
+                now |= text["detectors"]
+    assert finished(client, seen.run)["state"] == "completed"
+    return seen
 
 
 def exact(model: Any, data: Any) -> Any:
@@ -115,6 +168,44 @@ def test_a_run_tells_what_its_lights_showed_and_when_detectors_were_occupied(
     assert client.get(f"/api/runs/{run}/signals/99").status_code == 404
     assert client.get("/api/runs/nothing/signals").status_code == 404
     assert client.get("/api/runs/nothing/signals/1").status_code == 404
+
+
+def test_a_run_that_is_watched_shows_which_detectors_are_occupied_as_its_log_says_later(
+    client: TestClient, workspace: Workspace
+) -> None:
+    one = scenario(program(), control="actuated", clock=EVENING, walkers=600.0, until=120.0)
+    seen = watched(client, saved(workspace, one, "busy"), until=100.0)
+    calls = read_calls(workspace.runs / seen.run)
+    assert calls is not None
+
+    def logged(time: float) -> set[str]:
+        return {name for name, begin, end in calls.iter_rows() if begin <= time < end}
+
+    *times, _ = sorted(seen.occupied)  # the log ends before the last one
+    assert len(times) > 150
+    for time in times:
+        # SUMO logs the state at one instant of each step.
+        assert logged(time + 0.5) <= seen.occupied[time] <= logged(time) | logged(time + 0.5)
+    light = client.get(f"/api/runs/{seen.run}/signals/{JUNCTION}").json()
+    kinds = {one["id"]: one["call"] for one in light["detectors"]}
+    assert {kinds[name] for on in seen.occupied.values() for name in on} == {False, True}
+
+
+def test_areas_for_buses_are_shown_and_occupied_only_while_a_bus_is_under_way(
+    client: TestClient, buses: str
+) -> None:
+    light = client.get(f"/api/scenarios/{buses}/signals/{JUNCTION}").json()
+    areas = [one for one in light["detectors"] if one["bus"]]
+    assert {(one["label"], round(one["length"]), one["call"]) for one in areas} == {
+        ("buses", 80, False)
+    }
+    assert all(f'data-detector="{one["id"]}"' in light["site"] for one in light["detectors"])
+    assert "area in which buses are seen" in [key["words"] for key in light["legend"]]
+    names = {one["id"] for one in areas}
+    seen = watched(client, buses, until=60.0)
+    there = {t: any(one.startswith("bus ") for one in rows) for t, rows in seen.rows.items()}
+    assert any(names & on for on in seen.occupied.values())
+    assert not any(names & on for t, on in seen.occupied.items() if not there[t])
 
 
 def test_a_map_tells_where_its_signals_are(client: TestClient) -> None:

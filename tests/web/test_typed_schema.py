@@ -201,7 +201,7 @@ def test_an_incident_is_sent_as_it_stands_in_the_file_of_events() -> None:
     assert set(row) == {"time", "kind", "actor", "partner", "x", "y"}
 
 
-@pytest.mark.parametrize("kind", ["hello", "state", "lights", "events", "end"])
+@pytest.mark.parametrize("kind", ["hello", "state", "lights", "detectors", "events", "end"])
 def test_the_schema_has_the_texts_of_the_live_view(kind: str) -> None:
     told = SCHEMA["components"]["schemas"]["LiveMessage"]
     assert (

@@ -1812,8 +1812,10 @@ export interface components {
          * DetectorInfo
          * @description A detector and what it is for; metres before the stop line, and seconds of its gap.
          *
-         *     ``label`` names it in the pictures. ``calls`` are begin and end of the times in which it saw a
-         *     road user, seconds of a run; none without a run.
+         *     ``label`` names it in the pictures, where its shape has its id as ``data-detector``. ``bus`` if
+         *     it is an area of ``length`` metres that sees buses only, which have priority for its stages.
+         *     ``calls`` are begin and end of the times in which it saw a road user, seconds of a run; none
+         *     without a run, and none of an area for buses, which SUMO does not log.
          */
         DetectorInfo: {
             /** Id */
@@ -1824,8 +1826,12 @@ export interface components {
             stages: string[];
             /** Call */
             call: boolean;
+            /** Bus */
+            bus: boolean;
             /** Ahead */
             ahead: number;
+            /** Length */
+            length: number;
             /** Gap */
             gap: number;
             /** Calls */
@@ -4794,6 +4800,21 @@ export interface components {
             depart: number;
         };
         /**
+         * LiveDetectors
+         * @description Detectors of traffic lights that road users came onto or left, by id: whether on them now.
+         */
+        LiveDetectors: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "detectors";
+            /** Detectors */
+            detectors: {
+                [key: string]: boolean;
+            };
+        };
+        /**
          * LiveEnd
          * @description The run has ended; nothing follows.
          */
@@ -4883,7 +4904,7 @@ export interface components {
             /** Speed */
             speed: number | null;
         };
-        LiveMessage: components["schemas"]["LiveHello"] | components["schemas"]["LiveState"] | components["schemas"]["LiveLights"] | components["schemas"]["LiveIncidents"] | components["schemas"]["LiveEnd"];
+        LiveMessage: components["schemas"]["LiveHello"] | components["schemas"]["LiveState"] | components["schemas"]["LiveLights"] | components["schemas"]["LiveDetectors"] | components["schemas"]["LiveIncidents"] | components["schemas"]["LiveEnd"];
         /**
          * Actor
          * @description One road user, placed by hand or sampled.

@@ -60,7 +60,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
 
   const { map, drawing, loaded } = ground;
   const lights = useRunLights(run, map, mode === "replay" && replayable);
-  const { learn: learnLights, drawn } = lights;
+  const { learn: learnLights, learnDetectors, drawn } = lights;
   const [junction, setJunction] = useState<string | null>(null);
   const shownJunction = junction ?? lights.heads?.junctions[0] ?? null;
   // Anew at the end, when there are the calls of detectors.
@@ -73,10 +73,11 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
       onIntroduced: setCrowd,
       onIncidents: add,
       onLights: (changed) => learnLights(changed, latest()?.frame.time ?? 0),
+      onDetectors: learnDetectors,
       onState: learn,
     });
     return () => live.close();
-  }, [run, mode, show, add, learn, learnLights, latest]);
+  }, [run, mode, show, add, learn, learnLights, learnDetectors, latest]);
   // What has come before the map is drawn with it, so that nothing is missing or flickers.
   useEffect(() => redraw(), [redraw, drawing, loaded]);
   const { turn } = lights;
@@ -244,6 +245,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   }}
                   load={loadProgram}
                   now={lights.now(shownJunction, mode === "replay" ? player.time : now.time)}
+                  occupied={mode === "live" && !complete ? lights.occupied : null}
                 />
               </Tabs.Panel>
             )}

@@ -4,6 +4,7 @@ import { Crowd, decodeFrame, type Frame } from "./frames";
 export interface LiveEvents {
   onFrame: (frame: Frame, crowd: Crowd) => void;
   onLights: (lights: Record<string, string>) => void;
+  onDetectors: (detectors: Record<string, boolean>) => void;
   onState: (state: RunState, speed?: number | null) => void;
   onIncidents: (incidents: Incident[]) => void;
   /** All that will ever be on the road are known. */
@@ -43,6 +44,8 @@ export class Live {
         return this.events.onIntroduced(this.crowd);
       case "lights":
         return this.events.onLights(message.lights);
+      case "detectors":
+        return this.events.onDetectors(message.detectors);
       case "events":
         return this.events.onIncidents(message.events);
       case "state":

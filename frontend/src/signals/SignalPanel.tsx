@@ -8,6 +8,7 @@ import type { DayPlan, Detector, LightProgram } from "../api/signals";
 import { timeOfDay } from "../editor/demand";
 import { useLoaded } from "../ui/useLoaded";
 import { cursorAt, type Cursor, type SignalNow } from "./cursor";
+import { seenInLog, seenLive, type Sight } from "./occupancy";
 
 const ORIGIN: Record<LightProgram["origin"], string> = {
   scenario: "the engineer’s, in this scenario",
@@ -27,11 +28,14 @@ interface Props {
   load: (junction: string) => Promise<LightProgram>;
   /** What the light shows in a run; nothing without a run. */
   now?: SignalNow | null;
+  /** Ids of the detectors that are occupied now, if a run is watched live. */
+  occupied?: ReadonlySet<string> | null;
   onClose?: () => void;
 }
 
 /** The program of one traffic light; in a run also what it shows now. */
-export function SignalPanel({ junctions, junction, onJunction, load, now = null, onClose }: Props) {
+export function SignalPanel(props: Props) {
+  const { junctions, junction, onJunction, load, now = null, occupied = null, onClose } = props;
   const { value, error } = useLoaded(useCallback(() => load(junction), [load, junction]));
   const shown = value?.junctions.includes(junction) ? value : null;
   const region = useRef<HTMLElement>(null);
@@ -69,7 +73,7 @@ export function SignalPanel({ junctions, junction, onJunction, load, now = null,
       {error ? (
         <Alert color="red">{error}</Alert>
       ) : shown ? (
-        <Program key={junction} light={shown} now={now} />
+        <Program key={junction} light={shown} now={now} occupied={occupied} />
       ) : (
         <Loader size="sm" aria-label="Loading the program" />
       )}
@@ -77,12 +81,19 @@ export function SignalPanel({ junctions, junction, onJunction, load, now = null,
   );
 }
 
-function Program({ light, now }: { light: LightProgram; now: SignalNow | null }) {
+interface ProgramProps {
+  light: LightProgram;
+  now: SignalNow | null;
+  occupied: ReadonlySet<string> | null;
+}
+
+function Program({ light, now, occupied }: ProgramProps) {
   const [chosen, setChosen] = useState<string | null>(null);
   const running = light.plans.find(({ id }) => id === now?.plan);
   const plan = light.plans.find(({ id }) => id === chosen) ?? running ?? light.plans[0];
   if (!plan) return <Text size="sm">This light has no program.</Text>;
   const cursor = now && (running === undefined || running === plan) ? cursorAt(plan, now) : null;
+  const sight = now && (occupied ? seenLive(occupied) : seenInLog(light.detectors, now.time));
   return (
     <>
       <dl className="signal-facts">
@@ -100,7 +111,7 @@ function Program({ light, now }: { light: LightProgram; now: SignalNow | null })
           onChange={setChosen}
         />
       )}
-      {now && <Now plan={plan} cursor={cursor} now={now} />}
+      {now && <Now light={light} plan={plan} cursor={cursor} now={now} />}
       <Drawn className="signal-ground" svg={light.ground} />
       <h3>Signal timing plan</h3>
       <TimeBar plan={plan} cursor={cursor} />
@@ -120,8 +131,8 @@ function Program({ light, now }: { light: LightProgram; now: SignalNow | null })
       </ol>
       <Splits plan={plan} />
       <h3>Junction{light.detectors.length > 0 && " and detectors"}</h3>
-      {light.site && <Drawn className="signal-site" svg={light.site} />}
-      <Detectors light={light} time={now?.time ?? null} />
+      {light.site && <Site light={light} sight={sight} />}
+      <Detectors light={light} sight={sight} />
       <ul className="signal-legend" aria-label="What the pictures show">
         {light.legend.map(({ picture, words }) => (
           <li key={words}>
@@ -150,9 +161,16 @@ function Fact({ word, children }: { word: string; children: ReactNode }) {
 }
 
 /** The state now in words, as the cursor says it to the eye. */
-function Now({ plan, cursor, now }: { plan: DayPlan; cursor: Cursor | null; now: SignalNow }) {
+interface NowProps {
+  light: LightProgram;
+  plan: DayPlan;
+  cursor: Cursor | null;
+  now: SignalNow;
+}
+
+function Now({ light, plan, cursor, now }: NowProps) {
   const stage = cursor?.stage == null ? undefined : plan.stages[cursor.stage];
-  const what = stage ? `stage ${stage.id}` : betweenWords(now.state);
+  const what = stage ? `stage ${stage.id}` : betweenWords(light, now.state);
   return (
     <p className="signal-now">
       Now: <b>{what}</b>
@@ -161,8 +179,12 @@ function Now({ plan, cursor, now }: { plan: DayPlan; cursor: Cursor | null; now:
   );
 }
 
-const betweenWords = (state: string): string =>
-  state.includes("y") ? "yellow" : /[gG]/.test(state) ? "between stages" : "all red";
+/** What is shown that is no stage of the plan: between two, or a stage without its crossings. */
+function betweenWords({ groups }: LightProgram, state: string): string {
+  if (state.includes("y")) return "yellow";
+  const green = groups.filter(({ links }) => links.some((link) => /[gG]/.test(state[link] ?? "")));
+  return green.length > 0 ? `green for ${green.map(({ id }) => id).join(" ")}` : "all red";
+}
 
 function TimeBar({ plan, cursor }: { plan: DayPlan; cursor: Cursor | null }) {
   const [begin, end] = plan.plot;
@@ -208,12 +230,32 @@ function Splits({ plan }: { plan: DayPlan }) {
   );
 }
 
+interface Seen {
+  light: LightProgram;
+  sight: Sight | null;
+}
+
+/** The junction, with the detectors filled that are occupied. */
+function Site({ light, sight }: Seen) {
+  const box = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    for (const shape of box.current?.querySelectorAll<SVGElement>("[data-detector]") ?? [])
+      shape.classList.toggle("occupied", sight?.on.has(shape.dataset.detector ?? "") ?? false);
+  }, [light, sight]);
+  return (
+    <div ref={box}>
+      <Drawn className="signal-site" svg={light.site} />
+    </div>
+  );
+}
+
 interface Loops {
   label: string;
+  purpose: string;
   loops: Detector[];
 }
 
-function Detectors({ light, time }: { light: LightProgram; time: number | null }) {
+function Detectors({ light, sight }: Seen) {
   if (light.detectors.length === 0)
     return (
       <Text size="sm" c="dimmed">
@@ -222,12 +264,11 @@ function Detectors({ light, time }: { light: LightProgram; time: number | null }
     );
   const rows: Loops[] = [];
   for (const one of light.detectors) {
-    const row = rows.find(({ label }) => label === one.label);
+    const purpose = purposeOf(one);
+    const row = rows.find((other) => other.label === one.label && other.purpose === purpose);
     if (row) row.loops.push(one);
-    else rows.push({ label: one.label, loops: [one] });
+    else rows.push({ label: one.label, purpose, loops: [one] });
   }
-  // Without a log of calls nothing is known of who is on them.
-  const logged = time !== null && light.detectors.some(({ calls }) => calls.length > 0);
   return (
     <table className="signal-table" aria-label="Detectors">
       <thead>
@@ -235,16 +276,16 @@ function Detectors({ light, time }: { light: LightProgram; time: number | null }
           <th scope="col">Detector</th>
           <th scope="col">Place</th>
           <th scope="col">For</th>
-          {logged && <th scope="col">Now</th>}
+          {sight && <th scope="col">Now</th>}
         </tr>
       </thead>
       <tbody>
-        {rows.map(({ label, loops }) => (
-          <tr key={label}>
+        {rows.map(({ label, purpose, loops }) => (
+          <tr key={`${label} ${purpose}`}>
             <th scope="row">{label}</th>
             <td>{placeWords(loops)}</td>
-            <td>{purpose(loops)}</td>
-            {logged && <td>{occupancy(loops, time)}</td>}
+            <td>{purpose}</td>
+            {sight && <td>{sight.words(loops)}</td>}
           </tr>
         ))}
       </tbody>
@@ -256,24 +297,12 @@ const placeWords = (loops: readonly Detector[]): string => {
   const [first] = loops;
   if (!first || first.call) return "where people wait";
   const lanes = loops.length > 1 ? `, ${loops.length} lanes` : "";
+  if (first.bus) return `last ${Math.round(first.length)} m before the stop line${lanes}`;
   return `${round(first.ahead)} m before the stop line${lanes}`;
 };
 
-const purpose = ([first]: readonly Detector[]): string =>
-  first ? `${first.call ? "calls" : "prolongs"} stage ${first.stages.join(", ")}` : "";
-
-/** Whether a road user is on a detector, and for what share of the last minute. */
-export function occupancy(loops: readonly Detector[], time: number): string {
-  const from = Math.max(0, time - 60);
-  const seen = loops.flatMap(({ calls }) => calls);
-  const on = seen.some(([begin, end]) => begin <= time && time < end);
-  const busy = seen.reduce(
-    (sum, [begin, end]) => sum + Math.max(0, Math.min(end, time) - Math.max(begin, from)),
-    0,
-  );
-  const share = time > from ? (100 * busy) / ((time - from) * loops.length) : 0;
-  return `${on ? "occupied" : "free"}, ${Math.round(share)} % of the last minute`;
-}
+const purposeOf = ({ call, bus, stages }: Detector): string =>
+  `${call ? "calls" : bus ? "priority in" : "prolongs"} stage ${stages.join(", ")}`;
 
 function Groups({ light }: { light: LightProgram }) {
   return (

@@ -13,6 +13,10 @@ export interface RunLights {
   now: (junction: string, time: number) => SignalNow | null;
   /** Takes in what has changed in a live run. */
   learn: (lights: Record<string, string>, time: number) => void;
+  /** The same of detectors. */
+  learnDetectors: (detectors: Record<string, boolean>) => void;
+  /** Ids of the detectors that are occupied in a live run. */
+  occupied: ReadonlySet<string>;
   /** Counts what was learned, for those who draw. */
   turn: number;
   /** Whether there is anything to show. */
@@ -25,6 +29,7 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
   const live = useRef(new Map<string, SignalNow>());
   const [logged, setLogged] = useState<ReadonlyMap<string, ShownSignal> | null>(null);
   const [turn, setTurn] = useState(0);
+  const [occupied, setOccupied] = useState<ReadonlySet<string>>(new Set());
   useEffect(() => {
     if (!recorded) return;
     let current = true;
@@ -43,6 +48,16 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     for (const [light, state] of Object.entries(lights))
       live.current.set(light, changed(live.current.get(light), state, time));
     setTurn((n) => n + 1);
+  }, []);
+  const learnDetectors = useCallback((detectors: Record<string, boolean>) => {
+    setOccupied((old) => {
+      const next = new Set(old);
+      for (const [id, on] of Object.entries(detectors)) {
+        if (on) next.add(id);
+        else next.delete(id);
+      }
+      return next;
+    });
   }, []);
   const nowOf = useCallback(
     (light: string, time: number): SignalNow | null => {
@@ -64,5 +79,8 @@ export function useRunLights(run: string, map: MapDetails | null, recorded: bool
     [map, nowOf],
   );
   const known = recorded ? (logged?.size ?? 0) > 0 : turn > 0;
-  return useMemo(() => ({ heads, drawn, now, learn, turn, known }), [heads, drawn, now, learn, turn, known]);
+  return useMemo(
+    () => ({ heads, drawn, now, learn, learnDetectors, occupied, turn, known }),
+    [heads, drawn, now, learn, learnDetectors, occupied, turn, known],
+  );
 }

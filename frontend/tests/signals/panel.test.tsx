@@ -2,13 +2,20 @@
 import { screen, within } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
-import { occupancy, SignalPanel } from "../../src/signals/SignalPanel";
 import type { LightProgram } from "../../src/api/signals";
 import type { SignalNow } from "../../src/signals/cursor";
+import { occupancy } from "../../src/signals/occupancy";
+import { SignalPanel } from "../../src/signals/SignalPanel";
 import { rowsOf, show } from "../page";
 import { detector, plan, program } from "./program";
 
-const panel = (light: LightProgram, more: { now?: SignalNow; onClose?: () => void } = {}) => {
+interface More {
+  now?: SignalNow;
+  occupied?: ReadonlySet<string>;
+  onClose?: () => void;
+}
+
+const panel = (light: LightProgram, more: More = {}) => {
   const load = () => Promise.resolve(light);
   return <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} {...more} />;
 };
@@ -40,6 +47,10 @@ test("in a run the stage that is shown is marked, in words and for screen reader
   again(part({ ...now, time: 116, state: "yr", since: 115, before: "gr" }));
   expect(screen.getByText(/^Now/).textContent).toBe("Now: yellow, for 1 s");
   expect(document.querySelector("[aria-current]")).toBeNull();
+  again(part({ ...now, time: 118, state: "rr", since: 118, before: "yr" }));
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: all red, for 0 s");
+  again(part({ ...now, time: 120, state: "GG", since: 119, before: "rr" }));
+  expect(screen.getByText(/^Now/).textContent).toBe("Now: green for K1 K2");
   expect(load).toHaveBeenCalledTimes(1);
 });
 
@@ -69,6 +80,52 @@ test("detectors are listed with place and purpose, and with occupancy where call
     ["C0", "where people wait", "calls stage 2", "free, 0 % of the last minute"],
   ]);
   expect(occupancy([detector("J1.D1.0", { calls })], 92)).toBe("occupied, 3 % of the last minute");
+});
+
+test("in a run that is watched detectors are occupied or free, in the table and in the picture", async () => {
+  const detectors = [
+    detector("J1.D1.0"),
+    detector("J1.D1.1"),
+    detector("J1.bus.0", { label: "buses", bus: true, length: 79.6 }),
+    detector("J1.bus.1", { label: "buses", bus: true, length: 79.6, stages: ["2"] }),
+  ];
+  const site = `<svg>${detectors.map(({ id }) => `<path data-detector="${id}"/>`).join("")}</svg>`;
+  const light = program({ control: "actuated", detectors, site });
+  const now: SignalNow = { time: 100, state: "gr", since: null, before: null, plan: null };
+  const marked = () =>
+    [...document.querySelectorAll<SVGElement>(".occupied")].map((one) => one.dataset.detector);
+  const load = () => Promise.resolve(light);
+  const part = (occupied: ReadonlySet<string>) => (
+    <SignalPanel
+      junctions={["10"]}
+      junction="10"
+      onJunction={vi.fn()}
+      load={load}
+      now={now}
+      occupied={occupied}
+    />
+  );
+  const { again } = show(part(new Set(["J1.D1.1", "J1.bus.1"])));
+  const table = await screen.findByRole("table", { name: "Detectors" });
+  expect(rowsOf(table)).toEqual([
+    ["D1", "30 m before the stop line, 2 lanes", "prolongs stage 1", "occupied"],
+    ["buses", "last 80 m before the stop line", "priority in stage 1", "free"],
+    ["buses", "last 80 m before the stop line", "priority in stage 2", "occupied"],
+  ]);
+  expect(marked()).toEqual(["J1.D1.1", "J1.bus.1"]);
+  again(part(new Set(["J1.D1.0"])));
+  expect(marked()).toEqual(["J1.D1.0"]);
+});
+
+test("of areas for buses, which are not logged, a recorded run says so", async () => {
+  const detectors = [
+    detector("J1.D1.0", { calls: [[90, 101]] }),
+    detector("J1.bus.0", { label: "buses", bus: true, length: 80 }),
+  ];
+  const now: SignalNow = { time: 100, state: "gr", since: null, before: null, plan: "day" };
+  show(panel(program({ detectors }), { now }));
+  const rows = rowsOf(await screen.findByRole("table", { name: "Detectors" }));
+  expect(rows.map((row) => row[3])).toEqual(["occupied, 17 % of the last minute", "not logged"]);
 });
 
 test("what the server refuses is said, and Escape closes", async () => {

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 from odscen.sumo.worker.snapshots import origin
 from odscen.web.wire.live_messages import (
     LiveActor,
+    LiveDetectors,
     LiveEnd,
     LiveIncidents,
     LiveLights,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
     from odscen.results.records.run_records import Plan
+    from odscen.sumo.runner.live_run import LivePicture
     from odscen.web.active_runs import Active
     from odscen.web.messages import Answer
 
@@ -47,6 +49,7 @@ class LiveView:
         self._greeted = False
         self._said: LiveState | None = None
         self._lights: dict[str, str] = {}
+        self._detectors: dict[str, bool] = {}
         self._incidents = 0
         self._frame = 0
 
@@ -73,9 +76,11 @@ class LiveView:
             self._changed.clear()
             over = self._run.ended is not None
             if self._ready:
+                # Taken first, so that what is reported is no older than the frame.
+                picture = live.picture
                 await self._report_changes()
-                if live.picture.number > self._frame:
-                    await self._send_frame()
+                if picture.number > self._frame:
+                    await self._send_frame(picture)
                 elif over:
                     break
                 else:
@@ -117,13 +122,20 @@ class LiveView:
         if changed:
             self._lights = lights
             await self._send(LiveLights(lights=changed))
+        await self._report_detectors()
         if len(incidents) > self._incidents:
             new = incidents[self._incidents :]
             self._incidents += len(new)
             await self._send(LiveIncidents(events=[IncidentInfo(**one) for one in new]))
 
-    async def _send_frame(self) -> None:
-        picture = self._run.live.picture
+    async def _report_detectors(self) -> None:
+        now, said = self._run.live.detectors, self._detectors
+        changed = {name: on for name, on in now.items() if said.get(name) != on}
+        if changed:
+            self._detectors = now
+            await self._send(LiveDetectors(detectors=changed))
+
+    async def _send_frame(self, picture: LivePicture) -> None:
         self._frame = picture.number
         self._ready = False
         await self._socket.send_bytes(picture.frame)

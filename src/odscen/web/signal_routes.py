@@ -122,7 +122,9 @@ def _program(
                 label=detector_label(light, one),
                 stages=list(one.stages),
                 call=one.call,
+                bus=one.bus,
                 ahead=one.ahead,
+                length=one.length,
                 gap=one.gap,
                 calls=calls.get(one.id, []),
             )
@@ -132,7 +134,7 @@ def _program(
         ground=str(pictures.ground() or ""),
         legend=[
             PictureKey(picture=str(legend_picture(shape)), words=words)
-            for shape, words in legend_shapes()
+            for shape, words in legend_shapes([light])
         ],
     )
 

@@ -107,6 +107,28 @@ def test_the_junction_is_drawn_with_groups_and_detectors_by_name() -> None:
     assert "D1: prolongs stage 1" in told
 
 
+def test_areas_for_buses_are_drawn_along_their_lanes_and_listed_by_stage() -> None:
+    one = scenario(program(bus_priority=True), control="actuated")
+    (realized,) = realized_lights(one, crossing().sumo, until=86_400.0)
+    shown = realized.shown
+    assert [row for row in detector_rows(shown) if row[0] == "buses"] == [
+        ("buses", "2", "0 to 80", "", "priority in stage 1"),
+        ("buses", "2", "0 to 80", "", "priority in stage 1, 2"),
+        ("buses", "4", "0 to 80", "", "priority in stage 3"),
+    ]
+    site = etree.fromstring(str(JunctionPictures(shown, drawing()).site()))
+    bands = [one for one in site.iter("path") if one.get("class") == "bus-area"]
+    assert len(bands) == 8
+    assert {band.findtext("title") for band in bands} == {
+        "buses: priority in stage 1", "buses: priority in stage 1, 2",
+        "buses: priority in stage 3",
+    }  # fmt: skip
+    assert "buses" not in [text.text for text in site.iter("text")]
+    told = "area in which buses are seen"
+    assert told in signal_sheet(shown)
+    assert told not in signal_sheet(light())
+
+
 def test_stages_and_what_lies_between_them_make_the_cycle() -> None:
     spans = phase_spans(light().plans[0])
     assert [(one.begin, one.end, one.kind, one.stage) for one in spans[:6]] == [

@@ -9,7 +9,7 @@ from odscen.convert.lane_table.table import SumoLight
 from odscen.convert.model.net import LightLink
 from odscen.scenario.document.signals_document import SignalDetector
 from odscen.scenario.signals.light import Light, SignalMovement
-from odscen.sumo.realize.light_detectors import may_end, vehicle_loops
+from odscen.sumo.realize.light_detectors import area_length, may_end, vehicle_loops
 from odscen.sumo.realize.road_net import Link, RoadNet, RoadNetLane
 
 LIGHT = SumoLight(
@@ -25,6 +25,21 @@ def net(stop: float, inner: float, before: float) -> RoadNet:
         {name: RoadNetLane(name, name, 0, metres) for name, metres in lanes.items()},
         (Link("before", "stop", "inner"), Link("inner", "stop"), Link("stop", "out")),
     )
+
+
+@pytest.mark.parametrize(
+    ("lengths", "metres"),
+    [
+        ((100.0, 0.1, 100.0), 80.0),
+        ((20.0, 10.0, 100.0), 80.0),
+        ((20.0, 10.0, 30.0), 59.8),
+        ((80.1, 10.0, 0.05), 80.0),
+    ],
+)
+def test_an_area_is_no_longer_than_the_road_before_the_light(
+    lengths: tuple[float, float, float], metres: float
+) -> None:
+    assert area_length(net(*lengths), "stop", 80.0) == pytest.approx(metres)
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import Plan
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
 from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
+from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.edits.actor_edits import add_actor
 from odscen.scenario.sampling.sampler import sample_scenario
 from odscen.sumo.realize.run_settings import RunSettings
@@ -119,6 +120,24 @@ def test_sumo_loads_the_files_without_a_word(tmp_path: Path) -> None:
     lines = [line for line in said.splitlines() if "Column based formats" not in line]
     assert not [line for line in lines if "rror" in line]
     assert not [line for line in lines if "disconnect" in line.lower()]
+
+
+@pytest.mark.parametrize("buses", [False, True])
+@pytest.mark.parametrize("name", ["signal_crossing", "left_hand_crossing", "town_5x5"])
+def test_sumo_has_nothing_to_say_of_actuated_lights_and_their_detectors(
+    name: str, buses: bool, tmp_path: Path
+) -> None:
+    signals = Signals(control="actuated", bus_priority=buses)
+    one = sampled(name).model_copy(update={"signals": signals})
+    prepared = prepare(
+        one, built(name).sumo, net_file(name, tmp_path), settings=RunSettings(until=300)
+    )
+    done = run_prepared(prepared, tmp_path / "run")
+    assert done.status == "completed"
+    assert all(light.detectors for light in prepared.lights)
+    said = (tmp_path / "run" / "sumo.log").read_text()
+    assert "etector" not in said
+    assert "tlLogic" not in said
 
 
 def test_recorded_speeds_stay_below_what_each_actor_wants(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from itertools import pairwise
+from math import dist
 from typing import NamedTuple
 
 from odscen.base.stored_files import documents, read_document
@@ -63,9 +65,10 @@ class ShownPlan:
 class ShownDetector:
     """A detector, and the stages that it prolongs; ``call`` if it calls them instead.
 
-    ``place`` are points along it in driving direction, x and y in metres: its rear and front end,
-    or where people wait. ``ahead`` are metres from its front end to the stop line, ``gap`` the
-    seconds between vehicles in which a stage goes on.
+    ``bus`` if it is an area that sees buses only, which have priority for the stages. ``place`` are
+    points along it in driving direction, x and y in metres: its rear and front end, or where people
+    wait. ``ahead`` are metres from its front end to the stop line, ``gap`` the seconds between
+    vehicles in which a stage goes on.
     """
 
     id: str
@@ -75,6 +78,12 @@ class ShownDetector:
     place: tuple[tuple[float, float], ...] = ()
     ahead: float = 0.0
     gap: float = 0.0
+    bus: bool = False
+
+    @property
+    def length(self) -> float:
+        """Metres along it."""
+        return sum(dist(a, b) for a, b in pairwise(self.place))
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,7 +69,7 @@ def signal_section(
     return report_section(
         "Traffic lights",
         card_grid(figure_cards(ReportSection.SIGNALS, values)),
-        signal_legend(),
+        signal_legend(chosen),
         *parts,
         element("p", more) if more else None,
         explained=explained,
@@ -88,9 +88,10 @@ def _chosen(lights: LightsOfRun) -> list[LightProgram]:
     return [light for _, light in ranked[:SHOWN]]
 
 
-def signal_legend() -> Markup:
-    """What the shapes and colours of all pictures of signal programs mean."""
-    items = [element("span", legend_picture(shape), words) for shape, words in legend_shapes()]
+def signal_legend(lights: Sequence[LightProgram]) -> Markup:
+    """What the shapes and colours of all pictures of these lights mean."""
+    shapes = legend_shapes(lights)
+    items = [element("span", legend_picture(shape), words) for shape, words in shapes]
     return element("div", *items, class_="legend signals")
 
 

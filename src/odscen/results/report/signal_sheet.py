@@ -16,7 +16,7 @@ from odscen.results.report.signal_tables import (
 from odscen.results.report.stage_diagrams import SIDE, SITE, JunctionPictures
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.records.light_programs import LightProgram, ShownPlan
@@ -33,6 +33,7 @@ _COLORS = """\
     --paper: #16191d; --ink: #e8eaec; --soft: #a5afb8; --line: #3a4149; --land: #1b1f24;
     --paved: #343b43; --walked: #2a2d2e; --paint: #aeb5bc; --closed: #6d7680; --go: #4cc27d;
     --go-soft: #2f6d49; --amber: #e8b93a; --stop: #8a4a45; --detector: #7fb2ea; --span: #3a424b;
+    --bus-area: #f5a344;
   }
 }
 .sheet { font-family: system-ui, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif; }
@@ -128,7 +129,7 @@ class _Sheet:
             columns=(0.0, 80.0),
         )
         if light.detectors:
-            columns = (0.0, 110.0, 170.0, 350.0, 420.0)
+            columns = (0.0, 100.0, 170.0, 350.0, 420.0)
             self._table("Detectors", DETECTOR_HEADS, detector_rows(light), x=x, columns=columns)
         self._y = max(self._y, begin + (SITE if site is not None else 0.0)) + _GAP
 
@@ -181,7 +182,7 @@ class _Sheet:
 
     def _legend(self) -> None:
         x = _EDGE
-        for picture, words in legend_shapes():
+        for picture, words in legend_shapes([self._light]):
             room = 52.0 + 7.2 * len(words)
             if x + room > WIDTH - _EDGE:
                 x, self._y = _EDGE, self._y + _LINE
@@ -193,8 +194,8 @@ class _Sheet:
         self._y += 20.0
 
 
-def legend_shapes() -> Iterator[tuple[Markup, str]]:
-    """Shapes of the pictures in 24 by 14 pixels, with what they mean."""
+def legend_shapes(lights: Iterable[LightProgram]) -> Iterator[tuple[Markup, str]]:
+    """Shapes of the pictures of lights in 24 by 14 pixels, with what they mean."""
 
     def line(style: str) -> Markup:
         return element("path", d="M1 7 L23 7", class_=f"movement {style}")
@@ -209,6 +210,9 @@ def legend_shapes() -> Iterator[tuple[Markup, str]]:
         yield element("rect", x=2, y=2, width=20, height=10, class_=f"span {kind}"), words
     yield element("rect", x=6, y=3, width=12, height=8, class_="loop"), "detector"
     yield element("circle", cx=12, cy=7, r=5, class_="loop call"), "waiting place with a call"
+    if any(one.bus for light in lights for one in light.detectors):
+        band = element("rect", x=1, y=3, width=22, height=8, class_="bus-area")
+        yield band, "area in which buses are seen"
 
 
 def legend_picture(shape: Markup) -> Markup:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.base.markup import Markup, element, number
 from odscen.results.records.light_programs import stage_spans
 from odscen.results.report.page_templates import html_table
-from odscen.results.report.stage_diagrams import detector_label
+from odscen.results.report.stage_diagrams import detector_label, detector_purpose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from odscen.results.records.light_programs import LightProgram, ShownPlan
 
 SPLIT_HEADS = ("Stage", "Green, s", "Split, s", "Split, %", "Groups")
-DETECTOR_HEADS = ("Detector", "Loops", "Before the stop line, m", "Gap, s", "For")
+DETECTOR_HEADS = ("Detector", "Number", "Before the stop line, m", "Gap, s", "For")
 
 
 def split_rows(light: LightProgram, plan: ShownPlan) -> list[tuple[str, ...]]:
@@ -33,16 +33,15 @@ def split_rows(light: LightProgram, plan: ShownPlan) -> list[tuple[str, ...]]:
 
 
 def detector_rows(light: LightProgram) -> list[tuple[str, ...]]:
-    """Cells of :data:`DETECTOR_HEADS`; loops with one name and purpose are one row."""
+    """Cells of :data:`DETECTOR_HEADS`; detectors with one name and purpose are one row."""
     loops: dict[tuple[str, ...], int] = {}
     for one in light.detectors:
-        stages = ", ".join(one.stages)
-        row = (
-            detector_label(light, one),
-            "" if one.call else number(one.ahead, 1),
-            "" if one.call else number(one.gap, 1),
-            f"{'calls' if one.call else 'prolongs'} stage {stages}",
-        )
+        before, gap = number(one.ahead, 1), number(one.gap, 1)
+        if one.bus:
+            before, gap = f"0 to {number(one.length, 0)}", ""
+        elif one.call:
+            before, gap = "", ""
+        row = (detector_label(light, one), before, gap, detector_purpose(one))
         loops[row] = loops.get(row, 0) + 1
     return [(name, str(count), *more) for (name, *more), count in loops.items()]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import hypot
 from typing import TYPE_CHECKING, NamedTuple
 
+import shapely
+
 from odscen.base.markup import Markup, element, number
 from odscen.drawing.junction_ground import PictureFrame, junction_ground
 from odscen.results.records.light_programs import stage_spans
@@ -26,13 +28,14 @@ SIDE, SITE = 132.0, 380.0
 
 _MARGIN = 12.0
 _SITE_MARGIN = 30.0
-_APPROACH = 6.0
-"""Metres before the stop lines that a picture shows."""
+_APPROACH, _BUS_APPROACH = 6.0, 25.0
+"""Metres before the stop lines that a picture shows at least, without and with areas for buses."""
 
 _LABEL_AT = 5.0
 """Metres before the stop line at which a group is named."""
 
-_LOOP_WIDTH = 2.2
+_LOOP_WIDTH, _BAND_WIDTH = 2.2, 2.8
+"""Metres of a loop and of an area for buses across the lane."""
 _ROOM = 22.0
 """Pixels from the middle of a name to that of another beside it."""
 
@@ -56,11 +59,20 @@ def stage_words(stage: StageSpan) -> str:
 
 
 def detector_label(light: LightProgram, detector: ShownDetector) -> str:
-    """Name in the scenario, else ``L4`` of the loop ``J1.loop.4`` and ``C0`` of ``J1.call.0``."""
-    if detector.name:
-        return detector.name
+    """Name in the scenario, else ``L4`` of the loop ``J1.loop.4`` and ``C0`` of ``J1.call.0``.
+
+    Areas that see buses have one name together.
+    """
+    if detector.name or detector.bus:
+        return detector.name or "buses"
     kind, _, count = detector.id.removeprefix(f"{light.id}.").partition(".")
     return f"{kind[:1].upper()}{count}" if count else detector.id
+
+
+def detector_purpose(detector: ShownDetector) -> str:
+    """What it does for which stages: ``prolongs stage 1``."""
+    what = "calls" if detector.call else "priority in" if detector.bus else "prolongs"
+    return f"{what} stage {', '.join(detector.stages)}"
 
 
 class JunctionPictures:
@@ -80,7 +92,7 @@ class JunctionPictures:
         self._light = light
         self._drawing = drawing
         self._ident = ident
-        points = list(_reach(light))
+        points = list(_reach(light, _APPROACH))
         self._frame = PictureFrame.around(points, side=SIDE, margin=_MARGIN) if points else None
 
     def ground(self) -> Markup | None:
@@ -101,7 +113,10 @@ class JunctionPictures:
     def site(self) -> Markup | None:
         """The whole junction: movements with the names of their groups, and detectors."""
         light = self._light
-        points = [*_reach(light), *(p for one in light.detectors for p in one.place)]
+        loops = [one for one in light.detectors if one.place and not one.bus]
+        areas = [one for one in light.detectors if len(one.place) > 1 and one.bus]
+        approach = _BUS_APPROACH if areas else _APPROACH
+        points = [*_reach(light, approach), *(p for one in loops for p in one.place)]
         if self._frame is None:
             return None
         frame = PictureFrame.around(points, side=SITE, margin=_SITE_MARGIN)
@@ -114,10 +129,11 @@ class JunctionPictures:
             "svg",
             element("title", words),
             ground,
+            *(_bus_area(light, one, frame) for one in areas),
             *shapes,
-            *(_loop(light, one, frame) for one in light.detectors if one.place),
+            *(_loop(light, one, frame) for one in loops),
             *(_group_name(group, frame) for group in light.groups if any(group.paths)),
-            *_detector_names(light, frame),
+            *_detector_names(light, loops, frame),
             viewBox=f"0 0 {number(SITE)} {number(SITE)}",
             width=SITE,
             height=SITE,
@@ -180,15 +196,15 @@ def stage_diagram(
     )
 
 
-def _reach(light: LightProgram) -> Iterator[tuple[float, float]]:
+def _reach(light: LightProgram, approach: float) -> Iterator[tuple[float, float]]:
     """Points that have to be in a picture: paths, with the last metres before their stop lines."""
     for group in light.groups:
         for path in group.paths:
             yield from path
             if len(path) > 1 and not group.walk:
-                yield _back(path, _APPROACH)
+                yield _back(path, approach)
                 (x0, y0), (x1, y1) = path[-2:]
-                yield _back(((x1, y1), (x0, y0)), _APPROACH)
+                yield _back(((x1, y1), (x0, y0)), approach)
 
 
 def _back(path: Sequence[tuple[float, float]], away: float) -> tuple[float, float]:
@@ -225,11 +241,11 @@ def _head(path: Sequence[tuple[float, float]], frame: PictureFrame, kind: str) -
 
 def _loop(light: LightProgram, detector: ShownDetector, frame: PictureFrame) -> Markup:
     """A loop in its lane, or a circle where people wait."""
-    what = "calls" if detector.call else "prolongs"
-    words = f"{detector_label(light, detector)}: {what} stage {', '.join(detector.stages)}"
+    title = _detector_title(light, detector)
     if detector.call:
         x, y = frame.point(*detector.place[0])
-        return element("circle", element("title", words), cx=x, cy=y, r=5, class_="loop call")
+        return element("circle", title, cx=x, cy=y, r=5, class_="loop call",
+                       data_detector=detector.id)  # fmt: skip
     (x0, y0), (x1, y1) = detector.place[0], detector.place[-1]
     length = max(hypot(x1 - x0, y1 - y0), 1e-9)
     # A loop of two metres must be seen in a picture of a hundred.
@@ -240,7 +256,21 @@ def _loop(light: LightProgram, detector: ShownDetector, frame: PictureFrame) -> 
     b = x1 + ux * longer, y1 + uy * longer
     corners = [(a[0] + nx, a[1] + ny), (b[0] + nx, b[1] + ny),
                (b[0] - nx, b[1] - ny), (a[0] - nx, a[1] - ny)]  # fmt: skip
-    return element("path", element("title", words), d=f"{frame.path(corners)} Z", class_="loop")
+    return element("path", title, d=f"{frame.path(corners)} Z", class_="loop",
+                   data_detector=detector.id)  # fmt: skip
+
+
+def _bus_area(light: LightProgram, area: ShownDetector, frame: PictureFrame) -> Markup:
+    """A band along the lane; the picture may end before it does."""
+    band = shapely.LineString(area.place).buffer(_BAND_WIDTH / 2.0, cap_style="flat")
+    ring = shapely.get_coordinates(shapely.get_exterior_ring(band))
+    return element("path", _detector_title(light, area), d=f"{frame.path(ring[:-1])} Z",
+                   class_="bus-area", data_detector=area.id)  # fmt: skip
+
+
+def _detector_title(light: LightProgram, detector: ShownDetector) -> Markup:
+    words = f"{detector_label(light, detector)}: {detector_purpose(detector)}"
+    return element("title", words)
 
 
 def _group_name(group: ShownGroup, frame: PictureFrame) -> Markup:
@@ -257,12 +287,13 @@ def _group_name(group: ShownGroup, frame: PictureFrame) -> Markup:
     return element("text", group.id, x=at_x, y=at_y + 4.0, text_anchor="middle", class_="group")
 
 
-def _detector_names(light: LightProgram, frame: PictureFrame) -> Iterator[Markup]:
+def _detector_names(
+    light: LightProgram, detectors: Sequence[ShownDetector], frame: PictureFrame
+) -> Iterator[Markup]:
     """Names of detectors behind them, those of one detector in several lanes once."""
     named: dict[str, list[ShownDetector]] = {}
-    for one in light.detectors:
-        if one.place:
-            named.setdefault(detector_label(light, one), []).append(one)
+    for one in detectors:
+        named.setdefault(detector_label(light, one), []).append(one)
     taken: list[tuple[float, float]] = []
     for label, some in named.items():
         ends = [frame.point(*one.place[0]) for one in some]

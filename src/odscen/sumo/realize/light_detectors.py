@@ -7,6 +7,8 @@ vehicle waits for a gap in the green no longer prolongs it.
 
 from __future__ import annotations
 
+import heapq
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,7 +39,10 @@ STANDING, MOVED_OFF = 10.0, 5.0
 """A vehicle on a loop for more seconds waits for a gap, once a queue would have moved off."""
 
 BUS_AREA = 80.0
-"""Metres before the stop line in which a bus is seen."""
+"""Metres before the stop line in which a bus is seen, if there is as much road."""
+
+AREA_END = 0.1
+"""Metres before the end of its lane at which an area ends."""
 
 BUS_GREEN = 15.0
 """Seconds by which a bus may prolong the green of a fixed-time light."""
@@ -90,22 +95,46 @@ class PlacedLoop:
 class BusArea:
     """The last metres before the stop line of a lane, in which buses are seen.
 
-    ``movements`` are places in the light's states of the movements of the lane.
+    ``movements`` are places in the light's states of the movements of the lane; ``length`` is in
+    metres.
     """
 
     id: str
     lane: str
     movements: tuple[int, ...]
+    length: float = BUS_AREA
 
 
-def bus_areas(light: SumoLight, view: Light) -> tuple[BusArea, ...]:
+def bus_areas(light: SumoLight, view: Light, net: RoadNet) -> tuple[BusArea, ...]:
     """One in each lane of vehicles."""
     every = [n for n, one in enumerate(view.movements) if not one.walk]
     lanes = _by_lane(light, every).items()
     return tuple(
-        BusArea(f"{light.id}.bus.{number}", lane, movements)
+        BusArea(f"{light.id}.bus.{number}", lane, movements, area_length(net, lane, BUS_AREA))
         for number, (lane, movements) in enumerate(lanes)
     )
+
+
+def area_length(net: RoadNet, lane: str, wanted: float) -> float:
+    """Metres of an area that ends with a lane: less than wanted where all of the road is shorter.
+
+    SUMO leads it on over the lanes before, and warns where there are none. Which of several it
+    takes is its own choice: the shortest way to where the road begins counts, less what SUMO's
+    lengths may be shorter by.
+    """
+    todo, seen = [(net.lanes[lane].length - 2.0 * AREA_END, lane)], set[str]()
+    while todo:
+        length, one = heapq.heappop(todo)
+        before = net.links_to.get(one, ())
+        if length >= wanted:
+            break
+        if not before:
+            return max(math.floor(100.0 * length) / 100.0, AREA_END)
+        seen.add(one)
+        for link in before:
+            if link.source not in seen:
+                heapq.heappush(todo, (length + net.lanes[link.source].length, link.source))
+    return wanted
 
 
 def bus_in(areas: Iterable[BusArea], green: set[int]) -> tuple[str, str]:
@@ -261,10 +290,16 @@ def _placed(
 def _upstream(net: RoadNet, lane: str, ahead: float) -> tuple[str, float]:
     """Lane and position so many metres before the end of a lane; the start of the last one else."""
     while (rest := net.lanes[lane].length - max(ahead, 0.0)) < _LEAST:
-        before = [link.source for link in net.links_to.get(lane, ())]
-        if not before:
+        before = lane_before(net, lane)
+        if before is None:
             return lane, min(_LEAST, net.lanes[lane].length)
         ahead -= net.lanes[lane].length
-        same = net.lanes[lane].index
-        lane = min(before, key=lambda one: (abs(net.lanes[one].index - same), one))
+        lane = before
     return lane, rest
+
+
+def lane_before(net: RoadNet, lane: str) -> str | None:
+    """Lane that leads onto a lane, of several the one beside the fewest others; else ``None``."""
+    same = net.lanes[lane].index
+    sources = (link.source for link in net.links_to.get(lane, ()))
+    return min(sources, key=lambda one: (abs(net.lanes[one].index - same), one), default=None)

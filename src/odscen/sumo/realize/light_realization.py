@@ -22,6 +22,7 @@ from odscen.scenario.signals.movement_names import shortest_names
 from odscen.scenario.signals.plan_times import active_plans
 from odscen.scenario.signals.program_design import ONLY_PLAN, DesignedProgram, TimedPlan
 from odscen.sumo.realize.actuated.called_light import called_light
+from odscen.sumo.realize.actuated.detector_places import shown_bus_areas, shown_detectors
 from odscen.sumo.realize.light_detectors import (
     bus_areas,
     called,
@@ -32,7 +33,7 @@ from odscen.sumo.realize.light_detectors import (
     vehicle_loops,
     waiting_places,
 )
-from odscen.sumo.realize.light_views import scenario_lights, shown_detectors
+from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.stage_phases import (
     PhasePlan,
     SumoPhase,
@@ -141,7 +142,7 @@ class _Realizing:
         *,
         buses: bool = False,
     ) -> None:
-        self._buses = bus_areas(light, view) if buses else ()
+        self._buses = bus_areas(light, view, sumo_map.net) if buses else ()
         self._light = light
         self._view = view
         self._timing = timing
@@ -333,7 +334,10 @@ class _Realizing:
         own: bool,
     ) -> LightProgram:
         light = self._light
-        detectors = shown_detectors(loops, light, self._map)
+        detectors = (
+            *shown_detectors(loops, light, self._map),
+            *shown_bus_areas(self._buses, plans, self._map),
+        )
         return LightProgram(
             light.id, self._view.names, self._control, own, groups, plans, detectors
         )

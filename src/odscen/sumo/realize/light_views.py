@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from odscen.convert.model.net import CROSSED, UNUSED
 from odscen.convert.signals.signal_programs import SignalGroup
-from odscen.results.records.light_programs import ShownDetector
 from odscen.scenario.signals.light import Light, Meeting, SignalMovement
 from odscen.sumo.realize.sumo_lane_places import lane_segments
 
@@ -17,7 +14,6 @@ if TYPE_CHECKING:
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.convert.model.net import LightLink
-    from odscen.sumo.realize.light_detectors import PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 
 _TURNS = {"l": "left", "s": "straight", "r": "right", "t": "turnaround", CROSSED: "walk"}
@@ -29,68 +25,6 @@ def scenario_lights(sumo_map: SumoMap) -> tuple[Light, ...]:
         return ()
     segments = lane_segments(sumo_map)
     return tuple(_light(light, sumo_map, segments) for light in sumo_map.lights)
-
-
-def shown_detectors(
-    loops: Sequence[PlacedLoop], light: SumoLight, sumo_map: SumoMap
-) -> tuple[ShownDetector, ...]:
-    """Detectors of a light that prolong or call a stage, with their places on the map."""
-    return tuple(
-        ShownDetector(
-            loop.id, loop.name, loop.stages, loop.walk, _loop_place(loop, light, sumo_map),
-            loop.ahead, 0.0 if loop.walk else loop.gap,
-        )
-        for loop in loops
-        if loop.stages
-    )  # fmt: skip
-
-
-def _loop_place(
-    loop: PlacedLoop, light: SumoLight, sumo_map: SumoMap
-) -> tuple[tuple[float, float], ...]:
-    """Rear and front end of a loop; the end of the crossing where people wait; else nothing."""
-    if loop.walk:
-        waiting = [
-            path[end]
-            for link, path in ((light.links[n], light.links[n].path) for n in loop.movements)
-            if path
-            for end, area in ((0, link.source), (-1, link.target))
-            if loop.lane.startswith(area) or area.startswith(loop.lane)
-        ]
-        return tuple(waiting[:1])
-    places, lanes = sumo_map.lane_places, sumo_map.graph.lanes
-    row = places.lanes.index(loop.lane) if loop.lane in places.lanes else -2
-    nodes = np.flatnonzero(places.lane == row)
-    nodes = nodes[np.argsort(places.pos[nodes], kind="stable")]
-    if len(nodes) < 2:
-        return _before_stop_line(loop, light)
-    pos = places.pos[nodes]
-    points = []
-    for at in (loop.pos, loop.pos + loop.length):
-        # Beyond the first and the last node the lane goes on straight.
-        n = min(max(int(np.searchsorted(pos, at)), 1), len(nodes) - 1)
-        step = max(pos[n] - pos[n - 1], 1e-6)
-        share = (at - pos[n - 1]) / step
-        a, b = nodes[n - 1], nodes[n]
-        points.append(
-            (
-                round(float(lanes.x[a] + share * (lanes.x[b] - lanes.x[a])), 2),
-                round(float(lanes.y[a] + share * (lanes.y[b] - lanes.y[a])), 2),
-            )
-        )
-    return tuple(points)
-
-
-def _before_stop_line(loop: PlacedLoop, light: SumoLight) -> tuple[tuple[float, float], ...]:
-    """Straight back from where a movement of its lane begins, for a lane too short for a node."""
-    paths = (light.links[n].path for n in loop.movements)
-    (x, y), (x1, y1) = next((path[:2] for path in paths if len(path) > 1), ((0, 0), (0, 0)))
-    length = float(np.hypot(x1 - x, y1 - y))
-    if not length:
-        return ()
-    ux, uy = (x1 - x) / length, (y1 - y) / length
-    ends = (loop.ahead + loop.length, loop.ahead)
-    return tuple((round(x - ux * away, 2), round(y - uy * away, 2)) for away in ends)
 
 
 def _light(light: SumoLight, sumo_map: SumoMap, segments: Mapping[str, Sequence[str]]) -> Light:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from odscen.sumo.realize.light_detectors import BUS_AREA
+from odscen.sumo.realize.light_detectors import AREA_END
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -59,15 +59,15 @@ def _loop_xml(loop: PlacedLoop) -> str:
 def _bus_xml(area: BusArea, buses: Sequence[str]) -> str:
     # Without types SUMO would count all vehicles; a type that is not there counts none.
     return (
-        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-0.1"'
-        f' length="{BUS_AREA:g}" friendlyPos="true" vTypes="{" ".join(buses) or "bus"}"'
+        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-{AREA_END:g}"'
+        f' length="{area.length:g}" friendlyPos="true" vTypes="{" ".join(buses) or "bus"}"'
         f' file="NUL" period="{_PERIOD}"/>'
     )
 
 
 def _area_xml(area: CallArea) -> str:
     return (
-        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-0.1"'
+        f'    <laneAreaDetector id="{area.id}" lane="{area.lane}" endPos="-{AREA_END:g}"'
         f' length="{area.length:g}" friendlyPos="true" file="NUL" period="{_PERIOD}"/>'
     )
 
@@ -100,7 +100,10 @@ def _attributes(phase: SumoPhase, kind: str) -> Iterator[str]:
         yield f"earlyTarget={quoteattr(phase.early)}"
     if phase.final:
         yield f"finalTarget={quoteattr(phase.final)}"
-    yield f"name={quoteattr(phase.name)}"
+    if (
+        phase.name
+    ):  # networks of other converters have phases without one; SUMO refuses an empty one
+        yield f"name={quoteattr(phase.name)}"
 
 
 def _switches_xml(light: RealizedLight) -> Iterator[str]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from odscen.convert.model.net import STAGE
-from odscen.convert.signals.signal_programs import LEAST_GREEN
+from odscen.convert.model.net import CROSSED, STAGE
+from odscen.convert.signals.signal_programs import LEAST_GREEN, PROLONGED
 from odscen.scenario.signals.stage_sequence import (
     change_length,
     change_steps,
@@ -83,9 +83,11 @@ class PhasePlan:
 def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
     """Phases of the network's program, with other seconds of green if there is one for each stage.
 
-    Times for other stages are those of a network that the map had before.
+    Times for other stages are those of a network that the map had before. A network by another
+    converter may have no bounds: vehicles then prolong its stages as those of ours.
     """
     stages = sum(phase.is_stage for phase in light.phases)
+    bounded = any(phase.most > phase.least for phase in light.phases)
     greens = iter(green if len(green) == stages else ())
     phases = []
     for phase in light.phases:
@@ -93,8 +95,18 @@ def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
         seconds = next(greens, phase.duration) if phase.is_stage else phase.duration
         least = min(phase.least, seconds)
         most = phase.most * seconds / phase.duration if phase.is_stage else phase.most
+        if phase.is_stage and not bounded and _drive(phase.state, light):
+            least, most = min(LEAST_GREEN, seconds), PROLONGED * seconds
         phases.append(SumoPhase(seconds, phase.state, phase.name, stage, least, most))
     return phases
+
+
+def _drive(state: str, light: SumoLight) -> bool:
+    """Whether a vehicle has green."""
+    return any(
+        letter in "Gg" and link.turn != CROSSED
+        for letter, link in zip(state, light.links, strict=False)
+    )
 
 
 def kept_cycle(program: DesignedProgram, plan: TimedPlan) -> float | None:

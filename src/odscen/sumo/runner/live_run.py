@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from odscen.sumo.worker.protocol import (
     Command,
+    Detectors,
     FrameMessage,
     Incidents,
     Lights,
@@ -43,6 +44,7 @@ class _Seen:
     picture: LivePicture = field(default_factory=LivePicture)
     shot: LivePicture = field(default_factory=LivePicture)
     lights: dict[str, str] = field(default_factory=dict)
+    detectors: dict[str, bool] = field(default_factory=dict)
     incidents: list[dict[str, Any]] = field(default_factory=list)
     progress: Progress | None = None
 
@@ -80,6 +82,11 @@ class Live:
     def lights(self) -> dict[str, str]:
         """State of all traffic lights at the newest frame, by SUMO id; not to be changed."""
         return self._seen.lights
+
+    @property
+    def detectors(self) -> dict[str, bool]:
+        """Whether detectors were occupied at the newest frame, by SUMO id; not to be changed."""
+        return self._seen.detectors
 
     @property
     def incidents(self) -> list[dict[str, Any]]:
@@ -152,6 +159,8 @@ class Live:
                 seen.shot = LivePicture(seen.shot.number + 1, payload)
             elif isinstance(message, Lights):
                 seen.lights = {**seen.lights, **message.states}
+            elif isinstance(message, Detectors):
+                seen.detectors = {**seen.detectors, **message.occupied}
             elif isinstance(message, Incidents):
                 seen.incidents.extend(message.events)
             elif isinstance(message, Pace):

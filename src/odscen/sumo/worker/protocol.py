@@ -71,6 +71,16 @@ class Lights:
 
 
 @dataclass(frozen=True, slots=True)
+class Detectors:
+    """Detectors of lights that a road user came onto or left since the last such message.
+
+    By SUMO id, with whether they are occupied.
+    """
+
+    occupied: dict[str, bool]
+
+
+@dataclass(frozen=True, slots=True)
 class Incidents:
     """Events worth a mark on the map, as in ``events.json``: conflicts, jumps, hard stops."""
 
@@ -157,6 +167,7 @@ Message = (
     | Failed
     | FrameMessage
     | Lights
+    | Detectors
     | Incidents
     | Pace
     | Lockstep
@@ -171,6 +182,7 @@ _KINDS: dict[str, type[Message | Command | EgoPose]] = {
     "failed": Failed,
     "frame": FrameMessage,
     "lights": Lights,
+    "detectors": Detectors,
     "incidents": Incidents,
     "pace": Pace,
     "lockstep": Lockstep,

@@ -22,7 +22,7 @@ from odscen.base.errors import SimulationError
 from odscen.sumo.worker.observed import Ahead, Front, Poses, StepLists, StoppedVehicle
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from odscen.sumo.worker.protocol import EgoPose
@@ -227,6 +227,26 @@ class Session:
         """State of each traffic light, a letter per link."""
         state = self._sumo.trafficlight.getRedYellowGreenState
         return {name: state(name) for name in self._sumo.trafficlight.getIDList()}
+
+    def occupied(self, detectors: Iterable[str]) -> dict[str, bool]:
+        """Whether a road user was on each of these loops and areas in the last step.
+
+        Those that SUMO does not have are left out.
+        """
+        share = self._sumo.inductionloop.getLastStepOccupancy
+        count = self._sumo.lanearea.getLastStepVehicleNumber
+        loops, areas = self._detectors
+        return {
+            name: share(name) > 0.0 if name in loops else count(name) > 0
+            for name in detectors
+            if name in loops or name in areas
+        }
+
+    @cached_property
+    def _detectors(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Ids of loops and of areas."""
+        loops, areas = self._sumo.inductionloop, self._sumo.lanearea
+        return frozenset(loops.getIDList()), frozenset(areas.getIDList())
 
     def present(self) -> set[str]:
         """Ids of all vehicles and persons on the road, and of vehicles that wait for room."""

@@ -26,9 +26,11 @@ from odscen.base.atomic_folders import in_use
 from odscen.base.errors import OdscenError
 from odscen.base.system_errors import NO_MEMORY, system_words
 from odscen.results.measures.summary import Outcomes
+from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.run_records import Plan, event_line
 from odscen.sumo.folder.layout import (
     CONFIG_FILE,
+    LIGHTS_FILE,
     LOG_FILE,
     SUMO_FOLDER,
     TRAJECTORIES_FILE,
@@ -75,7 +77,7 @@ def main() -> int:
             plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
             gc.freeze()  # the plan stays, and need not be gone through again and again
             gc.enable()
-            watch = _watch(plan, sys.argv[2:], send) if len(sys.argv) > 2 else None
+            watch = _watch(plan, folder, sys.argv[2:], send) if len(sys.argv) > 2 else None
             done = simulate(plan, folder, send, watch)
             if done is not None:
                 send(done)
@@ -144,7 +146,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
 
 
 def _watch(
-    plan: Plan, how: Sequence[str], send: Callable[[Message, bytes], None]
+    plan: Plan, folder: Path, how: Sequence[str], send: Callable[[Message, bytes], None]
 ) -> Watch | LockstepWatch:
     start, *heard = map(decode, how)
     if isinstance(start, Lockstep):
@@ -155,7 +157,14 @@ def _watch(
         step_length=plan.step_length,
         heard=[command for command in heard if isinstance(command, Command)],
     )
-    return Watch(plan, steering, send)
+    return Watch(plan, steering, send, detectors=_detectors(folder))
+
+
+def _detectors(folder: Path) -> list[str]:
+    """SUMO's ids of the detectors that lights are shown with."""
+    file = folder / LIGHTS_FILE
+    lights = programs_from_json(file.read_text(encoding="utf-8")) if file.is_file() else ()
+    return [one.id for light in lights for one in light.detectors]
 
 
 if __name__ == "__main__":

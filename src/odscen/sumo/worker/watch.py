@@ -10,11 +10,11 @@ import time
 from typing import TYPE_CHECKING
 
 from odscen.results.records.run_records import EventKind, event_row
-from odscen.sumo.worker.protocol import FrameMessage, Incidents, Lights
+from odscen.sumo.worker.protocol import Detectors, FrameMessage, Incidents, Lights
 from odscen.sumo.worker.snapshots import Snapshots
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.protocol import Message
@@ -38,10 +38,17 @@ class Watch:
     ----------
     send
         Sends a message, and bytes after it.
+    detectors
+        SUMO's ids of detectors of lights that are shown.
     """
 
     def __init__(
-        self, plan: Plan, steering: Steering, send: Callable[[Message, bytes], None]
+        self,
+        plan: Plan,
+        steering: Steering,
+        send: Callable[[Message, bytes], None],
+        *,
+        detectors: Sequence[str] = (),
     ) -> None:
         self.steering = steering
         self._snapshots = Snapshots(plan)
@@ -49,6 +56,8 @@ class Watch:
         self._pace = steering.pace
         self._step_length = plan.step_length
         self._lights: dict[str, str] = {}
+        self._detectors = detectors
+        self._occupied: dict[str, bool] = {}
         self._reported = 0
         self._step = self._framed = 0
         self._next_frame = 0.0
@@ -93,6 +102,7 @@ class Watch:
         if changed:
             self._lights = states
             self._send(Lights(changed), b"")
+        self._report_detectors(session)
         self._report_incidents(recorder)
         frame = self._snapshots.frame(
             session,
@@ -109,6 +119,13 @@ class Watch:
         if self.steering.pace != self._pace:
             self._pace = self.steering.pace
             self._send(self._pace, b"")
+
+    def _report_detectors(self, session: Session) -> None:
+        occupied = session.occupied(self._detectors)
+        changed = {name: on for name, on in occupied.items() if self._occupied.get(name) != on}
+        if changed:
+            self._occupied = occupied
+            self._send(Detectors(changed), b"")
 
     def _report_incidents(self, recorder: Recorder) -> None:
         new = recorder.since(self._reported)

@@ -58,6 +58,13 @@ class LiveLights(Answer):
     lights: dict[str, str]
 
 
+class LiveDetectors(Answer):
+    """Detectors of traffic lights that road users came onto or left, by id: whether on them now."""
+
+    type: Literal["detectors"] = "detectors"
+    detectors: dict[str, bool]
+
+
 class LiveIncidents(Answer):
     """What has happened since the last of these."""
 
@@ -74,6 +81,7 @@ class LiveEnd(Answer):
 
 
 LiveMessage = Annotated[
-    LiveHello | LiveState | LiveLights | LiveIncidents | LiveEnd, Field(discriminator="type")
+    LiveHello | LiveState | LiveLights | LiveDetectors | LiveIncidents | LiveEnd,
+    Field(discriminator="type"),
 ]
 """Any text that the server sends."""

@@ -67,15 +67,19 @@ class LightGroupInfo(Answer):
 class DetectorInfo(Answer):
     """A detector and what it is for; metres before the stop line, and seconds of its gap.
 
-    ``label`` names it in the pictures. ``calls`` are begin and end of the times in which it saw a
-    road user, seconds of a run; none without a run.
+    ``label`` names it in the pictures, where its shape has its id as ``data-detector``. ``bus`` if
+    it is an area of ``length`` metres that sees buses only, which have priority for its stages.
+    ``calls`` are begin and end of the times in which it saw a road user, seconds of a run; none
+    without a run, and none of an area for buses, which SUMO does not log.
     """
 
     id: str
     label: str
     stages: list[str]
     call: bool
+    bus: bool
     ahead: float
+    length: float
     gap: float
     calls: list[tuple[float, float]]
 

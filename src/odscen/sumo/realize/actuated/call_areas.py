@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.sumo.realize.light_detectors import area_length
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.signals.light import Light
     from odscen.sumo.realize.light_detectors import BusArea, PlacedLoop
+    from odscen.sumo.realize.road_net import RoadNet
 
 STUCK = 20.0
 """Seconds of standing at a green that gives way, after which a vehicle needs another stage."""
@@ -39,7 +42,9 @@ class CallArea(NamedTuple):
     length: float
 
 
-def call_areas(light: SumoLight, view: Light, loops: Iterable[PlacedLoop]) -> tuple[CallArea, ...]:
+def call_areas(
+    light: SumoLight, view: Light, net: RoadNet, loops: Iterable[PlacedLoop]
+) -> tuple[CallArea, ...]:
     """One in each lane of vehicles, from its farthest loop on; all lanes call, loop or not."""
     lengths = dict[str, float]()
     for loop in loops:
@@ -50,7 +55,12 @@ def call_areas(light: SumoLight, view: Light, loops: Iterable[PlacedLoop]) -> tu
         if one.drive:
             lanes.setdefault(light.links[n].source, []).append(n)
     return tuple(
-        CallArea(f"{light.id}.area.{number}", lane, tuple(own), lengths.get(lane, SEEN))
+        CallArea(
+            f"{light.id}.area.{number}",
+            lane,
+            tuple(own),
+            area_length(net, lane, lengths.get(lane, SEEN)),
+        )
         for number, (lane, own) in enumerate(lanes.items())
     )
 

@@ -82,7 +82,7 @@ def called_light(
         return None
     walks = {n for n, one in enumerate(view.movements) if one.walk}
     places = waiting_places(light, net, {name: own & walks for name, own in green.items()})
-    areas = call_areas(light, view, loops)
+    areas = call_areas(light, view, net, loops)
     callers = Callers(areas, places, buses)
     plan = called_phases(variants, callers, ends=ends, conditions=conditions)
     return CalledLight(plan, (*loops, *places), areas, conditions)
