@@ -33,7 +33,8 @@ def net(stop: float, inner: float, before: float) -> RoadNet:
         ((100.0, 0.1, 100.0), 80.0),
         ((20.0, 10.0, 100.0), 80.0),
         ((20.0, 10.0, 30.0), 59.8),
-        ((80.1, 10.0, 0.05), 80.0),
+        ((80.1, 10.0, 0.05), 79.9),
+        ((79.98, 0.1, 100.0), 79.88),
     ],
 )
 def test_an_area_is_no_longer_than_the_road_before_the_light(

@@ -43,6 +43,8 @@ BUS_AREA = 80.0
 
 AREA_END = 0.1
 """Metres before the end of its lane at which an area ends."""
+LEAST_REST = 0.2
+"""Metres of an area on the lane where it begins: for less SUMO finds no lane, and says so."""
 
 BUS_GREEN = 15.0
 """Seconds by which a bus may prolong the green of a fixed-time light."""
@@ -120,7 +122,7 @@ def area_length(net: RoadNet, lane: str, wanted: float) -> float:
 
     SUMO leads it on over the lanes before, and warns where there are none. Which of several it
     takes is its own choice: the shortest way to where the road begins counts, less what SUMO's
-    lengths may be shorter by.
+    lengths may be shorter by. Nor does it lead an area on for less than :data:`LEAST_REST`.
     """
     todo, seen = [(net.lanes[lane].length - 2.0 * AREA_END, lane)], set[str]()
     while todo:
@@ -128,7 +130,7 @@ def area_length(net: RoadNet, lane: str, wanted: float) -> float:
         before = net.links_to.get(one, ())
         if length >= wanted:
             break
-        if not before:
+        if not before or wanted - length < LEAST_REST:
             return max(math.floor(100.0 * length) / 100.0, AREA_END)
         seen.add(one)
         for link in before:
