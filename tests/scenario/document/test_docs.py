@@ -6,6 +6,7 @@ from odscen.scenario.document.json_form import loads
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.document.scenario_document import Demand
 from odscen.scenario.document.signals_document import JunctionTiming
+from odscen.scenario.document.transit_document import Transit
 
 ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
@@ -43,7 +44,13 @@ def test_every_code_of_the_checks_is_listed_in_the_guide() -> None:
 def test_the_example_of_demand_is_one() -> None:
     example = json.loads("{" + block("demand.md", "json") + "}")["demand"]
     demand = Demand.model_validate_json(json.dumps(example), strict=True)
-    assert [part.id for _, part in demand.parts] == ["commuters", "survey", "others"]
+    assert [part.id for _, part in demand.parts] == ["west", "ramp", "commuters", "survey", "others"]
+
+
+def test_the_example_of_public_transport_is_one() -> None:
+    example = json.loads("{" + block("transit.md", "json") + "}")["transit"]
+    transit = Transit.model_validate_json(json.dumps(example), strict=True)
+    assert [one.stop for one in transit.lines[0].stops] == [stop.id for stop in transit.stops]
 
 
 def test_the_example_of_a_signal_program_is_one() -> None:
