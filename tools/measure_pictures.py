@@ -29,8 +29,8 @@ MARGIN = 60.0
 STYLE = (
     ".measures path{fill:none;stroke:#b45309;stroke-linecap:round;stroke-linejoin:round;"
     "opacity:.75}.measures text{fill:#b45309;stroke:#fff;stroke-width:.18em;paint-order:stroke;"
-    "font-weight:700;font-family:sans-serif;dominant-baseline:middle}.scale path{fill:none;stroke:#333}"
-    ".scale text{fill:#333;font-family:sans-serif}"
+    "font-weight:700;font-family:sans-serif;dominant-baseline:middle}"
+    ".scale path{fill:none;stroke:#333}.scale text{fill:#333;font-family:sans-serif}"
 )
 
 

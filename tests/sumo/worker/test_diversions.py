@@ -266,3 +266,45 @@ def test_a_light_that_fails_shows_nothing_and_comes_back(
         assert set("".join(failed["state"])) <= set("oO")
         later = own.filter(pl.col("time") > 150.0)
         assert "G" in "".join(later["state"])
+
+
+def test_a_bus_that_is_led_around_keeps_the_stops_that_it_can_reach(
+    workspace: Workspace, town: LoadedMap, tmp_path: Path
+) -> None:
+    transit = {
+        "stops": [
+            {"id": "on", "node": "23.0.-1.25"},
+            {"id": "beyond", "node": "36.0.-1.15"},
+        ],
+        "lines": [
+            {
+                "id": "line",
+                "start": "12.0.-1.5",
+                "goal": "36.0.-1.30",
+                "stops": [{"stop": "on"}, {"stop": "beyond"}],
+                "departures": [0, 60],
+                "dwell": {"kind": "constant", "value": 10},
+            }
+        ],
+    }
+    closed = {"id": "m", "kind": "closure", "begin": 20.0, "places": ["r35"]}
+    free, led = (
+        Ended(
+            workspace,
+            scenario(town, transit=transit, measures=measures, simulation={"duration": 500.0}),
+            tmp_path / name,
+        )
+        for name, measures in (("free", []), ("led", [closed]))
+    )
+    for run in (free, led):
+        assert {one.status.value for one in run.outcomes.values()} == {"arrived"}
+        visited = run.rows.filter(pl.col("vehicle_speed") < 0.1)
+        roads = {lane: own[0] for lane, own in lane_segments(town.sumo).items()}
+        at = {
+            (name, roads.get(lane))
+            for name, lane in visited.select("vehicle_id", "vehicle_lane").iter_rows()
+        }
+        for bus in run.outcomes:
+            assert {(bus, "r23"), (bus, "r36")} <= at
+    assert free.on(town, "r35", 0.0, 500.0)
+    assert not led.on(town, "r35", 60.0, 500.0)

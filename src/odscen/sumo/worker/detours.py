@@ -7,7 +7,7 @@ from collections import defaultdict
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 Pairs = frozenset[tuple[str, str]]
 
@@ -48,6 +48,21 @@ class Detours:
         if key not in self._known:
             self._known[key] = self._search(source, goal, vclass, closed)
         return self._known[key]
+
+    def by_stops(
+        self, source: str, goals: Sequence[str], vclass: str, closed: Pairs
+    ) -> tuple[str, ...] | None:
+        """Edges of the quickest route by all goals to the last; ``None`` if that is out of reach.
+
+        Other goals that are out of reach, or lead no further, are left out.
+        """
+        route: tuple[str, ...] = (source,)
+        for goal in goals[:-1]:
+            part = self.find(route[-1], goal, vclass, closed)
+            if part is not None and self.find(goal, goals[-1], vclass, closed) is not None:
+                route += part[1:]
+        rest = self.find(route[-1], goals[-1], vclass, closed)
+        return None if rest is None else route + rest[1:]
 
     def _search(self, source: str, goal: str, vclass: str, closed: Pairs) -> tuple[str, ...] | None:
         onwards = self._onwards.get(vclass, {})

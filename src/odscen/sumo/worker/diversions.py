@@ -107,7 +107,8 @@ class Diversions:
             if ahead.inside:
                 self._inside.add(name)
                 continue
-            route = self._detours.find(ahead.edges[0], ahead.edges[-1], vclass, closed)
+            goals = (*session.stop_edges(name), ahead.edges[-1])
+            route = self._detours.by_stops(ahead.edges[0], goals, vclass, closed)
             if route is not None and session.set_route(name, ahead.start + route):
                 continue
             if session.has_departed(name):

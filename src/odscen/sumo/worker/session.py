@@ -162,6 +162,11 @@ class Session:
         """Whether a vehicle that SUMO knows is on the road, or was."""
         return int(self._sumo.vehicle.getRouteIndex(vehicle)) >= 0
 
+    def stop_edges(self, vehicle: str) -> tuple[str, ...]:
+        """Edges of the stops that a vehicle has before it, in their order."""
+        lane = self._sumo.lane.getEdgeID
+        return tuple(lane(stop.lane) for stop in self._sumo.vehicle.getStops(vehicle))
+
     def set_route(self, vehicle: str, edges: Sequence[str]) -> bool:
         """Give a vehicle another route from its edge on; false if SUMO refuses it."""
         try:
