@@ -7,6 +7,7 @@ import {
   nearestOne,
   ofProblem,
   sceneActors,
+  measureStyles,
   sceneFlows,
   segmentStyles,
   wrongOnes,
@@ -29,6 +30,15 @@ test("the first segment is dark blue, the rest of the region blue, what can be a
 
 test("before the first segment nothing is highlighted, though all may be chosen", () => {
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
+});
+
+test("places of measures are drawn: segments, lanes, and both roads of a turn", () => {
+  const closure = { id: "m", kind: "closure", begin: 0, end: null } as const;
+  const drawn = (...places: string[]) => [...measureStyles(graph, [{ ...closure, places }]).keys()];
+  expect(drawn("b")).toEqual([1]);
+  expect(drawn("a>c")).toEqual([0, 2]);
+  expect(drawn("1.0.-1").length).toBeGreaterThan(0);
+  expect(drawn("nowhere")).toEqual([]);
 });
 
 test("a new road user or flow is selected; after a removal the others stay selected", () => {

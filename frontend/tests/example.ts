@@ -48,6 +48,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   demand: { clock: 0, zones: [], profiles: [], inputs: [], matrices: [], counts: [], background: [] },
   transit: { stops: [], lines: [] },
   signals: { control: "fixed", bus_priority: false, junctions: [] },
+  measures: [],
   simulation: {
     duration: 60,
     step_length: 0.5,

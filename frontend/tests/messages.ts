@@ -6,6 +6,7 @@ const ACTORS: Summary["actors"] = {
   arrived: null,
   running: null,
   waiting: null,
+  stranded: null,
   teleported: null,
   collided: null,
   emergency_stopped: null,

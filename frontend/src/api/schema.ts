@@ -1462,6 +1462,38 @@ export interface components {
             flow: string;
         };
         /**
+         * ChangedPermission
+         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
+         */
+        ChangedPermission: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "permission";
+            /** Places */
+            places: string[];
+            /**
+             * Allowed
+             * @default []
+             */
+            allowed: components["schemas"]["Category"][];
+            /**
+             * Banned
+             * @default []
+             */
+            banned: components["schemas"]["Category"][];
+        };
+        /**
          * Choice
          * @description One of ``values``, each with its weight (equal if there are none).
          */
@@ -2085,9 +2117,11 @@ export interface components {
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
+         *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
+         *     and end; their id stands for that of an actor.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end";
         /**
          * ExpectationInfo
          * @description An expectation, what came of it, and whether it was met.
@@ -2548,6 +2582,38 @@ export interface components {
             plans: components["schemas"]["DayPlan-Output"][];
             /** Bus Priority */
             bus_priority: boolean | null;
+        };
+        /**
+         * LaneIncident
+         * @description A broken-down vehicle that blocks a lane.
+         *
+         *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
+         *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
+         */
+        LaneIncident: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "incident";
+            /** Lane */
+            lane: string;
+            /** S */
+            s: number;
+            /**
+             * Length
+             * @default 5
+             */
+            length: number;
         };
         /**
          * LightGroupInfo
@@ -3304,6 +3370,62 @@ export interface components {
             actors: components["schemas"]["ReplayActor"][];
         };
         /**
+         * RoadClosure
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         */
+        RoadClosure: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "closure";
+            /** Places */
+            places: string[];
+        };
+        /**
+         * Roadworks
+         * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
+         *
+         *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
+         *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
+         */
+        Roadworks: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "roadworks";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed: number | null;
+            /**
+             * Closed Lanes
+             * @default []
+             */
+            closed_lanes: string[];
+            /** Width */
+            width: number | null;
+        };
+        /**
          * RoiInfo
          * @description Segments of the region, and those that may be added or taken out now.
          */
@@ -3690,6 +3812,11 @@ export interface components {
              *     }
              */
             signals: components["schemas"]["Signals"];
+            /**
+             * Measures
+             * @default []
+             */
+            measures: (components["schemas"]["RoadClosure"] | components["schemas"]["Roadworks"] | components["schemas"]["LaneIncident"] | components["schemas"]["SpeedLimit"] | components["schemas"]["ChangedPermission"] | components["schemas"]["SignalOutage"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -4352,6 +4479,37 @@ export interface components {
             value: number | null;
         };
         /**
+         * SignalOutage
+         * @description A traffic light out of order.
+         *
+         *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
+         *     named as in the timing of signals.
+         */
+        SignalOutage: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "signal_outage";
+            /** Junction */
+            junction: string;
+            /**
+             * Shows
+             * @default off
+             * @enum {string}
+             */
+            shows: "off" | "flashing";
+        };
+        /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
@@ -4439,6 +4597,30 @@ export interface components {
             done: components["schemas"]["SliceInfo"][];
         };
         /**
+         * SpeedLimit
+         * @description Another speed limit, m/s; of several at a place the lowest holds.
+         */
+        SpeedLimit: {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin: number;
+            /** End */
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed: number;
+        };
+        /**
          * StageInfo
          * @description A stage in the cycle of a plan; seconds.
          *
@@ -4506,6 +4688,8 @@ export interface components {
             running: number | null;
             /** Waiting */
             waiting: number | null;
+            /** Stranded */
+            stranded: number | null;
             /** Teleported */
             teleported: number | null;
             /** Collided */
@@ -5025,6 +5209,41 @@ export interface components {
          */
         "Category-File": "car" | "van" | "truck" | "bus" | "motorcycle" | "bicycle" | "pedestrian";
         /**
+         * ChangedPermission
+         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
+         */
+        "ChangedPermission-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "permission";
+            /** Places */
+            places: string[];
+            /**
+             * Allowed
+             * @default []
+             */
+            allowed?: components["schemas"]["Category-File"][];
+            /**
+             * Banned
+             * @default []
+             */
+            banned?: components["schemas"]["Category-File"][];
+        };
+        /**
          * Choice
          * @description One of ``values``, each with its weight (equal if there are none).
          */
@@ -5385,6 +5604,41 @@ export interface components {
             bus_priority?: boolean | null;
         };
         /**
+         * LaneIncident
+         * @description A broken-down vehicle that blocks a lane.
+         *
+         *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
+         *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
+         */
+        "LaneIncident-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "incident";
+            /** Lane */
+            lane: string;
+            /** S */
+            s: number;
+            /**
+             * Length
+             * @default 5
+             */
+            length?: number;
+        };
+        /**
          * MapReference
          * @description The map, by name *and* content, and the spacing of the graph that node names refer to.
          */
@@ -5535,6 +5789,74 @@ export interface components {
             on_call?: boolean;
         };
         /**
+         * RoadClosure
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         */
+        "RoadClosure-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "closure";
+            /** Places */
+            places: string[];
+        };
+        /**
+         * Roadworks
+         * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
+         *
+         *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
+         *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
+         */
+        "Roadworks-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "roadworks";
+            /** Places */
+            places: string[];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
+            /**
+             * Closed Lanes
+             * @default []
+             */
+            closed_lanes?: string[];
+            /**
+             * Width
+             * @default null
+             */
+            width?: number | null;
+        };
+        /**
          * ServedStop
          * @description A stop on a line.
          *
@@ -5585,6 +5907,40 @@ export interface components {
              * @default 3
              */
             gap?: number;
+        };
+        /**
+         * SignalOutage
+         * @description A traffic light out of order.
+         *
+         *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
+         *     named as in the timing of signals.
+         */
+        "SignalOutage-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "signal_outage";
+            /** Junction */
+            junction: string;
+            /**
+             * Shows
+             * @default off
+             * @enum {string}
+             */
+            shows?: "off" | "flashing";
         };
         /**
          * Signals
@@ -5652,6 +6008,33 @@ export interface components {
              * @enum {string}
              */
             pedestrians?: "striping" | "nonInteracting";
+        };
+        /**
+         * SpeedLimit
+         * @description Another speed limit, m/s; of several at a place the lowest holds.
+         */
+        "SpeedLimit-File": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /**
+             * End
+             * @default null
+             */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed: number;
         };
         /**
          * Transit
@@ -5937,6 +6320,11 @@ export interface components {
              *     }
              */
             signals?: components["schemas"]["Signals-File"];
+            /**
+             * Measures
+             * @default []
+             */
+            measures?: (components["schemas"]["RoadClosure-File"] | components["schemas"]["Roadworks-File"] | components["schemas"]["LaneIncident-File"] | components["schemas"]["SpeedLimit-File"] | components["schemas"]["ChangedPermission-File"] | components["schemas"]["SignalOutage-File"])[];
             /**
              * @default {
              *       "duration": 600,

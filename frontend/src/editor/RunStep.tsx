@@ -7,6 +7,7 @@ import { CarlaChoice } from "../carla/CarlaChoice";
 import { IconPlay } from "../ui/icons";
 import { Duration } from "./Duration";
 import { Forecast } from "./Forecast";
+import { MeasureList } from "./MeasureList";
 
 const CONTROLS = [
   { value: "fixed", label: "Fixed-time" },
@@ -54,6 +55,7 @@ export function RunStep({
     simulation: { duration },
     seed,
     signals: { control },
+    measures,
   } = document;
   const [inCarla, setInCarla] = useState(false);
   const [recording, setRecording] = useState("step");
@@ -129,6 +131,7 @@ export function RunStep({
           </Button>
         </div>
       )}
+      <MeasureList measures={measures} />
       <div>
         <Text size="sm" fw={500}>
           Speed at the start

@@ -1,6 +1,7 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
+import { placesOf } from "./measures";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
 export type Step = "map" | "region" | "environment" | "actors" | "traffic" | "run";
@@ -21,6 +22,27 @@ export function segmentStyles(
   // With no region yet everything may be chosen: nothing is highlighted.
   if (growing && roi.length > 0) for (const id of candidates) put(id, "eligible");
   if (growing) roi.forEach((id, n) => put(id, n === 0 ? "base" : "member"));
+  return styles;
+}
+
+/** Segments with places of measures: of a lane those that it lies in, of a turn all that it names. */
+export function measureStyles(
+  graph: Graph,
+  measures: ScenarioDocument["measures"],
+): Map<number, SegmentStyle> {
+  const styles = new Map<number, SegmentStyle>();
+  for (const measure of measures)
+    for (const name of placesOf(measure)) {
+      const place = graph.place(`${name}.0`);
+      if (place) {
+        const [first, end] = graph.lanePlaces(place);
+        for (let i = first; i < end; i++) styles.set(graph.vehiclePlace(i).segment, "measure");
+      }
+      for (const part of name.split(">")) {
+        const row = graph.segmentRow.get(part);
+        if (row !== undefined) styles.set(row, "measure");
+      }
+    }
   return styles;
 }
 

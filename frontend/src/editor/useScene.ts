@@ -2,14 +2,14 @@ import { useMemo } from "react";
 
 import type { Scene } from "../map/scene";
 import { laneFacts } from "./placeWords";
-import { segmentStyles } from "./scene";
+import { measureStyles, segmentStyles } from "./scene";
 import type { EditorNow } from "./useEditing";
 
 /** What the map shows of the editor as it is now. */
 export function useScene(now: EditorNow): Scene {
   const {
     graph,
-    document: { roi },
+    document: { roi, measures },
     region: { candidates },
     step,
     handler: { walks, badge },
@@ -25,7 +25,10 @@ export function useScene(now: EditorNow): Scene {
     const placing = step === "actors";
     const place = hover?.is === "place" ? hover.place : null;
     return {
-      segments: segmentStyles(graph, roi, candidates, step === "region"),
+      segments:
+        step === "traffic" || step === "run"
+          ? measureStyles(graph, measures)
+          : segmentStyles(graph, roi, candidates, step === "region"),
       hoverSegment: hover?.is === "segment" ? hover.row : null,
       nodes: {
         vehicles: step !== "region" && (!placing || walks !== true),
@@ -41,5 +44,5 @@ export function useScene(now: EditorNow): Scene {
       hoverText: placing && place ? laneFacts(graph, place.id) : null,
       hoverCategory: badge,
     };
-  }, [graph, roi, candidates, step, hover, walks, badge, inside, actors, flows, goals, one, route]);
+  }, [graph, roi, measures, candidates, step, hover, walks, badge, inside, actors, flows, goals, one, route]);
 }

@@ -13,6 +13,7 @@ export const GOAL = "#5AC3FF";
 /** Flows of vehicles; those of pedestrians have the colour of their places. */
 export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
+export const MEASURE = "#B45309";
 
 export interface Palette {
   land: string;

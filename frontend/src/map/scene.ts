@@ -1,7 +1,7 @@
 import type { Category } from "../api/types";
 import type { Place } from "./graph";
 
-export type SegmentStyle = "base" | "member" | "eligible" | "problem";
+export type SegmentStyle = "base" | "member" | "eligible" | "problem" | "measure";
 
 export interface SceneActor {
   id: string;

@@ -2,6 +2,7 @@ import {
   CATEGORY_COLOR,
   EGO,
   ELIGIBLE,
+  MEASURE,
   type Palette,
   PEDESTRIAN_NODE,
   PROBLEM,
@@ -48,6 +49,7 @@ const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
   member: { fill: ROI_MEMBER, alpha: 0.55 },
   eligible: { fill: ELIGIBLE, alpha: 0.55 },
   problem: { fill: PROBLEM, alpha: 0.6 },
+  measure: { fill: MEASURE, alpha: 0.6 },
 };
 
 /** What the user has made of the map: region, places, actors, goals and route. */

@@ -39,6 +39,12 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return `${who} was gridlocked and teleported`;
     case "teleport_end":
       return `${who} was put back on the road after its teleport`;
+    case "stranded":
+      return `${who} was stranded: every route to its goal was closed`;
+    case "measure_begin":
+      return `Measure ${incident.actor} began`;
+    case "measure_end":
+      return `Measure ${incident.actor} ended`;
     default:
       return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
@@ -55,7 +61,7 @@ export function marksAt(incidents: readonly Incident[], time: number): Mark[] {
     .filter((one) => one.time <= time + 1e-6)
     .slice(-DRAWN)
     .flatMap((one) =>
-      one.x === undefined || one.y === undefined
+      one.x === undefined || one.y === undefined || one.kind === "stranded"
         ? []
         : [
             {

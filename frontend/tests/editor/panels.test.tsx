@@ -293,6 +293,25 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
   return { ...shown, onEdit, onRun };
 }
 
+test("measures are listed with what they do and when", () => {
+  const measures: ScenarioDocument["measures"] = [
+    { id: "shut", kind: "closure", begin: 60, end: 120, places: ["r1"] },
+    {
+      id: "buses",
+      kind: "permission",
+      begin: 0,
+      end: null,
+      places: ["1.0.-1"],
+      allowed: ["bus"],
+      banned: [],
+    },
+  ];
+  toRun({ ...scenario([actor("a")]), measures });
+  expect(screen.getByText("Closure shut")).toBeTruthy();
+  expect(screen.getByText("r1; 1:00.0 to 2:00.0")).toBeTruthy();
+  expect(screen.getByText("only bus: 1.0.-1; 0:00.0 to the end")).toBeTruthy();
+});
+
 test("a run begins in real time with its trajectories, unless another choice is made", async () => {
   const { user, onRun } = toRun(scenario([actor("a")]));
   await user.click(screen.getByRole("button", { name: "Run" }));

@@ -27,6 +27,7 @@ _SINGULAR = {
     "background": "background demand",
     "lines": "line",
     "stops": "stop",
+    "measures": "measure",
 }
 
 

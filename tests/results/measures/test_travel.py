@@ -16,8 +16,8 @@ def test_counts_add_up_and_count_actors_not_events() -> None:
     outcomes = actor_outcomes(plan(planned("a"), planned("b"), planned("c")), EVENTS)
     counts = figure_values(RunData(outcomes), part=SummaryPart.ACTORS)
     assert counts == {
-        "planned": 3, "inserted": 2, "arrived": 1, "running": 1, "waiting": 1, "teleported": 1,
-        "collided": 2, "emergency_stopped": 1,
+        "planned": 3, "inserted": 2, "arrived": 1, "running": 1, "waiting": 1, "stranded": 0,
+        "teleported": 1, "collided": 2, "emergency_stopped": 1,
     }  # fmt: skip
 
 

@@ -27,7 +27,8 @@ def test_every_member_has_words_of_its_own(enumeration: type[ActorStatus]) -> No
 
 def test_files_keep_what_they_have_always_said() -> None:
     assert [*RunStatus, *ActorStatus, *IncidentKind] == [
-        "completed", "failed", "arrived", "running", "waiting", "jam", "moved_on", "kept_out",
+        "completed", "failed", "arrived", "running", "waiting", "stranded", "jam",
+        "moved_on", "kept_out",
     ]  # fmt: skip
     assert set(StopReason) == {
         "vehicles wait for each other in a circle",

@@ -2,7 +2,10 @@ import json
 import re
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from odscen.scenario.document.json_form import loads
+from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.document.scenario_document import Demand
 from odscen.scenario.document.signals_document import JunctionTiming
@@ -51,6 +54,19 @@ def test_the_example_of_public_transport_is_one() -> None:
     example = json.loads("{" + block("transit.md", "json") + "}")["transit"]
     transit = Transit.model_validate_json(json.dumps(example), strict=True)
     assert [one.stop for one in transit.lines[0].stops] == [stop.id for stop in transit.stops]
+
+
+def test_the_examples_of_measures_are_measures_and_each_has_its_picture() -> None:
+    text = (DOCS / "measures.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```json\n(.*?)\n```", text, re.DOTALL)
+    measures = [TypeAdapter(Measure).validate_json(one, strict=True) for one in examples]
+    kinds = {one.kind for one in measures}
+    assert kinds == {
+        "closure", "roadworks", "incident", "speed_limit", "permission", "signal_outage",
+    }  # fmt: skip
+    for one in measures:
+        assert f"images/measure-{one.id}.svg" in text
+        assert (DOCS / f"images/measure-{one.id}.svg").is_file()
 
 
 def test_the_example_of_a_signal_program_is_one() -> None:

@@ -38,8 +38,8 @@ def test_a_run_inserts_everyone_in_place_and_everyone_arrives(
     assert result.exit_code == 0
     actors = result.summary["actors"]
     assert actors == {
-        "planned": 5, "inserted": 5, "arrived": 5, "running": 0, "waiting": 0, "teleported": 0,
-        "collided": 0, "emergency_stopped": 0,
+        "planned": 5, "inserted": 5, "arrived": 5, "running": 0, "waiting": 0, "stranded": 0,
+        "teleported": 0, "collided": 0, "emergency_stopped": 0,
     }  # fmt: skip
     assert result.summary["insertion_error_max"] < 0.001
     assert 20 < result.summary["sim_seconds"] < 200

@@ -1,7 +1,7 @@
 """How long a run was, and how many actors had each outcome.
 
-``planned`` = ``inserted`` + ``waiting``, ``inserted`` = ``arrived`` + ``running``. They count
-actors, not events.
+``planned`` = ``inserted`` + ``waiting``, ``inserted`` = ``arrived`` + ``running`` +
+``stranded``. They count actors, not events.
 """
 
 from __future__ import annotations
@@ -55,14 +55,16 @@ FIGURES = (
         name="inserted",
         unit="",
         label="inserted",
-        definition="Actors that SUMO could place on the road: arrived or running.",
+        definition="Actors that SUMO could place on the road: arrived, running or stranded.",
         source="SUMO, departed",
         better=Better.HIGHER,
         tolerance="0",
         display=COUNT,
         part=SummaryPart.ACTORS,
         section=ReportSection.KEY_FIGURES,
-        compute=lambda run: _with_status(run, ActorStatus.ARRIVED, ActorStatus.RUNNING),
+        compute=lambda run: _with_status(
+            run, ActorStatus.ARRIVED, ActorStatus.RUNNING, ActorStatus.STRANDED
+        ),
     ),
     RunFigure(
         name="arrived",
@@ -102,6 +104,19 @@ FIGURES = (
         part=SummaryPart.ACTORS,
         on_page=True,
         compute=lambda run: _with_status(run, ActorStatus.WAITING),
+    ),
+    RunFigure(
+        name="stranded",
+        unit="",
+        label="stranded by a closure",
+        definition="Actors taken out because a measure had closed every route to their goal.",
+        source="odscen, measures",
+        better=Better.LOWER,
+        tolerance="0",
+        display=COUNT,
+        part=SummaryPart.ACTORS,
+        on_page=True,
+        compute=lambda run: _with_status(run, ActorStatus.STRANDED),
     ),
     RunFigure(
         name="teleported",

@@ -107,6 +107,7 @@ class _ActorHistory:
 
     departure: Event | None = None
     arrival: Event | None = None
+    stranded: bool = False
     teleports: int = 0
     collisions: int = 0
     emergency_stops: int = 0
@@ -123,6 +124,8 @@ class _ActorHistory:
                 self.collisions += 1
             case EventKind.EMERGENCY_STOP:
                 self.emergency_stops += 1
+            case EventKind.STRANDED:
+                self.stranded = True
 
 
 _NO_TRIPS: Mapping[str, Trip] = MappingProxyType({})
@@ -182,15 +185,17 @@ def actor_outcomes(
     return found.outcomes()
 
 
+def _status(history: _ActorHistory) -> ActorStatus:
+    if history.arrival:
+        return ActorStatus.ARRIVED
+    if history.stranded:
+        return ActorStatus.STRANDED
+    return ActorStatus.RUNNING if history.departure else ActorStatus.WAITING
+
+
 def _outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOutcome:
     departure, arrival = history.departure, history.arrival
-    status = (
-        ActorStatus.ARRIVED
-        if arrival
-        else ActorStatus.RUNNING
-        if departure
-        else ActorStatus.WAITING
-    )
+    status = _status(history)
     inserted = departure.time if departure else None
     travel_time = arrival.travel_time if arrival else None
     mean_speed = None

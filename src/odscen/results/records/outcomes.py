@@ -18,12 +18,14 @@ class RunStatus(StrEnum):
 class ActorStatus(StrEnum):
     """What has become of an actor when the run ended.
 
-    ``waiting`` is planned, but not inserted; ``running`` is inserted and has not arrived.
+    ``waiting`` is planned, but not inserted; ``running`` is inserted and has not arrived;
+    ``stranded`` was taken out because a measure had closed every route to its goal.
     """
 
     ARRIVED = "arrived"
     RUNNING = "running"
     WAITING = "waiting"
+    STRANDED = "stranded"
 
     @property
     def label(self) -> str:
@@ -35,6 +37,7 @@ _STATUS_LABELS = {
     ActorStatus.ARRIVED: "arrived",
     ActorStatus.RUNNING: "still under way",
     ActorStatus.WAITING: "not inserted",
+    ActorStatus.STRANDED: "stranded by a closure",
 }
 
 

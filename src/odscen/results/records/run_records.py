@@ -7,7 +7,7 @@ its folder alone. Poses are body centres in the OpenDRIVE frame; metres, radians
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -80,6 +80,31 @@ class PlannedActor:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedMeasure:
+    """A measure of the scenario as reports tell it; ``end`` is at most the end of the run.
+
+    ``lines`` are the centre lines of its lanes, x and y in turn, or one place.
+    """
+
+    id: str
+    kind: str
+    words: str
+    begin: float
+    end: float
+    lines: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedPeriod:
+    """From ``begin`` to ``end`` (s) vehicles of ``vclass`` cannot pass between these edges."""
+
+    begin: float
+    end: float
+    vclass: str
+    pairs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """What a run is to do.
 
@@ -96,6 +121,10 @@ class Plan:
         for a run in one piece.
     trajectories
         Whether they are recorded.
+    measures
+        Of the scenario, by begin.
+    closed
+        What they close, by begin: who would pass there must find another route.
     """
 
     scenario: str
@@ -107,10 +136,12 @@ class Plan:
     elevation: bool = False
     slice_length: float | None = None
     trajectories: bool = True
+    measures: tuple[PlannedMeasure, ...] = ()
+    closed: tuple[ClosedPeriod, ...] = ()
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
-        head = {
+        head: dict[str, Any] = {
             "format": PLAN_FORMAT,
             "version": VERSION,
             "scenario": self.scenario,
@@ -122,6 +153,9 @@ class Plan:
             "slice_length": self.slice_length,
             "trajectories": self.trajectories,
         }
+        if self.measures:
+            head["measures"] = [asdict(one) for one in self.measures]
+            head["closed"] = [asdict(one) for one in self.closed]
         return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
 
     @classmethod
@@ -139,10 +173,21 @@ class Plan:
             x, y = data["net_offset"]
             data["net_offset"] = (float(x), float(y))
             data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
+            data["measures"] = _nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
+            data["closed"] = _nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
             return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
 
 
+def _nested(
+    make: Callable[[Mapping[str, Any]], _Row], rows: Iterable[Mapping[str, Any]], name: str
+) -> tuple[_Row, ...]:
+    """Make rows of which one field has tuples of tuples."""
+    return tuple(make({**row, name: tuple(map(tuple, row[name]))}) for row in rows)
+
+
 _PLANNED_ACTOR = typed_rows(PlannedActor)
+_PLANNED_MEASURE = typed_rows(PlannedMeasure)
+_CLOSED_PERIOD = typed_rows(ClosedPeriod)
 _PLAN = typed_rows(Plan)
 
 
@@ -150,6 +195,8 @@ class EventKind(StrEnum):
     """What can happen to an actor.
 
     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
+    ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
+    and end; their id stands for that of an actor.
     """
 
     DEPARTED = "departed"
@@ -161,6 +208,9 @@ class EventKind(StrEnum):
     JAM_BEGIN = "jam_begin"
     JAM_END = "jam_end"
     LOST = "lost"
+    STRANDED = "stranded"
+    MEASURE_BEGIN = "measure_begin"
+    MEASURE_END = "measure_end"
 
 
 class Event(NamedTuple):
@@ -179,7 +229,8 @@ class Event(NamedTuple):
     travel_time
         Arrivals: seconds since departure.
     detail
-        SUMO's word for the kind of collision; why a vehicle was gridlocked (teleports, jams).
+        SUMO's word for the kind of collision; why a vehicle was gridlocked (teleports, jams); what
+        a measure does.
     waited
         Seconds that the first vehicle in a jam, or a teleported one, was stopped there.
     queue

@@ -41,6 +41,12 @@ EVENT_WORDS = {
         "did not come back when the simulation was reloaded",
         "A limit of the simulator; its trip is not counted as finished.",
     ),
+    EventKind.STRANDED: (
+        "was stranded",
+        "A measure had closed every route to its goal; it was taken out.",
+    ),
+    EventKind.MEASURE_BEGIN: ("began", ""),
+    EventKind.MEASURE_END: ("ended", ""),
 }
 """What happened and why that may be, for the events that are reported."""
 

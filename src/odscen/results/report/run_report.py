@@ -24,6 +24,7 @@ from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
+from odscen.results.report.report_measures import measure_section
 from odscen.results.report.report_service import service_section
 from odscen.results.report.report_signals import signal_section
 from odscen.results.report.report_tables import (
@@ -115,6 +116,7 @@ def render_report(
     body = [
         _head(title, plan, summary, _in_a_sentence(counts)),
         key_figure_section({**given, **counts}, traces),
+        measure_section(plan.measures, int(counts["stranded"] or 0)),
         service_section(figures, shapes) if figures else None,
         _map_section(traces, plan, actors, events, drawing, incidents, every),
         incident_section(incidents),
@@ -168,6 +170,8 @@ def _in_a_sentence(counts: Values) -> str:
     if counts["waiting"]:
         verb = "was" if counts["waiting"] == 1 else "were"
         parts.append(f"{counts['waiting']:,} {verb} not inserted")
+    if counts["stranded"]:
+        parts.append(f"{counts['stranded']:,} stranded by a closure")
     incidents = [
         f"{counts[key]:,} {word}"
         for key, word in (("teleported", "teleported"), ("collided", "collided"))

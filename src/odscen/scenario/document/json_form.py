@@ -12,7 +12,7 @@ from odscen.base.errors import ScenarioError
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
 from odscen.scenario.document.validation import validation_problems
 
-OPTIONAL = ("drivers", "demand", "transit", "signals")
+OPTIONAL = ("drivers", "demand", "transit", "signals", "measures")
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
 """Fields of the simulation that are written always."""
@@ -48,16 +48,13 @@ def dumps(scenario: Scenario) -> str:
     """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
 
     Fields of actors, flows, drivers and demand that have their default value are left out, and so
-    are signals that are all the map's. The same scenario gives the same text, and :func:`loads`
-    gives the same scenario back.
+    are signals that are all the map's, and measures if there are none. The same scenario gives the
+    same text, and :func:`loads` gives the same scenario back.
     """
-    data = scenario.model_dump(mode="json", exclude={"actors", "flows", "demand"})
+    data = scenario.model_dump(mode="json", exclude={"actors", "flows", "demand", "measures"})
     for key in type(scenario).model_fields:
-        if key in ("actors", "flows"):
-            parts = getattr(scenario, key)
-            data[key] = [part.model_dump(mode="json", exclude_defaults=True) for part in parts]
-        elif key in OPTIONAL:
-            data[key] = getattr(scenario, key).model_dump(mode="json", exclude_defaults=True)
+        if key in ("actors", "flows", *OPTIONAL):
+            data[key] = without_defaults(scenario, key)
         elif key == "simulation":
             said = scenario.simulation.model_dump(mode="json", exclude_defaults=True)
             data[key] = {name: data[key][name] for name in ALWAYS} | said
@@ -67,6 +64,14 @@ def dumps(scenario: Scenario) -> str:
         if key not in OPTIONAL or data[key]
     ]
     return "{\n" + ",\n".join(fields) + "\n}\n"
+
+
+def without_defaults(scenario: Scenario, field: str) -> Any:
+    """JSON of a field, a part or a list of parts, without what has its default value."""
+    value = getattr(scenario, field)
+    if isinstance(value, tuple):
+        return [part.model_dump(mode="json", exclude_defaults=True) for part in value]
+    return value.model_dump(mode="json", exclude_defaults=True)
 
 
 def schema() -> dict[str, Any]:

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 from odscen.base.categories import Category
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
+from odscen.scenario.document.measures_document import Measure  # noqa: TC001 - read by pydantic
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.transit_document import Transit
 
@@ -282,6 +283,8 @@ class Scenario(Part):
         Stops and lines of public transport.
     signals
         How traffic lights are run.
+    measures
+        Closures, roadworks, incidents, limits, permissions and signal outages, each with its times.
     simulation
         Duration and step length, s.
     """
@@ -302,4 +305,5 @@ class Scenario(Part):
     demand: Demand = Demand()
     transit: Transit = Transit()
     signals: Signals = Signals()
+    measures: tuple[Measure, ...] = ()
     simulation: Simulation = Simulation()

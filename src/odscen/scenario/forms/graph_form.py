@@ -25,7 +25,7 @@ from odscen.scenario.checks.scenario_checks import (
     roi_problems,
     shared_nodes,
 )
-from odscen.scenario.document.json_form import OPTIONAL
+from odscen.scenario.document.json_form import OPTIONAL, without_defaults
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.scenario_document import (
     FORMAT,
@@ -51,7 +51,9 @@ _One = TypeVar("_One", bound=Actor | Flow)
 GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
-_JSON = ("roi", "environment", "drivers", "demand", "transit", "signals", "simulation")
+_JSON = (
+    "roi", "environment", "drivers", "demand", "transit", "signals", "measures", "simulation",
+)  # fmt: skip
 """Graph attributes that hold JSON."""
 
 
@@ -125,7 +127,7 @@ def from_graphml(text: str, *, file: str | None = None) -> Scenario:
 def _about(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
     for name in OPTIONAL:
-        data[name] = getattr(scenario, name).model_dump(mode="json", exclude_defaults=True)
+        data[name] = without_defaults(scenario, name)
     held = [name for name in _JSON if name not in OPTIONAL or data[name]]
     return {
         "format": FORMAT,

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.light_realization import RealizedLight, SumoProgram
     from odscen.sumo.realize.stage_phases import SumoPhase
 
+FLASHING = "flashing"
+"""Program of a light that is out of order and flashes."""
+
 DETECTOR_PARAM = "odscen.detector"
 """Parameter of a loop that has the detector's name in the scenario."""
 
@@ -32,7 +35,7 @@ def signals_xml(lights: Iterable[RealizedLight], *, buses: Sequence[str] = ()) -
     """
     lines: list[str] = []
     for light in lights:
-        if light.programs:
+        if light.programs or light.switches:
             lines += [_loop_xml(loop) for loop in light.loops]
             lines += [_bus_xml(area, buses) for area in light.buses]
             lines += [_area_xml(area) for area in light.areas]
@@ -107,15 +110,16 @@ def _attributes(phase: SumoPhase, kind: str) -> Iterator[str]:
 
 
 def _switches_xml(light: RealizedLight) -> Iterator[str]:
-    """Plans of the day: SUMO waits for the begin of the first stage, and falls in step there."""
-    if len(light.programs) < 2:
+    """Plans of the day, or outages: SUMO switches plans at the begin of the first stage."""
+    if len(light.programs) < 2 and len(light.switches) < 2:
         return
+    known = {program.id for program in light.programs}
+    outage = any(program not in known for _, program in light.switches) or FLASHING in known
     name = light.shown.id
     yield f'    <WAUT id="plans.{name}" refTime="0" startProg="{light.switches[0][1]}">'
     for time, program in light.switches[1:]:
         yield f'        <wautSwitch time="{time:g}" to="{program}"/>'
     yield "    </WAUT>"
-    yield (
-        f'    <wautJunction wautID="plans.{name}" junctionID="{name}" procedure="GSP"'
-        ' synchron="true"/>'
-    )
+    # Plans wait for a stage that both have; a light that fails does so at once.
+    procedure = "" if outage else ' procedure="GSP" synchron="true"'
+    yield f'    <wautJunction wautID="plans.{name}" junctionID="{name}"{procedure}/>'

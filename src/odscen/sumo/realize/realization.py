@@ -24,6 +24,7 @@ from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
 from odscen.scenario.signals.detectors import without_detectors
 from odscen.sumo.folder.layout import (
+    CLOSURES_FILE,
     CONFIG_FILE,
     MEASURES_FILE,
     REGION_FILE,
@@ -43,6 +44,12 @@ from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumocfg import SSM_PARAMETER, SumocfgSettings, sumo_config
+from odscen.sumo.realize.traffic_measures.breakdowns import breakdowns
+from odscen.sumo.realize.traffic_measures.measure_actions import (
+    MeasureActions,
+    measure_actions,
+)
+from odscen.sumo.realize.traffic_measures.signal_outages import with_outages
 from odscen.sumo.realize.transit.line_vehicles import line_users
 from odscen.sumo.realize.transit.stop_places import left_out, stop_places, stops_xml
 from odscen.sumo.realize.usable import usable_places
@@ -131,8 +138,12 @@ def realize(
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
     demand = RoutesFile((SSM_PARAMETER,) if recording.criticality else ())
+    for vehicle in breakdowns(scenario, sumo_map, until=until):
+        demand.add_breakdown(vehicle)
+    actions = measure_actions(scenario, sumo_map, until=until)
     stops = stop_places(scenario, sumo_map)
     writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length, stops)
+    writer.actions = actions
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -143,15 +154,27 @@ def realize(
         elevation=sumo_map.elevation,
         slice_length=slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
+        measures=actions.measures,
+        closed=actions.closed,
     )
     if settings.meso:
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
-    lights = realized_lights(scenario, sumo_map, until=until)
+    lights = with_outages(
+        realized_lights(scenario, sumo_map, until=until), scenario, sumo_map, until=until
+    )
     signals = signals_xml(lights, buses=demand.types_of(Category.BUS))
     files = {
         ROUTES_FILE: demand.to_xml(),
         **({STOPS_FILE: stops_xml(stops)} if stops else {}),
-        **_run_files(plan, settings, scenario.simulation, signals, lights, stops=bool(stops)),
+        **_run_files(
+            plan,
+            settings,
+            scenario.simulation,
+            signals,
+            lights,
+            stops=bool(stops),
+            closures=actions.xml,
+        ),
     }
     return Realization(
         files,
@@ -170,6 +193,7 @@ def _run_files(
     lights: Sequence[RealizedLight],
     *,
     stops: bool,
+    closures: str | None,
 ) -> dict[str, str]:
     """What SUMO reads beside network and routes; ``signals`` are programs that differ.
 
@@ -183,6 +207,7 @@ def _run_files(
         elevation=plan.elevation,
         signals=signals is not None,
         stops=stops,
+        closures=closures is not None,
         recording=recording,
         measures=True,
         meso=settings.meso,
@@ -203,6 +228,8 @@ def _run_files(
     }
     if signals is not None:
         files[SIGNALS_FILE] = signals
+    if closures is not None:
+        files[CLOSURES_FILE] = closures
     if recording.region is not None:
         files[REGION_FILE] = region_xml(recording.region, plan.net_offset)
     return files
@@ -272,7 +299,9 @@ class _Writer:
         self.demand = demand
         self.problems: list[str] = []
         self.notes: list[str] = []
+        self.actions = MeasureActions()
         self._graph = graph
+        self._net = sumo_map.net
         self._region = region
         self._assets = assets
         self._scenario = scenario
@@ -318,6 +347,9 @@ class _Writer:
             return self._walks.plan(path, length=body.length, lateral_offset=offset)
         vclass = KINDS[user.category].vclass
         route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        route = self.actions.fitted(
+            route, self._net, length=body.length, depart=user.depart, vclass=vclass
+        )
         missed = left_out((self._stops[visit.stop] for visit in user.visits), route.edges)
         if missed is not None:
             msg = f"its route on the SUMO network does not pass stop {missed.id!r}"

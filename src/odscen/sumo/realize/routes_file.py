@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.driving import Driver
     from odscen.sumo.realize.road_user import RoadUser, StopVisit
     from odscen.sumo.realize.route_planner import Route
+    from odscen.sumo.realize.traffic_measures.breakdowns import Breakdown
     from odscen.sumo.realize.walk_planner import Walk
 
 
@@ -36,6 +37,7 @@ class RoutesFile:
         self._counts: dict[str, int] = {}
         self._on_foot: set[str] = set()
         self._lines: list[tuple[float, str, list[str]]] = []
+        self._breakdowns: list[str] = []
 
     def add_vehicle(
         self, user: RoadUser, driver: Driver, route: Route, *, bays: Collection[str] = ()
@@ -87,6 +89,11 @@ class RoutesFile:
         lines = [f"    <person{_xml(person)}>", f"        <walk{_xml(stage)}/>", "    </person>"]
         self._lines.append((user.depart, user.id, lines))
 
+    def add_breakdown(self, vehicle: Breakdown) -> None:
+        """Add the vehicle of an incident."""
+        self._breakdowns.append(vehicle.type_line())
+        self._lines.append((vehicle.depart, vehicle.id, list(vehicle.lines())))
+
     def to_xml(self) -> str:
         """Text of ``routes.rou.xml``."""
         head = [
@@ -94,6 +101,7 @@ class RoutesFile:
             for attributes, name in self._types.items()
             for line in self._type_lines(name, attributes)
         ]
+        head += self._breakdowns
         body = [line for _, _, lines in sorted(self._lines) for line in lines]
         return "\n".join(
             ['<?xml version="1.0" encoding="UTF-8"?>', "<routes>", *head, *body, "</routes>", ""]

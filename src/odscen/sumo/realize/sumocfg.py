@@ -10,6 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 from odscen.results.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
 from odscen.sumo.folder.layout import (
+    CLOSURES_FILE,
     MEASURES_FILE,
     NET_FILE,
     REGION_FILE,
@@ -65,6 +66,8 @@ class SumocfgSettings:
         Whether there are programs of traffic lights beside the network's own.
     stops
         Whether there are stops of lines, and what vehicles do there is recorded.
+    closures
+        Whether measures of the scenario close lanes or set limits.
     recording
         What is recorded.
     measures
@@ -83,6 +86,7 @@ class SumocfgSettings:
     elevation: bool = False
     signals: bool = False
     stops: bool = False
+    closures: bool = False
     recording: Recording = field(default_factory=Recording)
     measures: bool = False
     meso: bool = False
@@ -95,6 +99,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
     additional = [SIGNALS_FILE] if settings.signals else []
     if settings.stops:
         additional.append(STOPS_FILE)
+    additional += [CLOSURES_FILE] if settings.closures else []
     if recording.region is not None:
         additional.append(REGION_FILE)
     if settings.measures:

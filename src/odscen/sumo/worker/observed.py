@@ -96,3 +96,21 @@ class Ahead(NamedTuple):
     leader: str | None
     people: bool
     beside: bool = False
+
+
+class RouteAhead(NamedTuple):
+    """Normal edges that a vehicle has before it.
+
+    Attributes
+    ----------
+    start
+        Edge inside a junction on which it is to depart, if it is.
+    edges
+        From its own on.
+    inside
+        Whether it is inside a junction, so that it cannot get another route yet.
+    """
+
+    start: tuple[str, ...]
+    edges: tuple[str, ...]
+    inside: bool

@@ -116,6 +116,15 @@ class Recorder:
         """Say that the run ends because the road is empty: every jam is over."""
         self.events.extend(self._jams.road_is_empty(time))
 
+    def add(self, events: Sequence[Event]) -> None:
+        """Add what measures did in the last step; who is stranded is not under way any more."""
+        if not events:
+            return
+        self.events.extend(events)
+        for event in events:
+            if event.kind is EventKind.STRANDED:
+                self._departures.pop(event.actor, None)
+
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
         self.events.extend(Event(time, EventKind.LOST, name) for name in sorted(names))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from odscen.sumo.worker.diversions import Diversions
 from odscen.sumo.worker.protocol import Progress
 from odscen.sumo.worker.recorder import Recorder
 
@@ -48,6 +49,7 @@ class Stepper:
         self.recorder = Recorder(plan)
         self.steps = 0
         self._plan = plan
+        self._diversions = Diversions(plan) if plan.measures else None
         self._send = send
         self._watch = watch
         self._sent = 0.0
@@ -78,6 +80,9 @@ class Stepper:
                 if not watch.next_step(session, self.recorder):
                     break
                 waited += clock() - asked
+            if self._diversions is not None:
+                step = self._plan.step_length
+                self.recorder.add(self._diversions.before_step(session, now, step))
             after = session.step()
             record(session, now)
             now = after
@@ -88,6 +93,9 @@ class Stepper:
         self._busy += clock() - begin - waited
         if not more and session.expected() == 0:
             self.recorder.road_is_empty(now)
+        over = now >= self._plan.until or (not more and session.expected() == 0)
+        if self._diversions is not None and over:
+            self.recorder.add(self._diversions.last_events(now))
         if self._watch is not None:  # a user who watches sees how it ends
             self._watch.show_last(session, self.recorder)
             self._report(session, now, self._busy)

@@ -1,0 +1,29 @@
+import { Text } from "@mantine/core";
+
+import type { Measure } from "./measures";
+import { inWords } from "./measures";
+
+/** The measures of the scenario, with begin and end; their places are orange on the map. */
+export function MeasureList({ measures }: { measures: readonly Measure[] }) {
+  if (measures.length === 0) return null;
+  return (
+    <section aria-labelledby="measures">
+      <Text id="measures" size="sm" fw={500}>
+        Measures
+      </Text>
+      <ul style={{ margin: 0, paddingLeft: 18 }}>
+        {measures.map((measure) => {
+          const { title, detail, when } = inWords(measure);
+          return (
+            <li key={measure.id}>
+              <Text size="sm">{title}</Text>
+              <Text size="xs" c="dimmed">
+                {detail}; {when}
+              </Text>
+            </li>
+          );
+        })}
+      </ul>
+    </section>
+  );
+}

@@ -1,0 +1,179 @@
+"""The rules on measures: places and lights that are there, times, and who finds no other route."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.lanegraph.shortest_paths import Router
+from odscen.scenario.checks.measure_places import PlaceNames, UnknownPlace
+from odscen.scenario.document.measures_document import (
+    LaneIncident,
+    SignalOutage,
+    banned_by,
+    closed_places,
+    named_places,
+)
+from odscen.scenario.document.problems import error, warning
+from odscen.scenario.signals.light import find_light
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from odscen.base.arrays import BoolArray
+    from odscen.base.categories import Category
+    from odscen.scenario.document.measures_document import Measure
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.placing.region import Region
+    from odscen.scenario.signals.light import Light
+
+SLACK = 0.1
+"""Metres by which a place may lie beyond the ends of a lane."""
+
+
+def measure_problems(
+    scenario: Scenario, region: Region, lights: Sequence[Light] | None = None
+) -> Iterator[Problem]:
+    """Yield what is wrong with the measures of a scenario.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map for the rules on outages; without them those are left out.
+    """
+    if not scenario.measures:
+        return
+    places = PlaceNames(region.graph)
+    yield from _twice(scenario)
+    for index, measure in enumerate(scenario.measures):
+        where = f"measures[{index}]"
+        yield from _time_problems(scenario, measure, where)
+        yield from _place_problems(measure, places, where)
+        if isinstance(measure, LaneIncident):
+            yield from _incident_problems(measure, places, region, where)
+        if isinstance(measure, SignalOutage) and lights is not None:
+            yield from _outage_problems(scenario, measure, lights, where)
+    yield from _cut_off(scenario, region, places)
+
+
+def _twice(scenario: Scenario) -> Iterator[Problem]:
+    """Yield ids that two measures have, or a measure and an actor: events name both alike."""
+    others = [*scenario.actors, *scenario.flows, *(part for _, part in scenario.demand.parts)]
+    taken = Counter([*(one.id for one in others), *(one.id for one in scenario.measures)])
+    for index, measure in enumerate(scenario.measures):
+        if taken[measure.id] > 1:
+            message = f"id {measure.id!r} is taken {taken[measure.id]} times; give each its own"
+            yield error("duplicate_id", f"measures[{index}].id", message)
+
+
+def _time_problems(scenario: Scenario, measure: Measure, where: str) -> Iterator[Problem]:
+    duration = scenario.simulation.duration
+    if measure.begin >= duration:
+        message = (
+            f"{measure.id!r} begins at {measure.begin:g} s, but the run ends at {duration:g} s; "
+            "begin earlier or run longer"
+        )
+        yield warning("measure_too_late", f"{where}.begin", message)
+
+
+def _place_problems(measure: Measure, places: PlaceNames, where: str) -> Iterator[Problem]:
+    for field, name in named_places(measure):
+        found = places.find(name)
+        here = f"{where}.{field}"
+        if isinstance(found, UnknownPlace):
+            yield error(found.code, here, found.message, segments=found.segments)
+        elif found.turn and not field.startswith("places"):
+            yield error("place_broken", here, f"{name!r} is a turn; give a lane here")
+        elif found.turn and measure.kind in ("speed_limit", "roadworks"):
+            message = f"{name!r} is a turn; a limit needs segments or lanes"
+            yield error("place_broken", here, message)
+
+
+def _incident_problems(
+    measure: LaneIncident, places: PlaceNames, region: Region, where: str
+) -> Iterator[Problem]:
+    nodes = places.lane_nodes(measure.lane)
+    if nodes is None:
+        if not isinstance(places.find(measure.lane), UnknownPlace):
+            message = f"{measure.lane!r} is no lane; name one, such as 12.0.-1"
+            yield error("unknown_place", f"{where}.lane", message)
+        return
+    lanes = region.graph.lanes
+    low, high = float(lanes.s[nodes].min()), float(lanes.s[nodes].max())
+    if not low - lanes.spacing - SLACK <= measure.s <= high + lanes.spacing + SLACK:
+        message = f"lane {measure.lane!r} lies between s {low:g} and {high:g} m"
+        yield error("place_off_lane", f"{where}.s", message)
+    if lanes.lanes.junctions[int(lanes.lane[nodes[0]])] is not None:
+        message = f"lane {measure.lane!r} lies in a junction; block a lane before or behind it"
+        yield error("place_in_junction", f"{where}.lane", message)
+
+
+def _outage_problems(
+    scenario: Scenario, measure: SignalOutage, lights: Sequence[Light], where: str
+) -> Iterator[Problem]:
+    here = f"{where}.junction"
+    light = find_light(lights, measure.junction)
+    if light is None:
+        names = ", ".join(sorted(one.names[0] for one in lights)[:10]) or "none"
+        message = f"there is no traffic light in junction {measure.junction!r}; there are {names}"
+        yield error("unknown_light", here, message)
+        return
+    for timing in scenario.signals.junctions:
+        if timing.junction in light.names and timing.plans:
+            message = f"the light of {measure.junction!r} has plans of the day; take them out first"
+            yield error("outage_with_plans", here, message)
+    same = [
+        one
+        for one in scenario.measures
+        if isinstance(one, SignalOutage) and one.junction in light.names
+    ]
+    for other in same[: same.index(measure)]:
+        if _overlap(measure, other):
+            message = f"{measure.id!r} and {other.id!r} switch one light at the same time"
+            yield error("light_twice", here, message)
+
+
+def _overlap(one: Measure, other: Measure) -> bool:
+    ends = (float("inf") if each.end is None else each.end for each in (one, other))
+    return max(one.begin, other.begin) < min(ends)
+
+
+def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator[Problem]:
+    """Yield placed actors that depart while every route to their goal is closed."""
+    routers: dict[bytes, Router] = {}
+    for index, actor in enumerate(scenario.actors):
+        closing = [one for one in scenario.measures if _stops(one, actor.category, actor.depart)]
+        spawn = region.place(actor.spawn)
+        goal = None if actor.goal is None else region.place(actor.goal)
+        if not closing or spawn is None or goal is None or spawn.walk or goal.walk:
+            continue
+        closed = _closed_nodes(closing, places, len(region.lanes))
+        own = region.graph.lanes.segment == region.graph.lanes.segment[spawn.node]
+        mask = region.lanes & (~closed | (own & closed[spawn.node]))
+        router = routers.setdefault(mask.tobytes(), Router(region.graph, mask))
+        if not mask[goal.node] or not router.reachable(spawn.node)[goal.node]:
+            names = ", ".join(repr(one.id) for one in closing)
+            message = (
+                f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "
+                "to its goal; it will be stranded"
+            )
+            yield warning("only_route_closed", f"actors[{index}].goal", message)
+
+
+def _stops(measure: Measure, category: Category, time: float) -> bool:
+    if not closed_places(measure) or not measure.begin <= time:
+        return False
+    return (measure.end is None or time < measure.end) and category in banned_by(measure)
+
+
+def _closed_nodes(measures: Iterable[Measure], places: PlaceNames, size: int) -> BoolArray:
+    closed = np.zeros(size, dtype=np.bool_)
+    for measure in measures:
+        for name in closed_places(measure):
+            found = places.find(name)
+            if not isinstance(found, UnknownPlace):
+                closed |= found.nodes
+    return closed

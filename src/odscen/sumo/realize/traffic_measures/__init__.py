@@ -1,0 +1,1 @@
+"""What measures of a scenario do in SUMO: additional files, switched lights, closed turns."""

@@ -1,0 +1,298 @@
+"""What the measures of a scenario do, as an additional file of SUMO's and as part of the plan.
+
+Lanes are closed by SUMO's rerouters, limits set by its variable speed signs: both hold in plain
+``sumo`` too, and after a saved state is loaded, where SUMO takes up what is active at its begin.
+Neither leads drivers around: the run does that, see :mod:`odscen.sumo.worker.diversions`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from odscen.results.records.run_records import ClosedPeriod, PlannedMeasure
+from odscen.scenario.document.measures_document import (
+    ChangedPermission,
+    LaneIncident,
+    RoadClosure,
+    Roadworks,
+    SignalOutage,
+    SpeedLimit,
+    banned_by,
+    closed_places,
+    measure_words,
+    named_places,
+)
+from odscen.sumo.realize.driving import KINDS
+from odscen.sumo.realize.traffic_measures.measured_lanes import MeasuredLanes, by_lane, periods
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from odscen.scenario.document.measures_document import Measure
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.road_net import RoadNet, RoadNetLane
+    from odscen.sumo.realize.route_planner import Route
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+NARROW = ((3.66, 0.0), (3.35, 3.1), (3.05, 10.6))
+"""Least lane width (m) and what it takes off the free-flow speed (km/h); below, the last.
+
+Highway Capacity Manual, 6th edition, exhibit 12-20: 12 ft 0, 11 ft 1.9 mi/h, 10 ft 6.6 mi/h.
+"""
+
+SLOWEST = 1.0
+"""m/s that a limit is lowered to at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedLanes:
+    """Lanes that vehicles of some classes may not enter for a time."""
+
+    id: str
+    begin: float
+    end: float
+    lanes: tuple[str, ...]
+    banned: frozenset[str]
+
+
+@dataclass(frozen=True)
+class MeasureActions:
+    """Additional file, ``None`` if nothing is in it, and what goes into the plan."""
+
+    xml: str | None = None
+    measures: tuple[PlannedMeasure, ...] = ()
+    closed: tuple[ClosedPeriod, ...] = ()
+    closings: tuple[ClosedLanes, ...] = ()
+
+    def fitted(
+        self, route: Route, net: RoadNet, *, length: float, depart: float, vclass: str
+    ) -> Route:
+        """Let a route begin and end where closures leave it.
+
+        The front of a body of ``length`` metres reaches over where its centre is to be: into the
+        junction where its lane ends, or onto the road behind its goal. A route that meets something
+        closed begins and ends on a road instead: SUMO refuses other routes to vehicles that depart
+        inside a junction. Who would depart on a closed lane departs on the nearest open one.
+        """
+        if not self.closings:
+            return route
+        return self._departing(
+            self._ending(self._beginning(route, net), net, length=length), net, depart, vclass
+        )
+
+    def _beginning(self, route: Route, net: RoadNet) -> Route:
+        first = net.edge_lanes[route.edges[0]][0]
+        before = net.links_to.get(first.id, ()) if first.internal else ()
+        if not before:
+            return route
+        lane = net.lanes[before[0].source]
+        edges = (lane.edge, *route.edges[1:])
+        passed = {first.id, *(one.id for one in net.leaving(first.id))}
+        if passed.isdisjoint(self._lanes) and not self._meets(edges):
+            return route
+        return replace(route, edges=edges, depart_lane=lane.index, depart_pos=lane.length)
+
+    def _ending(self, route: Route, net: RoadNet, *, length: float) -> Route:
+        edges = route.edges
+        if len(edges) < 3 or route.arrival_pos > length or edges[-2:] not in self._pairs:
+            return route
+        pos = net.edge_length(edges[-2])
+        return replace(route, edges=edges[:-1], arrival_lane=None, arrival_pos=pos)
+
+    def _departing(self, route: Route, net: RoadNet, depart: float, vclass: str) -> Route:
+        closed = {
+            lane
+            for one in self.closings
+            if one.begin <= depart < one.end and vclass in one.banned
+            for lane in one.lanes
+        }
+        lanes = net.edge_lanes[route.edges[0]]
+        if lanes[route.depart_lane].id not in closed:
+            return route
+        rest = [one for one in lanes if one.id not in closed and one.allows(vclass)]
+        if not rest:
+            return route
+        nearest = min(rest, key=lambda one: abs(one.index - route.depart_lane))
+        return replace(route, depart_lane=nearest.index)
+
+    def _meets(self, edges: tuple[str, ...]) -> bool:
+        return any(pair in self._pairs for pair in pairwise(edges))
+
+    @cached_property
+    def _pairs(self) -> set[tuple[str, ...]]:
+        return {pair for period in self.closed for pair in period.pairs}
+
+    @cached_property
+    def _lanes(self) -> set[str]:
+        return {lane for one in self.closings for lane in one.lanes}
+
+
+def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> MeasureActions:
+    """Work out what the measures of a scenario do in a run of ``until`` seconds.
+
+    Raises
+    ------
+    ScenarioError
+        If a place is not on the map.
+    """
+    active = [one for one in scenario.measures if one.begin < until]
+    if not active:
+        return MeasureActions()
+    found = MeasuredLanes(sumo_map)
+    closings = [
+        ClosedLanes(
+            one.id,
+            one.begin,
+            end_of(one, until),
+            found.closed_by(closed_places(one)),
+            frozenset(KINDS[category].vclass for category in banned_by(one)),
+        )
+        for one in active
+        if isinstance(one, RoadClosure | Roadworks | ChangedPermission) and closed_places(one)
+    ]
+    lines = [*_rerouters(closings, found), *_signs(active, found, until)]
+    xml = "\n".join(["<additional>", *lines, "</additional>", ""]) if lines else None
+    planned = sorted((_planned(one, found, sumo_map, until) for one in active), key=_when)
+    return MeasureActions(
+        xml,
+        tuple(planned),
+        tuple(_closed(closings, found, until)),
+        tuple(closings),
+    )
+
+
+def end_of(measure: Measure, until: float) -> float:
+    """Seconds at which a measure ends in a run."""
+    return until if measure.end is None else min(measure.end, until)
+
+
+def narrowed(width: float) -> float:
+    """What a lane of so many metres takes off the free-flow speed, m/s."""
+    less = next((kmh for least, kmh in NARROW if width >= least), NARROW[-1][1])
+    return less / 3.6
+
+
+def _when(measure: PlannedMeasure) -> tuple[float, str]:
+    return measure.begin, measure.id
+
+
+def _rerouters(closings: Sequence[ClosedLanes], found: MeasuredLanes) -> Iterator[str]:
+    for one in closings:
+        if not one.lanes:
+            continue
+        edges = " ".join(found.predecessors(one.lanes))
+        yield f"    <rerouter id={quoteattr(f'closed.{one.id}')} edges={quoteattr(edges)}>"
+        yield f'        <interval begin="{one.begin:g}" end="{one.end:g}">'
+        for name in one.lanes:
+            who = _permission(found.net.lanes[name], one.banned)
+            yield f"            <closingLaneReroute id={quoteattr(name)} {who}/>"
+        yield "        </interval>"
+        yield "    </rerouter>"
+
+
+def _permission(lane: RoadNetLane, banned: frozenset[str]) -> str:
+    """Say who may still use a lane; SUMO starts from all classes, not from those of the lane."""
+    if lane.allowed is None:
+        return f'disallow="{" ".join(sorted(banned))}"'
+    left = sorted(lane.allowed - banned)
+    return f'allow="{" ".join(left)}"' if left else 'disallow="all"'
+
+
+def _signs(measures: Sequence[Measure], found: MeasuredLanes, until: float) -> Iterator[str]:
+    limits = by_lane(_limits(measures, found, until))
+    alike: dict[tuple[tuple[float, float], ...], list[str]] = {}
+    for lane, spans in sorted(limits.items()):
+        alike.setdefault(_steps(spans, until), []).append(lane)
+    for number, (steps, lanes) in enumerate(alike.items()):
+        yield f'    <variableSpeedSign id="limit.{number}" lanes={quoteattr(" ".join(lanes))}>'
+        yield from (f'        <step time="{time:g}" speed="{speed:g}"/>' for time, speed in steps)
+        yield "    </variableSpeedSign>"
+
+
+def _limits(
+    measures: Sequence[Measure], found: MeasuredLanes, until: float
+) -> Iterator[tuple[str, float, float, float]]:
+    for one in measures:
+        if not isinstance(one, SpeedLimit | Roadworks):
+            continue
+        if isinstance(one, Roadworks) and one.speed is None and one.width is None:
+            continue
+        for lane in sorted({lane for name in one.places for lane in found.lanes(name)}):
+            speed = found.net.lanes[lane].speed if one.speed is None else one.speed
+            if isinstance(one, Roadworks) and one.width is not None:
+                speed = max(SLOWEST, speed - narrowed(one.width))
+            yield lane, one.begin, end_of(one, until), round(speed, 4)
+
+
+def _steps(
+    spans: Sequence[tuple[float, float, float]], until: float
+) -> tuple[tuple[float, float], ...]:
+    """When which limit holds; -1 is the lane's own."""
+    steps: list[tuple[float, float]] = []
+    for begin, end in periods(((b, e) for b, e, _ in spans), until):
+        held = [speed for b, e, speed in spans if b <= begin and end <= e]
+        speed = min(held, default=-1.0)
+        if steps[-1:] and steps[-1][1] == speed:
+            continue
+        if steps or speed >= 0.0:
+            steps.append((begin, speed))
+    return tuple(steps)
+
+
+def _closed(
+    closings: Sequence[ClosedLanes], found: MeasuredLanes, until: float
+) -> Iterator[ClosedPeriod]:
+    classes = sorted({vclass for one in closings for vclass in one.banned})
+    for begin, end in periods(((one.begin, one.end) for one in closings), until):
+        for vclass in classes:
+            closed = frozenset(
+                lane
+                for one in closings
+                if one.begin <= begin and end <= one.end and vclass in one.banned
+                for lane in one.lanes
+            )
+            if pairs := found.broken_links(closed, vclass):
+                yield ClosedPeriod(begin, end, vclass, pairs)
+
+
+def _planned(
+    measure: Measure, found: MeasuredLanes, sumo_map: SumoMap, until: float
+) -> PlannedMeasure:
+    if isinstance(measure, SignalOutage):
+        lines = _light_place(measure, sumo_map)
+    elif isinstance(measure, LaneIncident):
+        nodes = found.places.lane_nodes(measure.lane)
+        lanes = sumo_map.graph.lanes
+        lines = ()
+        if nodes is not None:
+            near = int(nodes[np.argmin(np.abs(lanes.s[nodes] - measure.s))])
+            lines = ((round(float(lanes.x[near]), 2), round(float(lanes.y[near]), 2)),)
+    else:
+        lines = tuple(
+            line for _, name in named_places(measure) for line in found.line(found.find(name).nodes)
+        )
+    return PlannedMeasure(
+        id=measure.id,
+        kind=measure.kind,
+        words=measure_words(measure),
+        begin=measure.begin,
+        end=end_of(measure, until),
+        lines=lines,
+    )
+
+
+def _light_place(measure: SignalOutage, sumo_map: SumoMap) -> tuple[tuple[float, ...], ...]:
+    """Middle of what a light controls."""
+    for light in sumo_map.lights:
+        if measure.junction in (light.id, *light.junctions):
+            points = [point for link in light.links for point in link.path]
+            if points:
+                middle = np.mean(np.array(points), axis=0).round(2)
+                return (tuple(middle.tolist()),)
+    return ()

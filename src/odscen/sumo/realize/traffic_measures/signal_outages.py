@@ -1,0 +1,66 @@
+"""Traffic lights out of order: SUMO's WAUT switches them off, or to flashing, and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from odscen.convert.model.net import CROSSED
+from odscen.scenario.document.measures_document import SignalOutage
+from odscen.sumo.realize.light_realization import SumoProgram
+from odscen.sumo.realize.program_files import FLASHING
+from odscen.sumo.realize.stage_phases import PhasePlan, SumoPhase
+from odscen.sumo.realize.traffic_measures.measure_actions import end_of
+
+if TYPE_CHECKING:
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.light_realization import RealizedLight
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+NET_PROGRAM = "0"
+"""Program of a light in our networks."""
+
+_AROUND = 90.0
+"""Seconds of the only phase of a flashing light."""
+
+
+def with_outages(
+    lights: tuple[RealizedLight, ...], scenario: Scenario, sumo_map: SumoMap, *, until: float
+) -> tuple[RealizedLight, ...]:
+    """Let lights switch as the measures of a scenario say; without any, the same lights."""
+    outages = [
+        one for one in scenario.measures if isinstance(one, SignalOutage) and one.begin < until
+    ]
+    if not outages:
+        return lights
+    return tuple(
+        _switched(
+            light, sumo, [o for o in outages if o.junction in (sumo.id, *sumo.junctions)], until
+        )
+        for light, sumo in zip(lights, sumo_map.lights, strict=True)
+    )
+
+
+def _switched(
+    light: RealizedLight, sumo: SumoLight, outages: list[SignalOutage], until: float
+) -> RealizedLight:
+    if not outages:
+        return light
+    usual = light.programs[0].id if light.programs else NET_PROGRAM
+    switches: list[tuple[float, str]] = [(0.0, usual)]
+    for one in sorted(outages, key=lambda outage: outage.begin):
+        switches.append((one.begin, one.shows))
+        if one.end is not None and one.end < until:
+            switches.append((end_of(one, until), usual))
+    programs = light.programs
+    if any(one.shows == FLASHING for one in outages):
+        programs = (*programs, _flashing(sumo))
+    return replace(light, programs=programs, switches=tuple(switches))
+
+
+def _flashing(light: SumoLight) -> SumoProgram:
+    """All vehicles give way; who walks has right of way, as at any crosswalk."""
+    state = "".join("O" if link.turn == CROSSED else "o" for link in light.links)
+    phase = SumoPhase(_AROUND, state, FLASHING)
+    return SumoProgram(FLASHING, "static", 0.0, PhasePlan((phase,), 1), {}, {})

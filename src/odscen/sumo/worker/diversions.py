@@ -1,0 +1,139 @@
+"""What measures of the scenario do during a run: who finds a turn closed takes another route.
+
+When a closure begins every driver knows of it: those on the road whose route leads over what is
+closed take the quickest other one in free flow, and so do those who depart later. Who has none is
+stranded, and taken out. SUMO's rerouters close the lanes, in plain ``sumo`` too; but they know no
+closed turns, and end trips to a closed goal anywhere.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from odscen.results.records.run_records import Event, EventKind
+from odscen.sumo.worker.detours import Detours
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from odscen.results.records.run_records import Plan
+    from odscen.sumo.worker.detours import Pairs
+    from odscen.sumo.worker.session import Session
+
+
+class Diversions:
+    """Follows the measures of one simulation, step by step; nothing is kept between slices."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._measures = plan.measures
+        self._closed = plan.closed
+        self._offset = plan.net_offset
+        self._last = plan.until
+        moments = {one.begin for one in plan.closed} | {one.end for one in plan.closed}
+        moments |= {one.begin for one in plan.measures} | {one.end for one in plan.measures}
+        self._moments = sorted(moments)
+        vehicles = sorted((one.depart, one.id) for one in plan.actors if not one.person)
+        self._departs = [depart for depart, _ in vehicles]
+        self._names = [name for _, name in vehicles]
+        self._pairs: Mapping[str, Pairs] = {}
+        self._detours: Detours | None = None
+        self._inside: set[str] = set()
+        self._cut_off: set[str] = set()
+        self._begun = False
+
+    def before_step(self, session: Session, begin: float, length: float) -> list[Event]:
+        """Act before the step from ``begin`` that lasts ``length`` (s); what happened."""
+        index = bisect_left(self._moments, begin)
+        changed = index < len(self._moments) and self._moments[index] < begin + length
+        events = self._begun_and_ended(begin, begin + length) if changed else []
+        if self._closed and self._detours is None:  # as long as no lane is closed
+            self._detours = Detours(session.road_links())
+        if changed or not self._begun:
+            self._close(begin + length)
+        events += self._strand_departed(session, begin)
+        if self._pairs:
+            # Right after a state is loaded as well: who was inside a junction was not led around.
+            everyone = changed or not self._begun
+            concerned = session.vehicles() if everyone else ()
+            waiting = session.waiting_vehicles() if everyone else ()
+            # SUMO inserts in the first step that begins after the departure.
+            departing = self._departing(begin - length, begin + length)
+            events += self._divert(
+                session, {*concerned, *waiting, *departing, *self._inside}, begin
+            )
+        self._begun = True
+        return events
+
+    def last_events(self, now: float) -> list[Event]:
+        """Ends of the measures that last to the end of the run."""
+        return [
+            Event(now, EventKind.MEASURE_END, one.id, detail=one.words)
+            for one in self._measures
+            if one.begin < now <= one.end and (one.end > now or one.end >= self._last)
+        ]
+
+    def _begun_and_ended(self, begin: float, end: float) -> list[Event]:
+        found = []
+        for one in self._measures:
+            if begin <= one.end < end and one.end < self._last:
+                found.append(Event(one.end, EventKind.MEASURE_END, one.id, detail=one.words))
+            if begin <= one.begin < end:
+                found.append(Event(one.begin, EventKind.MEASURE_BEGIN, one.id, detail=one.words))
+        return sorted(found, key=lambda event: event.time)
+
+    def _close(self, end: float) -> None:
+        """Know what is closed in the step that ends at ``end``."""
+        active = [one for one in self._closed if one.begin < end and one.end >= end]
+        self._pairs = {one.vclass: frozenset(one.pairs) for one in active}
+        self._inside = set()
+
+    def _departing(self, begin: float, end: float) -> list[str]:
+        return self._names[bisect_left(self._departs, begin) : bisect_left(self._departs, end)]
+
+    def _divert(self, session: Session, vehicles: Iterable[str], time: float) -> list[Event]:
+        events = []
+        for name in sorted(vehicles):
+            self._inside.discard(name)
+            vclass = session.vehicle_class(name)
+            closed = self._pairs.get(vclass)
+            if closed is None or self._detours is None:
+                continue
+            ahead = session.route_ahead(name)
+            last = _last_open(ahead.edges, closed)
+            if last == len(ahead.edges):
+                continue
+            if ahead.inside:
+                self._inside.add(name)
+                continue
+            goals = (*session.stop_edges(name), ahead.edges[-1])
+            route = self._detours.by_stops(ahead.edges[0], goals, vclass, closed)
+            if route is not None and session.set_route(name, ahead.start + route):
+                continue
+            if session.has_departed(name):
+                events.append(self._strand(session, name, time))
+            else:  # SUMO does not bear that a vehicle is taken out before it has departed
+                session.set_route(name, ahead.start + ahead.edges[:last])
+                self._cut_off.add(name)
+        return events
+
+    def _strand_departed(self, session: Session, time: float) -> list[Event]:
+        """Take out those who found no route when they were to depart, and have departed now."""
+        departed = [name for name in sorted(self._cut_off) if session.has_departed(name)]
+        self._cut_off.difference_update(departed)
+        return [self._strand(session, name, time) for name in departed]
+
+    def _strand(self, session: Session, name: str, time: float) -> Event:
+        front = session.vehicle_front(name)
+        session.take_out(name)
+        if front is None:
+            return Event(time, EventKind.STRANDED, name)
+        dx, dy = self._offset
+        return Event(time, EventKind.STRANDED, name, x=front.x - dx, y=front.y - dy)
+
+
+def _last_open(edges: tuple[str, ...], closed: Pairs) -> int:
+    """How many edges of a route come before the first closed turn; all if none is closed."""
+    pairs = enumerate(pairwise(edges), start=1)
+    return next((number for number, pair in pairs if pair in closed), len(edges))
