@@ -36,14 +36,16 @@ FEW = 20
 """Vehicles that a place has to have had to be among the worst: one unlucky driver is no jam."""
 
 
-def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Markup | None:
-    """Map and tables; ``None`` if no vehicle drove."""
-    junctions, movements = over_run(figures.junctions), over_run(figures.movements)
-    worst = _worst(junctions)
-    turns = _worst(movements)
-    parts = []
-    if shapes is not None and (drawn := _service_map(figures, shapes, worst)) is not None:
-        parts.append(drawn)
+def service_map(figures: TrafficFigures, shapes: PlaceShapes) -> Markup | None:
+    """Map of the levels over the run and in its busiest interval; ``None`` if no vehicle drove."""
+    return _service_map(figures, shapes, worst_places(over_run(figures.junctions)))
+
+
+def service_section(figures: TrafficFigures) -> Markup | None:
+    """Tables of the worst places; ``None`` if there are none."""
+    worst = worst_places(over_run(figures.junctions))
+    turns = worst_places(over_run(figures.movements))
+    parts: list[Markup] = []
     for title, place, shown, table in (
         ("Junctions with the highest delay", "junction", worst, figures.junctions),
         ("Turning movements with the highest delay", "movement", turns, figures.movements),
@@ -63,7 +65,7 @@ def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Mark
     return report_section("Level of service", *parts, explained=explained, ident="service")
 
 
-def _worst(rows: pl.DataFrame) -> list[dict[str, Any]]:
+def worst_places(rows: pl.DataFrame) -> list[dict[str, Any]]:
     """Return the places with the longest delay first; those with traffic only."""
     import polars as pl
 
