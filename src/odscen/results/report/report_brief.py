@@ -74,8 +74,7 @@ def _places(figures: TrafficFigures | None) -> Iterator[str]:
             name = str(row["movement"]).replace(">", " > ")
             yield (
                 f"the turning movement {name} has level of service {row['level']}: "
-                f"{number(row['control_delay'] or row['delay'], 0)} s control delay of "
-                f"{row['vehicles']:,} vehicles"
+                f"{number(row['shown'], 0)} s control delay of {row['vehicles']:,} vehicles"
             )
     segments = over_run(figures.segments)
     slow = segments.filter(segments["level"].is_in(["E", "F"])).sort("time_loss", descending=True)

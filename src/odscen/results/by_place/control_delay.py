@@ -1,0 +1,213 @@
+"""Control delay of each vehicle at each junction, from trajectories.
+
+Control delay is what a signal, a sign or a roundabout costs: by slowing down on the approach, in
+the queue, and by getting up to speed again behind the junction (HCM, 7th edition, chapters 4 and
+19). Chapter 36 has its measurement on trajectories: time steps are added up by the share that speed
+falls short of free flow. Here, for a vehicle at speed ``v`` with desired speed ``v0`` (the limit
+of its lane times its speed factor, at most its own maximum)::
+
+    r    = min(v / v0, 1)
+    loss = (1 - r) dt
+    top  = largest r on the road between two junctions
+
+    behind a junction   loss until r has reached 0.95 top: of the junction behind
+    on the way          loss until r falls below 0.9 top: of none, unless top < 0.8
+    before a junction   all loss after that: of the junction ahead
+    in a junction       loss of that junction, against the speed of its own curve
+
+So what a slow leader costs on the road between is in no control delay, nor is getting up to speed
+after the departure. A vehicle that never got near its speed on the road (``top < 0.8``) is in the
+queue of the junction ahead from its top on.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.results.by_place.facilities import NetFacts
+    from odscen.results.by_place.lane_places import LanePlaces
+
+REACHED, SLOWED, FREE = 0.95, 0.90, 0.80
+"""Shares of the top speed that end the acceleration and begin the deceleration; share of the
+desired speed from which a vehicle counts as driving freely on the way."""
+
+_NEEDED = ("timestep_time", "vehicle_id", "vehicle_lane", "vehicle_speed")
+
+
+MOST_ROWS = 4_000_000
+"""Rows of trajectories that are held in memory at a time; more are taken vehicles by vehicles."""
+_THIN = 20_000_000
+"""Rows from which one record a second is taken: loss is the mean of its share over the steps."""
+
+
+def vehicle_passages(
+    trajectories: pl.LazyFrame, places: LanePlaces, facts: NetFacts
+) -> pl.DataFrame | None:
+    """Control delay of each vehicle at each junction of a run, however long it is.
+
+    Returns
+    -------
+    As :func:`passages`; ``None`` if lane or speed were not recorded.
+    """
+    import polars as pl
+
+    if not set(_NEEDED) <= set(trajectories.collect_schema()):
+        return None
+    time = pl.col("timestep_time").cast(pl.Float64)
+    number = int(trajectories.select(pl.len()).collect().item())
+    moments = trajectories.select(time.unique().sort()).collect().to_series()
+    period = float(moments.diff().min() or 0.0)  # type: ignore[arg-type]
+    if not number or period <= 0.0:
+        return None
+    end = float(moments[-1])
+    if number > _THIN and period < 1.0:
+        kept = moments.gather_every(round(1.0 / period))
+        trajectories = trajectories.filter(time.is_in(kept.implode()))
+        number, period = number * len(kept) // len(moments), period * round(1.0 / period)
+    names = facts.drivers["id"]
+    batches = -(-number // MOST_ROWS)
+    found = []
+    for batch in range(batches):
+        drivers = facts.drivers.filter(pl.Series(range(len(names))) % batches == batch)
+        lost = lost_time(trajectories, places, facts.limits, drivers, period=period)
+        if lost is not None:
+            found.append(passages(lost, end=end, period=period))
+    return pl.concat(found).sort("time", "id")
+
+
+def lost_time(
+    trajectories: pl.LazyFrame,
+    places: LanePlaces,
+    limits: pl.DataFrame,
+    drivers: pl.DataFrame,
+    *,
+    period: float,
+) -> pl.DataFrame | None:
+    """Time that each vehicle lost on each stretch: a road between junctions, or a junction.
+
+    Parameters
+    ----------
+    trajectories
+        As recorded, see docs/runs.md; whole vehicles.
+    limits
+        ``lane`` and its speed ``limit``, m/s.
+    drivers
+        ``id``, ``factor`` on limits, and ``max_speed``, m/s; others are left out.
+    period
+        Seconds between two records.
+
+    Returns
+    -------
+    One row per vehicle and stretch in order of time: ``id``, ``number`` of the stretch,
+    ``junction`` and ``movement`` (null on roads), ``ahead`` (junction ahead, on roads),
+    ``approach``, ``begin`` and ``last`` (s), and seconds lost: ``behind``, ``on_the_way``,
+    ``before``, and ``inside``.
+    ``None`` if lane or speed were not recorded.
+    """
+    import polars as pl
+
+    if not set(_NEEDED) <= set(trajectories.collect_schema()):
+        return None
+    col = pl.col
+    inside = places.ways.with_columns(
+        inner=pl.when(col("via").is_not_null()).then("junction"),
+        ahead=pl.when(col("via").is_null()).then("junction"),
+    )
+    rows = (
+        trajectories.select(
+            id=col("vehicle_id").cast(str),
+            time=col("timestep_time").cast(pl.Float64),
+            lane=col("vehicle_lane").cast(str),
+            speed=col("vehicle_speed").cast(pl.Float64),
+        )
+        .join(drivers.lazy(), on="id")
+        .join(limits.lazy(), on="lane")
+        .join(inside.lazy().select("lane", "inner", "ahead", "approach", "movement"),
+              on="lane", how="left")
+        .sort("id", "time")
+        .with_columns(
+            ratio=(col("speed") / pl.min_horizontal(col("limit") * col("factor"), "max_speed"))
+            .clip(0.0, 1.0),
+            number=pl.struct("id", "inner").rle_id(),
+        )
+        # The first record is the insertion, before the first step is driven.
+        .with_columns(
+            lost=pl.when(col("time") > col("time").min().over("id"))
+            .then((1.0 - col("ratio")) * period)
+            .otherwise(0.0),
+            top=col("ratio").max().over("number"),
+        )
+        .with_columns(reached=(col("ratio") >= REACHED * col("top")).cum_max().over("number"))
+        .with_columns(
+            slowed=(col("reached") & ((col("ratio") < SLOWED * col("top")) | (col("top") < FREE)))
+            .cum_max()
+            .over("number")
+        )
+    )  # fmt: skip
+    road = col("inner").is_null()
+    return (
+        rows.group_by("number")
+        .agg(
+            col("id").first(),
+            junction=col("inner").first(),
+            movement=pl.when(~road).then("movement").first(),
+            ahead=col("ahead").last(),
+            approach=col("approach").last(),
+            begin=col("time").min(),
+            last=col("time").max(),
+            behind=col("lost").filter(road & ~col("reached")).sum(),
+            on_the_way=col("lost").filter(road & col("reached") & ~col("slowed")).sum(),
+            before=col("lost").filter(road & col("slowed")).sum(),
+            inside=col("lost").filter(~road).sum(),
+        )
+        .sort("number")
+        .collect()
+    )
+
+
+def passages(stretches: pl.DataFrame, *, end: float, period: float) -> pl.DataFrame:
+    """Control delay of each vehicle at each junction that it came to.
+
+    Parameters
+    ----------
+    stretches
+        From :func:`lost_time`.
+    end
+        When the run ended, s: who is slowed down before a junction then is counted with what it has
+        lost so far, without a movement.
+
+    Returns
+    -------
+    ``id``, ``junction``, ``movement`` (null for those that had not entered), ``approach``, ``time``
+    (s, when it entered, or the end) and ``control_delay`` (s).
+    """
+    import polars as pl
+
+    col = pl.col
+    around = stretches.with_columns(
+        previous=col("before").shift(1).over("id").fill_null(0.0),
+        following=col("behind").shift(-1).over("id").fill_null(0.0),
+    )
+    entered = around.filter(col("junction").is_not_null()).select(
+        "id", "junction", "movement", "approach",
+        time="begin",
+        control_delay=col("previous") + col("inside") + col("following"),
+    )  # fmt: skip
+    final = (col("number") == col("number").max().over("id")) & (col("last") > end - 2 * period)
+    queued = around.filter(
+        final
+        & col("ahead").is_not_null()
+        & (col("before") > 0.0)
+        & (col("last") > end - 2 * period)
+    ).select(
+        "id",
+        pl.lit(None, pl.String).alias("movement"),
+        "approach",
+        junction="ahead",
+        time="last",
+        control_delay="before",
+    )
+    return pl.concat([entered, queued.select(entered.columns)]).sort("time", "id")
