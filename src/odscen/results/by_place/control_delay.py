@@ -37,7 +37,7 @@ desired speed from which a vehicle counts as driving freely on the way."""
 _NEEDED = ("timestep_time", "vehicle_id", "vehicle_lane", "vehicle_speed")
 
 
-MOST_ROWS = 4_000_000
+MOST_ROWS = 2_000_000
 """Rows of trajectories that are held in memory at a time; more are taken vehicles by vehicles."""
 _THIN = 20_000_000
 """Rows from which one record a second is taken: loss is the mean of its share over the steps."""
@@ -111,60 +111,95 @@ def lost_time(
 
     if not set(_NEEDED) <= set(trajectories.collect_schema()):
         return None
-    col = pl.col
-    inside = places.ways.with_columns(
-        inner=pl.when(col("via").is_not_null()).then("junction"),
-        ahead=pl.when(col("via").is_null()).then("junction"),
-    )
+    lanes = _known_lanes(places, limits)
+    known = drivers.select("id", "factor", "max_speed").with_row_index("vehicle")
+    # Numbers instead of names: there are very many rows.
     rows = (
         trajectories.select(
-            id=col("vehicle_id").cast(str),
-            time=col("timestep_time").cast(pl.Float64),
-            lane=col("vehicle_lane").cast(str),
-            speed=col("vehicle_speed").cast(pl.Float64),
+            id=pl.col("vehicle_id").cast(str),
+            time=pl.col("timestep_time").cast(pl.Float64),
+            lane=pl.col("vehicle_lane").cast(str),
+            speed=pl.col("vehicle_speed").cast(pl.Float64),
         )
-        .join(drivers.lazy(), on="id")
-        .join(limits.lazy(), on="lane")
-        .join(inside.lazy().select("lane", "inner", "ahead", "approach", "movement"),
-              on="lane", how="left")
-        .sort("id", "time")
-        .with_columns(
-            ratio=(col("speed") / pl.min_horizontal(col("limit") * col("factor"), "max_speed"))
-            .clip(0.0, 1.0),
-            number=pl.struct("id", "inner").rle_id(),
+        .join(known.lazy(), on="id")
+        .join(lanes.lazy().select("lane", "place", "limit", "inner"), on="lane")
+        .select("vehicle", "time", "place", "inner", ratio=_share_of_desired())
+        .sort("vehicle", "time")
+    )
+    found = _stretch_sums(rows, period).collect()
+    return (
+        found.join(known.select("vehicle", "id"), on="vehicle")
+        .join(lanes.select("junction", "movement", first="place"), on="first")
+        .join(lanes.select("ahead", "approach", final="place"), on="final")
+        .sort("number")
+        .select("id", "number", "junction", "movement", "ahead", "approach", *_MEASURED)
+    )
+
+
+_MEASURED = ("begin", "last", "behind", "on_the_way", "before", "inside")
+
+
+def _known_lanes(places: LanePlaces, limits: pl.DataFrame) -> pl.DataFrame:
+    """Each lane with its limit and its junction, numbered; ``inner`` is 0 on roads."""
+    import polars as pl
+
+    within = pl.col("via").is_not_null()
+    ways = places.ways.select(
+        "lane",
+        "movement",
+        "approach",
+        ahead=pl.when(~within).then("junction"),
+        junction=pl.when(within).then("junction"),
+    )
+    rows = limits.select("lane", "limit").join(ways, on="lane", how="left", maintain_order="left")
+    inner = pl.col("junction").rank("dense").fill_null(0).cast(pl.UInt32)
+    return rows.with_columns(inner=inner).with_row_index("place")
+
+
+def _share_of_desired() -> pl.Expr:
+    import polars as pl
+
+    desired = pl.min_horizontal(pl.col("limit") * pl.col("factor"), "max_speed")
+    return (pl.col("speed") / desired).clip(0.0, 1.0)
+
+
+def _stretch_sums(rows: pl.LazyFrame, period: float) -> pl.LazyFrame:
+    """What is lost on each stretch; rows are sorted by vehicle and time."""
+    import polars as pl
+
+    col = pl.col
+    other = col("vehicle") != col("vehicle").shift(1)
+    road, top = col("inner") == 0, col("top")
+    reached, slowed = col("reached"), col("slowed")
+    return (
+        rows.with_columns(
+            number=(other | (col("inner") != col("inner").shift(1)))
+            .fill_null(value=True)
+            .cum_sum(),
+            # The first record is the insertion, before the first step is driven.
+            lost=pl.when(other.fill_null(value=True))
+            .then(0.0)
+            .otherwise((1.0 - col("ratio")) * period),
         )
-        # The first record is the insertion, before the first step is driven.
+        .with_columns(top=col("ratio").max().over("number"))
+        .with_columns(reached=(col("ratio") >= REACHED * top).cum_max().over("number"))
         .with_columns(
-            lost=pl.when(col("time") > col("time").min().over("id"))
-            .then((1.0 - col("ratio")) * period)
-            .otherwise(0.0),
-            top=col("ratio").max().over("number"),
-        )
-        .with_columns(reached=(col("ratio") >= REACHED * col("top")).cum_max().over("number"))
-        .with_columns(
-            slowed=(col("reached") & ((col("ratio") < SLOWED * col("top")) | (col("top") < FREE)))
+            slowed=(reached & ((col("ratio") < SLOWED * top) | (top < FREE)))
             .cum_max()
             .over("number")
         )
-    )  # fmt: skip
-    road = col("inner").is_null()
-    return (
-        rows.group_by("number")
+        .group_by("number")
         .agg(
-            col("id").first(),
-            junction=col("inner").first(),
-            movement=pl.when(~road).then("movement").first(),
-            ahead=col("ahead").last(),
-            approach=col("approach").last(),
-            begin=col("time").min(),
-            last=col("time").max(),
-            behind=col("lost").filter(road & ~col("reached")).sum(),
-            on_the_way=col("lost").filter(road & col("reached") & ~col("slowed")).sum(),
-            before=col("lost").filter(road & col("slowed")).sum(),
+            col("vehicle").first(),
+            first=col("place").first(),
+            final=col("place").last(),
+            begin=col("time").first(),
+            last=col("time").last(),
+            behind=col("lost").filter(road & ~reached).sum(),
+            on_the_way=col("lost").filter(road & reached & ~slowed).sum(),
+            before=col("lost").filter(road & slowed).sum(),
             inside=col("lost").filter(~road).sum(),
         )
-        .sort("number")
-        .collect()
     )
 
 

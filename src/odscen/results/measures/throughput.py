@@ -62,6 +62,7 @@ FIGURES = (
         source="SUMO lane data, arrived",
         better=Better.HIGHER,
         basis=Basis.ROADS,
+        display=Display("veh/h", digits=0),
         compute=_throughput,
     ),
     RunFigure(
@@ -76,7 +77,7 @@ FIGURES = (
         basis=Basis.ROADS,
         display=CLOCK,
         section=ReportSection.KEY_FIGURES,
-        note="per vehicle, on its approaches and in it",
+        note="control delay per vehicle",
         compute=_worst_junction_delay,
     ),
 )

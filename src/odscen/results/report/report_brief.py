@@ -74,14 +74,14 @@ def _places(figures: TrafficFigures | None) -> Iterator[str]:
             name = str(row["movement"]).replace(">", " > ")
             yield (
                 f"the turning movement {name} has level of service {row['level']}: "
-                f"{number(row['shown'], 0)} s control delay of {row['vehicles']:,} vehicles"
+                f"{number(row['shown'], 0)} s control delay for {row['vehicles']:,} vehicles"
             )
     segments = over_run(figures.segments)
     slow = segments.filter(segments["level"].is_in(["E", "F"])).sort("time_loss", descending=True)
     for row in slow.head(1).iter_rows(named=True):
         yield (
             f"segment {row['segment']} has level of service {row['level']}: "
-            f"{number(row['speed'] * 3.6, 0)} km/h of {row['vehicles']:,} vehicles"
+            f"{number(row['speed'] * 3.6, 0)} km/h for {row['vehicles']:,} vehicles"
         )
 
 

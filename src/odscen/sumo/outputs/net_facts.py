@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 HEAVY = ("truck", "trailer", "bus", "coach", "fire", "tram")
 """SUMO's vehicle classes that count as heavy vehicles."""
+
+
+_DESIRED = {"bicycle": 20.0 / 3.6}
+"""m/s, ``desiredMaxSpeed`` of vehicle classes for which SUMO has one; times the speed factor."""
 
 
 def read_net_facts(run: Path) -> NetFacts | None:
@@ -98,16 +103,17 @@ def _giving_way(net: NetFile) -> set[str]:
 def _drivers(routes: Path) -> pl.DataFrame:
     import polars as pl
 
-    kinds: dict[str, tuple[float, bool]] = {}
+    kinds: dict[str, tuple[float, float, bool]] = {}
     rows = []
     for found in elements(routes, "vType", "vehicle", "trip"):
         if found.tag == "vType":
-            speed = float(found.get("maxSpeed", "55.55"))
-            kinds[found.get("id", "")] = speed, found.get("vClass") in HEAVY
+            speed, vclass = float(found.get("maxSpeed", "55.55")), found.get("vClass", "")
+            desired = float(found.get("desiredMaxSpeed", _DESIRED.get(vclass, math.inf)))
+            kinds[found.get("id", "")] = speed, desired, vclass in HEAVY
         else:
-            speed, heavy = kinds.get(found.get("type", ""), (55.55, False))
+            speed, desired, heavy = kinds.get(found.get("type", ""), (55.55, math.inf, False))
             factor = float(found.get("speedFactor", "1"))
-            rows.append((found.get("id"), factor, speed, heavy))
+            rows.append((found.get("id"), factor, min(speed, desired * factor), heavy))
     schema = {
         "id": pl.String,
         "factor": pl.Float64,
