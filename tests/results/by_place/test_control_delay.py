@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from odscen.results.by_place.control_delay import lost_time, passages
+from odscen.results.by_place.control_delay import lost_time, passages, vehicle_passages
+from odscen.results.by_place.facilities import NetFacts
 from odscen.results.by_place.lane_places import LanePlaces
 
 if TYPE_CHECKING:
@@ -89,6 +90,17 @@ def test_who_is_queued_at_the_end_counts_with_what_it_has_lost() -> None:
     row = found.row(0, named=True)
     assert (row["junction"], row["movement"]) == ("j1", None)
     assert row["control_delay"] == pytest.approx(30.0)
+
+
+@pytest.mark.parametrize(("serves", "number"), [(False, 1), (True, 0)])
+def test_a_bus_that_serves_stops_has_no_control_delay(serves: bool, number: int) -> None:
+    rows = [(float(t), "v", lane, 5.0) for t, lane in enumerate(["a", "a", ":j", "b", "b"])]
+    names = ("timestep_time", "vehicle_id", "vehicle_lane", "vehicle_speed")
+    table = pl.DataFrame(rows, schema=names, orient="row")
+    drivers = DRIVERS.with_columns(heavy=pl.lit(value=False), serves=pl.lit(serves))
+    found = vehicle_passages(table.lazy(), PLACES, NetFacts(LIMITS, pl.DataFrame(), drivers))
+    assert found is not None
+    assert found["junction"].to_list() == ["j1"] * number
 
 
 def test_all_that_is_lost_is_on_one_stretch() -> None:

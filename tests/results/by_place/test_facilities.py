@@ -44,7 +44,7 @@ def facts(main: tuple[str, bool, bool, bool], side: tuple[str, bool, bool, bool]
         for via, row in ((":9_0", main), (":9_1", side))
     ]
     limits = [("m_0", "m", 30.0), ("m_1", "m", 30.0), ("s_0", "s", 30.0)]
-    drivers = pl.DataFrame({"id": ["a", "b"], "heavy": [False, True]})
+    drivers = pl.DataFrame({"id": ["a", "b"], "heavy": [False, True], "serves": [False, False]})
     return NetFacts(
         pl.DataFrame(limits, schema=("lane", "edge", "limit"), orient="row"),
         pl.DataFrame(links),

@@ -48,6 +48,8 @@ def vehicle_passages(
 ) -> pl.DataFrame | None:
     """Control delay of each vehicle at each junction of a run, however long it is.
 
+    Vehicles that serve stops are left out: their time at stops is no control delay.
+
     Returns
     -------
     As :func:`passages`; ``None`` if lane or speed were not recorded.
@@ -67,11 +69,11 @@ def vehicle_passages(
         kept = moments.gather_every(round(1.0 / period))
         trajectories = trajectories.filter(time.is_in(kept.implode()))
         number, period = number * len(kept) // len(moments), period * round(1.0 / period)
-    names = facts.drivers["id"]
+    chosen = facts.drivers.filter(~pl.col("serves"))
     batches = -(-number // MOST_ROWS)
     found = []
     for batch in range(batches):
-        drivers = facts.drivers.filter(pl.Series(range(len(names))) % batches == batch)
+        drivers = chosen.filter(pl.Series(range(len(chosen))) % batches == batch)
         lost = lost_time(trajectories, places, facts.limits, drivers, period=period)
         if lost is not None:
             found.append(passages(lost, end=end, period=period))

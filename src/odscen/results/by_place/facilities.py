@@ -69,7 +69,8 @@ class NetFacts:
         ``state`` (SUMO's letter), whether it ``gives_way`` to other vehicles, and whether it leads
         ``onto_ring`` or comes ``from_ring``, a roundabout.
     drivers
-        ``id``, ``factor`` on limits, ``max_speed`` (m/s), and whether a vehicle is ``heavy``.
+        ``id``, ``factor`` on limits, ``max_speed`` (m/s), whether a vehicle is ``heavy``, and
+        whether it ``serves`` stops.
     """
 
     limits: pl.DataFrame

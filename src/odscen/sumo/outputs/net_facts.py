@@ -113,11 +113,13 @@ def _drivers(routes: Path) -> pl.DataFrame:
         else:
             speed, desired, heavy = kinds.get(found.get("type", ""), (55.55, math.inf, False))
             factor = float(found.get("speedFactor", "1"))
-            rows.append((found.get("id"), factor, min(speed, desired * factor), heavy))
+            serves = found.find("stop") is not None
+            rows.append((found.get("id"), factor, min(speed, desired * factor), heavy, serves))
     schema = {
         "id": pl.String,
         "factor": pl.Float64,
         "max_speed": pl.Float64,
         "heavy": pl.Boolean,
+        "serves": pl.Boolean,
     }
     return pl.DataFrame(rows, schema=schema, orient="row")
