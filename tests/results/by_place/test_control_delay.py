@@ -94,7 +94,7 @@ def test_who_is_queued_at_the_end_counts_with_what_it_has_lost() -> None:
 
 @pytest.mark.parametrize(("serves", "number"), [(False, 1), (True, 0)])
 def test_a_bus_that_serves_stops_has_no_control_delay(serves: bool, number: int) -> None:
-    rows = [(float(t), "v", lane, 5.0) for t, lane in enumerate(["a", "a", ":j", "b", "b"])]
+    rows = [(float(t), "v", lane, 5.0) for t, lane in enumerate(["a", "a", ":j", "c", "c"])]
     names = ("timestep_time", "vehicle_id", "vehicle_lane", "vehicle_speed")
     table = pl.DataFrame(rows, schema=names, orient="row")
     drivers = DRIVERS.with_columns(heavy=pl.lit(value=False), serves=pl.lit(serves))

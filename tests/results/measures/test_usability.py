@@ -123,7 +123,7 @@ def test_more_than_half_a_per_cent_of_teleports_are_too_many(
 def test_demand_that_did_not_get_through_is_not_served() -> None:
     verdict = run_usability(outcomes(80, running=20)[1], [], end=END)
     assert verdict.headline == (
-        "not usable: 20 of 100 road users that were due had not arrived (demand not served) (20 %)"
+        "not usable: 20 of 100 road users due had not arrived (demand not served) (20.0 %)"
     )
 
 

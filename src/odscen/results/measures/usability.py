@@ -9,7 +9,6 @@ demand and blocked vehicles to be looked at before any result; the bounds are ou
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -253,7 +252,7 @@ def _not_served(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason
         and one.depart + SLOW * one.free_flow_time + LATE < end
     ]
     late = [one for one in arriving if one.status is not ActorStatus.ARRIVED]
-    words = "road users that were due had not arrived (demand not served)"
+    words = "road users due had not arrived (demand not served)"
     return _share(UsabilityKind.NOT_SERVED, len(late), len(arriving), words, "", ())
 
 
@@ -303,7 +302,6 @@ def _were(some: Sequence[object]) -> str:
 
 
 def _percent(share: float) -> str:
-    """Rounded up, so that a few of many are never 0 %."""
-    digits = 1 if share >= 0.01 else 2
-    scale = 10.0**digits
-    return f"{math.ceil(100.0 * share * scale - 1e-9) / scale:g} %"
+    """Two digits at least, so that a few of many are never 0 %."""
+    percent = 100.0 * share
+    return f"{percent:.1f} %" if percent >= 0.1 else f"{percent:.2g} %"
