@@ -24,6 +24,23 @@ _UNGRADED = (Facility.MAJOR.value, Facility.UNCONTROLLED.value)
 """HCM grades neither what goes first at a two-way stop, nor a junction where nobody gives way."""
 
 
+def with_missing(table: pl.DataFrame) -> pl.DataFrame:
+    """Add what tables by place of earlier versions lack, as null."""
+    import polars as pl
+
+    types = {"facility": pl.String, "passages": pl.Int64}
+    names: tuple[str, ...] = ()
+    if "segment" in table.columns:
+        names = ("facility", "lane_density", "car_seconds", "lane_metres")
+    elif "junction" in table.columns:
+        names = ("facility", "control_delay", *CONTROL)
+    return table.with_columns(
+        pl.lit(None, types.get(name, pl.Float64)).alias(name)
+        for name in names
+        if name not in table.columns
+    )
+
+
 def with_control(
     sums: pl.DataFrame, found: FacilityData | None, place: Literal["junction", "movement"]
 ) -> pl.DataFrame:
