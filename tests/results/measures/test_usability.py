@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from odscen.results.measures.expectations import evaluate, parse_expectation
@@ -85,7 +87,7 @@ def test_a_jam_counts_by_how_long_it_lasted_and_whether_it_dissolved(
 
 @pytest.mark.parametrize(
     ("waiting", "level"),
-    [(1, UsabilityLevel.RESERVATIONS), (30, UsabilityLevel.NOT_USABLE)],
+    [(1, UsabilityLevel.RESERVATIONS), (60, UsabilityLevel.NOT_USABLE)],
 )
 def test_those_not_inserted_are_counted_with_their_share_and_place(
     waiting: int, level: UsabilityLevel
@@ -142,6 +144,16 @@ def test_the_mean_delay_is_of_all_who_were_due_with_what_they_waited_for() -> No
     reasons = {one.kind: one for one in run_usability(found, [], end=END).reasons}
     assert reasons[UsabilityKind.LATENT_DELAY].value == pytest.approx(127.0)
     assert reasons[UsabilityKind.LATENT_DELAY].level is UsabilityLevel.NOT_USABLE
+
+
+def test_who_has_no_route_is_not_inserted_and_in_no_mean_delay() -> None:
+    plan, found = outcomes(9, waiting=1)
+    found = (*found[:9], replace(found[9], problem="no route"))
+    figures = figure_values(RunData(found, end=END))
+    assert (figures["mean_delay"], figures["mean_latent_delay"]) == (40.0, 0.0)
+    incidents = find_incidents(plan, found, (), end=END)
+    (reason, _) = run_usability(found, incidents, end=END).reasons
+    assert (reason.kind, reason.value) == (UsabilityKind.NOT_INSERTED, 0.1)
 
 
 def test_the_expectation_usable_is_met_with_reservations_but_not_otherwise() -> None:

@@ -25,6 +25,11 @@ def due(outcomes: Sequence[ActorOutcome], end: float | None) -> list[ActorOutcom
     return [one for one in outcomes if end is None or one.depart < end]
 
 
+def served(outcomes: Sequence[ActorOutcome]) -> list[ActorOutcome]:
+    """Those for whom the network has a route: who has none waits for no room, and is no delay."""
+    return [one for one in outcomes if one.problem is None]
+
+
 def latent_delay(one: ActorOutcome, end: float | None) -> float | None:
     """Seconds from the planned departure to the insertion, or to the end of the run.
 
@@ -45,7 +50,7 @@ def total_delay(one: ActorOutcome, end: float | None) -> float | None:
 
 def mean_delay(outcomes: Sequence[ActorOutcome], end: float | None) -> float | None:
     """Mean over all who were due; ``None`` where time loss was not measured of any who departed."""
-    expected = due(outcomes, end)
+    expected = served(due(outcomes, end))
     departed = [one for one in expected if one.status is not ActorStatus.WAITING]
     if departed and all(one.time_loss is None for one in departed):
         return None
@@ -53,7 +58,7 @@ def mean_delay(outcomes: Sequence[ActorOutcome], end: float | None) -> float | N
 
 
 def _mean_latent(run: RunData) -> float | None:
-    return mean([latent_delay(one, run.end) for one in due(run.vehicles, run.end)])
+    return mean([latent_delay(one, run.end) for one in served(due(run.vehicles, run.end))])
 
 
 FIGURES = (

@@ -14,7 +14,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from odscen.results.measures.figure import mean
-from odscen.results.measures.latent_delay import due, latent_delay
+from odscen.results.measures.latent_delay import due, latent_delay, served
 from odscen.results.records.outcomes import ActorStatus, IncidentKind, StopReason, reason_label
 from odscen.results.records.run_records import rounded
 
@@ -65,7 +65,7 @@ class Bound:
 
 
 BOUNDS: Mapping[UsabilityKind, Bound] = {
-    UsabilityKind.NOT_INSERTED: Bound(0.0, 0.02),
+    UsabilityKind.NOT_INSERTED: Bound(0.0, 0.05),
     UsabilityKind.TELEPORTED: Bound(0.001, 0.005),
     UsabilityKind.NOT_SERVED: Bound(0.02, 0.10),
     UsabilityKind.LATENT_DELAY: Bound(5.0, 60.0),
@@ -272,7 +272,7 @@ def _share(
 
 
 def _latent(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
-    expected = [one for one in due(outcomes, end) if one.category != "pedestrian"]
+    expected = [one for one in served(due(outcomes, end)) if one.category != "pedestrian"]
     waits = [latent_delay(one, end) or 0.0 for one in expected]
     value = mean(waits)
     if value is None:
