@@ -19,6 +19,7 @@ export const summary = (
 ): Summary => ({
   format: "odscen-run",
   version: 1,
+  usable: null,
   status: "completed",
   error: null,
   stopped: false,

@@ -54,6 +54,8 @@ def test_a_report_is_written_anew_along_the_way_asked_for(workspace, finished, t
 
 
 def test_a_run_gives_what_scripts_rely_on(finished):
+    assert list(finished)[2:4] == ["usable", "status"], "the verdict comes first"
+    assert finished["usable"] == {"level": "usable", "headline": "usable", "reasons": []}
     assert finished["status"] == "completed"
     assert finished["sim_seconds"] > 10
     assert finished["real_time_factor"] > 1

@@ -11,7 +11,7 @@ from odscen.regression.junit import junit_xml
 from odscen.regression.suite import read_suite
 from odscen.regression.suite_page import suite_page
 from odscen.regression.suite_summary import suite_summary
-from odscen.regression.suite_words import headline, lines
+from odscen.regression.suite_words import headline, lines, to_dict
 from tests.regression.conftest import copy_suite, edit_json, write_tiny
 
 
@@ -128,6 +128,23 @@ def test_expectations_are_held_against_every_seed(store, suite):
     assert [line.split(":")[0] for line in told] == ["seed 1", "seed 2"]
     assert "expected mean_delay <= 1 s, but it is" in told[0]
     assert headline(case(result, "signal_crossing")).startswith("behaviour: seed 1: expected")
+
+
+def test_a_run_that_is_not_usable_fails_as_its_own_cause_unless_the_suite_says_otherwise(
+    store, suite
+):
+    timing = {"junction": "10001", "green": [5, 600]}
+    edit_scenario(suite, "signal_crossing", signals={"junctions": [timing]})
+    result = run(store, suite)
+    failed = case(result, "signal_crossing")
+    assert headline(failed).startswith("usable: seed 1: not usable: ")
+    assert to_dict(result)["cases"][0]["cause"] == "usable"
+    assert [line.split(":")[1] for line in failed.unusable] == [" not usable"] * 2
+    assert case(result, "t_junction_signs").status == "passed"
+    suite.write_text("usable = false\n" + suite.read_text())
+    without = case(run(store, suite), "signal_crossing")
+    assert without.unusable == ()
+    assert headline(without).startswith("signals: ")
 
 
 def test_a_run_that_dies_is_an_error_not_a_difference(store, suite):

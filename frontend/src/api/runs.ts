@@ -14,6 +14,8 @@ export type RunFile = Schemas["RunFile"];
 /** One count of vehicles and what a run made of it; seconds and metres. */
 export type FitRow = Schemas["FitRow"];
 export type Summary = Schemas["RunSummary"];
+/** Whether the figures of a run can be used. */
+export type Verdict = Schemas["UsabilityInfo"];
 /** Something that went wrong on the road. */
 export type Incident = Schemas["IncidentInfo"];
 /** Who was where: rows `first[i]` to `first[i + 1]` belong to `times[i]`. */

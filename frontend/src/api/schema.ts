@@ -3667,6 +3667,7 @@ export interface components {
             format: string;
             /** Version */
             version: number;
+            usable: components["schemas"]["UsabilityInfo"] | null;
             status: components["schemas"]["RunStatus"];
             /** Error */
             error: string | null;
@@ -4818,6 +4819,61 @@ export interface components {
             low: number;
             /** High */
             high: number;
+        };
+        /**
+         * UsabilityInfo
+         * @description Whether the figures of a run can be used, in one line and reason by reason.
+         */
+        UsabilityInfo: {
+            level: components["schemas"]["UsabilityLevel"];
+            /** Headline */
+            headline: string;
+            /** Reasons */
+            reasons: components["schemas"]["UsabilityReason"][];
+        };
+        /**
+         * UsabilityKind
+         * @description What can be wrong with a run as a whole.
+         * @enum {string}
+         */
+        UsabilityKind: "failed" | "gridlock" | "not inserted" | "teleported" | "demand not served" | "latent delay" | "stopped early";
+        /**
+         * UsabilityLevel
+         * @description Whether the figures of a run can be used.
+         * @enum {string}
+         */
+        UsabilityLevel: "usable" | "usable with reservations" | "not usable";
+        /**
+         * UsabilityReason
+         * @description One thing that is wrong.
+         *
+         *     Attributes
+         *     ----------
+         *     level
+         *         What it alone makes of the run.
+         *     value
+         *         What was measured, in the unit of :data:`BOUNDS`; ``None`` where there is no number.
+         *     count
+         *         Road users, or jams, that are concerned.
+         *     words
+         *         A whole phrase, with number, share and first place.
+         *     places
+         *         The worst places, with where they are.
+         */
+        UsabilityReason: {
+            kind: components["schemas"]["UsabilityKind"];
+            level: components["schemas"]["UsabilityLevel"];
+            /** Value */
+            value: number | null;
+            /** Count */
+            count: number;
+            /** Words */
+            words: string;
+            /**
+             * Places
+             * @default []
+             */
+            places: string[];
         };
         /**
          * VehicleInput

@@ -47,7 +47,7 @@ export function EarlierRuns({
           {[...value].reverse().map((one) => (
             <Table.Tr key={one.run} title={one.run}>
               <Table.Td>{one.finished ? when(one.finished) : "now"}</Table.Td>
-              <Table.Td>{STATE_WORD[one.state]}</Table.Td>
+              <Table.Td>{outcome(one)}</Table.Td>
               <Table.Td>
                 <Group gap={10} justify="flex-end" wrap="nowrap">
                   {one.run === current ? (
@@ -102,5 +102,9 @@ export function EarlierRuns({
   );
 }
 
+const outcome = ({ state, summary }: RunInfo): string =>
+  (state === "completed" || state === "stopped") && summary?.usable
+    ? `${STATE_WORD[state]}, ${summary.usable.level}`
+    : STATE_WORD[state];
 const watchWord = ({ state }: RunInfo): string => (state === "interrupted" ? "Resume" : "Watch");
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

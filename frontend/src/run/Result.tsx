@@ -3,7 +3,7 @@ import { useState } from "react";
 
 import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
-import { type RunInfo, runs, type Summary } from "../api/runs";
+import { type RunInfo, runs, type Summary, type Verdict } from "../api/runs";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
@@ -42,11 +42,14 @@ export function Result({
   };
   if (info.state === "interrupted") return <Interrupted info={info} onBack={onBack} onResume={onResume} />;
   const failed = info.state === "failed";
+  const verdict = failed ? null : (info.summary?.usable ?? null);
   return (
     <section aria-label="Result of the run">
       <Title order={2} size="h3">
         {TITLE[info.state] ?? "The run is finished"}
+        {verdict && `: ${verdict.level}`}
       </Title>
+      {verdict && <Reservations verdict={verdict} />}
       {failed && <Failure info={info} />}
       {info.summary && !failed && (
         <dl className="run-figures">
@@ -90,6 +93,25 @@ export function Result({
       {info.summary && !failed && <Comparison info={info} scenario={scenario} />}
       {info.summary && !failed && <Files run={info.run} />}
     </section>
+  );
+}
+
+/** Why the figures below cannot be used, or only with care; nothing of a usable run. */
+function Reservations({ verdict }: { verdict: Verdict }) {
+  if (verdict.reasons.length === 0) return null;
+  const bad = verdict.level === "not usable";
+  return (
+    <Alert
+      color={bad ? "red" : "yellow"}
+      mt="sm"
+      title={bad ? "The figures of this run cannot be used" : "Use these figures with care"}
+    >
+      <ul className="verdict-reasons">
+        {verdict.reasons.map(({ kind, words }) => (
+          <li key={kind}>{words}</li>
+        ))}
+      </ul>
+    </Alert>
   );
 }
 

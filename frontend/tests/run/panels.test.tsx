@@ -42,6 +42,17 @@ const progressAt = (time: number, until: number, more: Partial<RunProgress> = {}
 });
 const now = { time: 65, pace: 2.5, running: 7, arrived: 3, there: false };
 
+const REASON = "gridlock that did not dissolve, first at e_0 since 700 s";
+const GRIDLOCKED = summary({
+  usable: {
+    level: "not usable",
+    headline: `not usable: ${REASON}`,
+    reasons: [
+      { kind: "gridlock", level: "not usable", value: 300, count: 1, words: REASON, places: ["e_0"] },
+    ],
+  },
+});
+
 test("a run is paused, resumed and stopped; its state is learned from the answer", async () => {
   const asked = server({ "/runs/r1/control": info("paused", { speed: 1 }) });
   const learn = vi.fn();
@@ -107,11 +118,17 @@ test("what is saved of a long run is said while it runs", () => {
 test("earlier runs are listed newest first, and those that were interrupted can be resumed", async () => {
   const asked = server({
     "/removal": { kind: "run", name: "s-1", scenarios: 0, runs: 0, live: 0 },
-    "/runs": [info("completed", { run: "s-1", finished: 1e9 }), info("interrupted", { run: "s-2" })],
+    "/runs": [
+      info("completed", { run: "s-1", finished: 1e9, summary: GRIDLOCKED }),
+      info("interrupted", { run: "s-2" }),
+    ],
   });
   const { user } = show(<EarlierRuns scenario="s" />);
   expect(await screen.findByRole("link", { name: "Resume s-2" })).toBeTruthy();
-  expect(rowsOf(screen.getByRole("table")).map((row) => row[1])).toEqual(["Interrupted", "Finished"]);
+  expect(rowsOf(screen.getByRole("table")).map((row) => row[1])).toEqual([
+    "Interrupted",
+    "Finished, not usable",
+  ]);
   expect(screen.queryByRole("link", { name: "Report of s-2" })).toBeNull();
   await user.click(screen.getByRole("button", { name: "Remove s-1" }));
   await screen.findByText(/wastebasket for 30 days/);
@@ -256,4 +273,19 @@ test.each([
   expect(await screen.findByText(text)).toBeTruthy();
   expect(screen.queryAllByRole("switch")).toHaveLength(switches);
   expect(screen.queryAllByText("what to do")).toHaveLength(1 - switches);
+});
+
+test("a gridlocked run is not simply finished: the result opens with why it is not usable", () => {
+  server({ "/figures": FIGURES, "/runs": [] });
+  show(
+    <Result
+      info={info("completed", { summary: GRIDLOCKED })}
+      scenario="s"
+      onBack={vi.fn()}
+      onResume={vi.fn()}
+    />,
+  );
+  expect(screen.getByRole("heading", { level: 2 }).textContent).toBe("The run is finished: not usable");
+  expect(screen.getByText("The figures of this run cannot be used")).toBeTruthy();
+  expect(screen.getByText(/^gridlock that did not dissolve, first at e_0/)).toBeTruthy();
 });

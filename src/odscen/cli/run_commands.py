@@ -11,7 +11,9 @@ import typer
 
 from odscen.base.durations import clock, parse_duration
 from odscen.base.errors import InputError
+from odscen.base.shown import visible
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.results.measures.usability import UsabilityLevel
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
@@ -121,8 +123,10 @@ def run(
 ) -> None:
     """Run scenarios in SUMO, without a window; write records, events, figures and a report.
 
-    Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input, or the folder is
-    in the hands of another process; 3: a run failed, or the machine lacks room, memory or handles.
+    The first line of each run says whether its figures can be used; --expect usable fails one
+    that is not. Exit code 0: completed; 1: completed, but an expectation failed; 2: bad input, or
+    the folder is in the hands of another process; 3: a run failed, or the machine lacks room,
+    memory or handles.
     """
     from odscen.app import runs
     from odscen.app.scenarios import scenario_files
@@ -195,17 +199,26 @@ def show_results(results: Sequence[Run], *, as_json: bool, several: bool) -> Non
         runs = [result.to_dict() for result in results]
         print_json({"runs": runs} if several else runs[0])
     else:
+        for result in results:
+            if result.usability:
+                typer.echo(visible(f"{result.folder.name}: {result.usability['headline']}"))
         keys = ("planned", "inserted", "arrived", "teleported", "collided")
         rows = []
         for result in results:
             counts = result.summary["actors"]
             verdict = result.status if result.expectations_met else "expectation failed"
+            level = result.usability.get("level")
+            if result.status is RunStatus.COMPLETED and level != UsabilityLevel.USABLE:
+                verdict = f"{verdict}, {level or 'not judged'}"
             rows.append((result.folder.name, verdict, *(counts[key] for key in keys)))
         print_table("", ("run", "status", *keys), rows)
     for result in results:
         for verdict in result.summary["expectations"]:
             if not verdict["passed"]:
-                has = f"{verdict['expectation']} (is {verdict['value']})"
+                own = (
+                    result.usability.get("headline") if verdict["expectation"] == "usable" else None
+                )
+                has = f"{verdict['expectation']} (is {own or verdict['value']})"
                 log(f"{result.folder.name}: failed: {has}")
         if result.status is RunStatus.FAILED:
             log(f"{result.folder.name}: {result.summary['error']}")

@@ -52,6 +52,8 @@ class SeedResult:
         Expectations that it does not meet, in ours.
     folder
         Where it is kept; ``None`` if it was deleted.
+    unusable
+        Why its figures cannot be used, if the suite expects that they can; one of ``missed``.
     """
 
     seed: int
@@ -60,6 +62,7 @@ class SeedResult:
     missed: tuple[str, ...]
     figures: Measured
     folder: Path | None = None
+    unusable: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +133,11 @@ class CaseResult:
         if self.status is CaseStatus.CHANGED and self.better:
             return "changed (better)"
         return "baseline written" if self.updated and self.status.passes else self.status.value
+
+    @property
+    def unusable(self) -> tuple[str, ...]:
+        """Why the figures of runs cannot be used, seed by seed; empty if they can."""
+        return tuple(run.unusable for run in self.runs if run.unusable)
 
     @property
     def better(self) -> bool:

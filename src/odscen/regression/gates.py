@@ -20,7 +20,7 @@ from odscen.regression.own_figures import own_values
 from odscen.regression.suite import missing_case
 from odscen.regression.suite_loading import LoadedCase, load_cases
 from odscen.regression.verdict import hold_against
-from odscen.results.measures.expectations import evaluate
+from odscen.results.measures.expectations import USABLE, evaluate
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
@@ -163,13 +163,25 @@ def _seed_result(
     with in_file(str(suite.file)):
         own = own_values(suite.figures, result, beside=suite.file.parent)
     summary = {**summary, "figures": {**summary["figures"], **own}}
+    failed = [row for row in evaluate(loaded.case.expectations, summary) if not row.passed]
+    unusable = None
+    if USABLE.text in [row.expectation for row in failed]:
+        unusable = f"seed {seed}: {result.usability.get('headline', 'not judged')}"
     missed = [
         f"seed {seed}: expected {verdict.expectation}, but it is "
         f"{'nothing' if verdict.value is None else f'{verdict.value:g}'}"
-        for verdict in evaluate(loaded.case.expectations, summary)
-        if not verdict.passed
+        for verdict in failed
+        if verdict.expectation != USABLE.text
     ]
-    return SeedResult(seed, seconds, None, tuple(missed), measure(result.folder, summary), folder)
+    return SeedResult(
+        seed,
+        seconds,
+        None,
+        (*filter(None, [unusable]), *missed),
+        measure(result.folder, summary),
+        folder,
+        unusable=unusable,
+    )
 
 
 def _missing(baseline: Path) -> CaseResult:

@@ -14,7 +14,7 @@ from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
 from odscen.regression.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
 from odscen.regression.tolerance import Tolerances, parse_tolerance
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.measures.expectations import USABLE, parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validation_problems
@@ -59,6 +59,7 @@ class _Settings(Part):
 
     seeds: Seeds | None = None
     expect: tuple[Annotated[str, AfterValidator(_expectation)], ...] = ()
+    usable: bool | None = None
     tolerance: Annotated[ToleranceTable, AfterValidator(_tolerance_table)] = Field(
         default_factory=dict
     )
@@ -241,7 +242,10 @@ def _case(
 ) -> Case:
     name = scenario_name(path)
     tolerances = _tolerances(document.tolerance, own=own) | _tolerances(entry.tolerance, own=own)
+    wanted = document.usable if entry.usable is None else entry.usable
     expect = dict.fromkeys((*document.expect, *entry.expect))
+    if wanted is not False:
+        expect = {USABLE.text: None, **expect}
     return Case(
         name=name,
         file=path,

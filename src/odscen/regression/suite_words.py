@@ -29,6 +29,8 @@ def headline(case: CaseResult) -> str:
     if case.status in (CaseStatus.ERROR, CaseStatus.MISSING, CaseStatus.NEW):
         first = case.problems[0].splitlines()
         return first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+    if case.status is CaseStatus.FAILED and case.unusable:
+        return f"usable: {case.unusable[0]}"
     if case.status is CaseStatus.FAILED:
         return f"{_cause(case)}{'; '.join(_worst(case))}"
     return "; ".join([*_better(case)[:_IN_HEADLINE], *([why] if (why := _inputs(case)) else [])])
@@ -146,7 +148,7 @@ def _case(case: CaseResult) -> dict[str, Any]:
         "map": case.map_name,
         "status": case.status,
         "headline": headline(case),
-        "cause": case.causes[0].name if case.causes else None,
+        "cause": _cause_name(case),
         "seeds": [run.seed for run in case.runs],
         "wall_seconds": round(case.wall_seconds, 3),
         "problems": list(case.problems),
@@ -158,6 +160,12 @@ def _case(case: CaseResult) -> dict[str, Any]:
         "baseline": None if case.case.baseline is None else str(case.case.baseline),
         "baseline_updated": case.updated,
     }
+
+
+def _cause_name(case: CaseResult) -> str | None:
+    if case.unusable:
+        return "usable"
+    return case.causes[0].name if case.causes else None
 
 
 def _change(change: Change) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def test_flow_density_and_speed_are_edies():
     assert row["speed"] == pytest.approx(10.0)
     assert row["travel_time"] == pytest.approx(50.0)
     assert row["free_flow_time"] == pytest.approx(40.0), "at the speed that they wished for"
-    assert row["level"] == "B", "0.8 of the free-flow speed is not more than 0.8"
+    assert row["level"] is None, "two vehicles are too few for a level"
     assert row["co2"] is None
 
 
@@ -109,7 +109,7 @@ def test_delay_of_a_junction_begins_on_the_way_to_it():
     assert row["delay"] == pytest.approx(36.0)
     assert row["waiting"] == pytest.approx(25.0)
     assert row["standing"] == pytest.approx(50.0 / 60.0)
-    assert row["level"] == "D", "a signal may cost 35 s for C"
+    assert row["level"] is None, "two vehicles are too few for a level"
     assert row["seconds"] == 4.0, "time is spent in the junction, not before it"
     assert row["queue_max"] is None
 
@@ -128,7 +128,7 @@ def test_vehicles_of_a_lane_share_its_delay_and_those_of_a_road_what_is_lost_bef
     straight, left = (only(movements, movement=f"r1>j2>{name}") for name in ("r3", "r4"))
     assert straight["delay"] == pytest.approx(10.0 + 4.0)
     assert left["delay"] == pytest.approx(10.0 + 60.0 + 1.0)
-    assert (straight["level"], left["level"]) == ("B", "E")
+    assert (straight["level"], left["level"]) == (None, None), "too few vehicles for a level"
 
 
 def test_what_a_red_light_costs_is_told_when_it_turns_green():
@@ -189,6 +189,18 @@ def test_levels_are_those_of_the_highway_capacity_manual():
     assert found == [*"ABCDEF", None]
 
 
+def test_ten_vehicles_have_a_level_and_nine_do_not():
+    for number, level in ((9, None), (10, "D")):
+        lanes = pl.DataFrame(
+            [
+                lane("up", seconds=50.0, lost=30.0 * number, stood=20.0, distance=300.0),
+                lane(":s", seconds=4.0, lost=6.0 * number, distance=40.0, entered=number),
+            ]
+        )
+        row = only(traffic_figures(lanes, PLACES, end=60.0).junctions, junction="j2")
+        assert (row["delay"], row["level"]) == (pytest.approx(36.0), level)
+
+
 def test_intervals_without_anybody_are_there_too():
     lanes = pl.DataFrame([lane("up", begin=60.0), lane("a", begin=60.0), lane("up", begin=240.0)])
     assert intervals(lanes, 330.0)["begin"].to_list() == [0.0, 60.0, 120.0, 180.0, 240.0, 300.0]
@@ -217,7 +229,7 @@ def test_files_say_the_same_and_their_units(tmp_path):
     for name in TABLES:
         table = pl.read_csv(tmp_path / "figures" / f"{name}.csv")
         assert table.height == getattr(figures, name).height
-        words = {"segment", "junction", "movement", "control", "level"}
+        words = {"segment", "junction", "movement", "control", "facility", "level"}
         assert set(table.columns) - words <= set(COLUMN_UNITS)
     data = json.loads(figures_json(RunData(traffic=figures), figures))
     assert data["segments"][0]["co2"] == 5.0

@@ -2,11 +2,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.results.by_place.traffic import TABLES
-from odscen.results.measures.traffic_files import places_from_json, read_tables
+from odscen.results.by_place.traffic import TABLES, over_run
+from odscen.results.measures.traffic_files import places_from_json, read_tables, write_tables
+from odscen.results.report.report_service import service_section
+from tests.results.made_traffic import made_figures
 
 
 @pytest.mark.parametrize(
@@ -35,3 +38,17 @@ def test_a_torn_table_of_figures_is_named(tmp_path: Path, content: bytes) -> Non
 def test_a_torn_list_of_figures_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not figures of a run"):
         places_from_json(text, "segments")
+
+
+def test_tables_of_an_earlier_version_are_read_and_shown_by_their_delay(tmp_path: Path) -> None:
+    write_tables(made_figures(), tmp_path)
+    new = ("facility", "control_delay", "passages", "control_seconds", "lane_density",
+           "car_seconds", "lane_metres")  # fmt: skip
+    for name in TABLES:
+        table = pl.read_csv(tmp_path / f"{name}.csv")
+        table.drop(new, strict=False).write_csv(tmp_path / f"{name}.csv")
+    found = read_tables(tmp_path)
+    assert found is not None
+    (junction,) = over_run(found.junctions).to_dicts()
+    assert (junction["control_delay"], junction["level"]) == (None, "D")
+    assert "47.4" in str(service_section(found))

@@ -11,7 +11,7 @@ from odscen.results.report.place_shapes import PlaceShapes
 from odscen.results.report.report_corridor import NONE_RECORDED, CorridorTraces, corridor_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_flow import diagram_section, flow_section
-from odscen.results.report.report_service import level_strip, service_section
+from odscen.results.report.report_service import level_strip, service_map, service_section
 from odscen.results.report.report_words import stretch
 from tests.results.made_traffic import NOBODY, PLACES, lane_rows, made_figures
 from tests.results.report.test_run_report import EVIL, Reader, report
@@ -39,7 +39,7 @@ def cells(markup):
 
 def test_a_junction_has_its_level_delay_and_worst_time():
     # 50, 100, 150 and 60 vehicles lost 5, 30, 90 and 5 s: 17,050 s by 360 of them.
-    section = service_section(made_figures(), SHAPES)
+    section = service_section(made_figures())
     rows = cells(section)
     row = next(row for row in rows if row[0] == "j10")
     assert row[:4] == ["j10", "signal", "D", "47.4"]
@@ -49,7 +49,7 @@ def test_a_junction_has_its_level_delay_and_worst_time():
 
 
 def test_the_map_colours_places_and_leaves_those_without_traffic_grey():
-    section = str(service_section(made_figures(), SHAPES))
+    section = str(service_map(made_figures(), SHAPES))
     # On r1 it takes 57 s to drive what would take 10.
     assert re.search(r'href="#place-0" class="los-f"><title>r1: level F, 6 km/h', section)
     assert re.search(r'href="#place-1" class="los-a"><title>r2: level A, 36 km/h', section)
@@ -64,12 +64,12 @@ def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
     # Two vehicles stand before it for a quarter of an hour.
     stuck = lane_rows(0, "a_0", 2, length=0.0, lost=900.0, co2=20.0, source=True, sink=False)
     rows = pl.DataFrame([stuck | {"waiting": 1800.0}])
-    section = str(service_section(traffic_figures(rows, PLACES, end=900.0), SHAPES))
+    section = str(service_map(traffic_figures(rows, PLACES, end=900.0), SHAPES))
     assert "<title>j10: level F, no vehicle enters it</title>" in section
 
 
 def test_a_place_with_few_vehicles_is_not_among_the_worst():
-    section = service_section(made_figures([(3, 300.0), (3, 300.0)]), None)
+    section = service_section(made_figures([(3, 300.0), (3, 300.0)]))
     assert section is None
 
 
@@ -161,7 +161,8 @@ def test_names_of_places_are_escaped():
     )
     shapes = PlaceShapes({EVIL: SHAPES.segments["r1"]}, {EVIL: SHAPES.junctions["j10"]})
     for section in (
-        service_section(figures, shapes),
+        service_section(figures),
+        service_map(figures, shapes),
         emission_section(figures),
         corridor_section(traces(segments=(EVIL,), junctions=[(EVIL, 1.0, 2.0)])),
     ):
@@ -172,7 +173,17 @@ def test_names_of_places_are_escaped():
 def test_the_whole_report_holds_every_section_and_is_well_formed():
     page = report(figures=made_figures(), shapes=SHAPES, corridor=traces())
     found = re.findall(r'<section id="(\w+)"', page)
-    wanted = {"figures", "service", "map", "flow", "diagram", "corridor", "walking", "emissions"}
+    wanted = {
+        "brief",
+        "figures",
+        "service",
+        "map",
+        "flow",
+        "diagram",
+        "corridor",
+        "walking",
+        "emissions",
+    }
     assert wanted <= set(found)
     assert page.count("How to read this:") == len(found)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +18,22 @@ import pytest
 import sumo
 from lxml import etree
 
+from odscen.results.by_place.control_delay import lost_time, vehicle_passages
+from odscen.results.by_place.facilities import (
+    FacilityData,
+    NetFacts,
+    highway_density,
+    movement_facilities,
+    passage_sums,
+)
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
 from odscen.results.by_place.traffic_sums import intervals
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
+from odscen.sumo.folder import layout
 from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.net_facts import read_net_facts
 from odscen.sumo.outputs.trip_table import trip_table
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumo_lane_places import lane_places
@@ -54,6 +65,7 @@ class Run:
     figures: TrafficFigures
     steps: pl.DataFrame
     trips: pl.DataFrame
+    stretches: pl.DataFrame
 
     def loops(self, edge: str) -> int:
         """Vehicles that induction loops counted on all lanes of an edge."""
@@ -96,6 +108,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         if not edge.startswith(":")
         for lane in own
     ]
+    ends = [
+        f'<det{end} lane="{lane}" pos="{pos}"/>'
+        for end, direction, pos in (("Entry", "f", 5), ("Exit", "b", -15))
+        for arm in ARMS
+        for lane in lanes[f"{arm}.0.{direction}"]
+    ]
+    around = f'<entryExitDetector id="around" period="{UNTIL:g}" file="around.xml">'
+    loops += [around, *ends, "</entryExitDetector>"]
     (folder / "loops.add.xml").write_text("\n".join(["<additional>", *loops, "</additional>"]))
     subprocess.run(
         [
@@ -116,7 +136,30 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     trips = trip_table(folder / "trips.xml", unfinished=True)
     assert trips.height == NUMBER
     assert trips["arrival"].null_count() == 0
-    return Run(folder, traffic_figures(table, places, end=UNTIL, queues=queues), steps, trips)
+    facts = facts_of(folder)
+    rows = pl.scan_parquet(folder / "fcd.parquet")
+    stretches = lost_time(rows, places, facts.limits, facts.drivers, period=STEP)
+    passed = vehicle_passages(rows, places, facts)
+    assert stretches is not None
+    assert passed is not None
+    kinds = movement_facilities(places, facts)
+    clock = intervals(table, UNTIL)
+    facilities = FacilityData(
+        kinds, *passage_sums(passed, kinds, clock), highway_density(table, places, facts, None)
+    )
+    figures = traffic_figures(table, places, end=UNTIL, queues=queues, facilities=facilities)
+    return Run(folder, figures, steps, trips, stretches)
+
+
+def facts_of(folder: Path) -> NetFacts:
+    """What net and routes of the folder say, laid out as in a run."""
+    inside = folder / "run" / layout.SUMO_FOLDER
+    inside.mkdir(parents=True)
+    shutil.copy(folder / f"{MAP}.net.xml", inside / layout.NET_FILE)
+    shutil.copy(folder / "routes.rou.xml", inside / layout.ROUTES_FILE)
+    facts = read_net_facts(folder / "run")
+    assert facts is not None
+    return facts
 
 
 def of(table: pl.DataFrame, **key: str) -> dict[str, float]:
@@ -132,6 +175,31 @@ def test_delay_and_travel_time_are_those_of_tripinfo(run):
     assert network["seconds"] / NUMBER == pytest.approx(run.trips["duration"].mean(), rel=CLOSE)
     assert network["distance"] == pytest.approx(run.trips["route_length"].sum(), rel=CLOSE)
     assert run.trips["time_loss"].mean() > 10.0, "else there is nothing to be measured"
+
+
+def test_time_lost_on_all_stretches_is_that_of_tripinfo_for_each_vehicle(run):
+    parts = ("behind", "on_the_way", "before", "inside")
+    ours = run.stretches.group_by("id").agg(pl.sum_horizontal(parts).sum().alias("ours"))
+    both = ours.join(run.trips.select("id", "time_loss"), on="id")
+    assert both.height == NUMBER
+    assert both["ours"].sum() == pytest.approx(both["time_loss"].sum(), rel=CLOSE)
+    assert (both["ours"] - both["time_loss"]).abs().max() < 0.5
+
+
+def test_control_delay_is_what_a_detector_around_the_junction_measures_but_for_the_cruise(run):
+    """SUMO's E3 detector: time lost from 5 m behind the start to 15 m before the end."""
+    (found,) = etree.parse(run.folder / "around.xml").getroot()
+    assert int(found.get("vehicleSum")) == NUMBER
+    on_the_way = run.stretches["on_the_way"].sum() / NUMBER
+    junction = of(run.figures.junctions, junction="j10001")
+    assert (junction["facility"], junction["passages"]) == ("signal", NUMBER)
+    lost = float(found.get("meanTimeLoss"))
+    assert junction["control_delay"] == pytest.approx(lost - on_the_way, rel=2 * CLOSE)
+    assert 0.0 < on_the_way < 0.05 * lost
+    assert junction["level"] == "C" if junction["control_delay"] > 20.0 else "B"
+    movements = over_run(run.figures.movements)
+    assert movements["passages"].sum() == NUMBER
+    assert movements["control_seconds"].sum() == pytest.approx(junction["control_seconds"])
 
 
 def test_flows_are_those_of_induction_loops(run):

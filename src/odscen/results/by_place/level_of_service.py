@@ -20,12 +20,23 @@ STREET_SPEED = (0.80, 0.67, 0.50, 0.40, 0.30)
 """Share of the free-flow speed above which vehicles on an urban street travel for level A, B, ...
 E: HCM Exhibit 18-1, whose speeds are these shares of the base free-flow speed."""
 
+HIGHWAY_DENSITY = tuple(round(bound / 1.609344, 2) for bound in (11.0, 18.0, 26.0, 35.0, 45.0))
+"""Passenger cars per km and lane up to which a freeway or multilane highway has level A, B, ... E:
+HCM Exhibit 12-15, whose bounds are 11, 18, 26, 35 and 45 pc/mi/ln."""
+FEWEST = 10
+"""A place with fewer vehicles has no level: a mean over a handful says nothing of the place."""
+
 _LEVELS: tuple[Level, ...] = ("A", "B", "C", "D", "E", "F")
 
 
 def street_level(share: pl.Expr) -> pl.Expr:
     """Level of a segment by travel speed over free-flow speed; null where that is null."""
     return _graded(share, [share > bound for bound in STREET_SPEED])
+
+
+def highway_level(density: pl.Expr) -> pl.Expr:
+    """Level of a freeway or multilane highway by passenger cars per km and lane."""
+    return _graded(density, [density <= bound for bound in HIGHWAY_DENSITY])
 
 
 def junction_level(delay: pl.Expr, control: pl.Expr) -> pl.Expr:

@@ -21,8 +21,11 @@ standing, waiting
     Of vehicles below 0.1 m/s: their mean number, and seconds per vehicle.
 delay and waiting of a junction
     Those on the approaches to it (from the junction before, over all segments between) and in it,
-    per vehicle that enters it: the control delay of the Highway Capacity Manual (HCM, 7th edition),
-    with what is lost behind other vehicles on the approach.
+    per vehicle that enters it: from lane data, without trajectories, and with what is lost behind
+    other vehicles on the approach.
+control_delay
+    The control delay of the Highway Capacity Manual (HCM, 7th edition), from trajectories:
+    :mod:`odscen.results.by_place.control_delay`.
 delay and waiting of a movement
     Vehicles that use one lane share its delay alike, as in a lane group of the HCM: that of the
     last edge by lane, that of the edges before it all together.
@@ -37,7 +40,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
-from odscen.results.by_place.level_of_service import junction_level, street_level
+from odscen.results.by_place.facility_levels import (
+    CONTROL,
+    place_level,
+    segment_level,
+    with_control,
+    with_density,
+)
 from odscen.results.by_place.traffic_sums import (
     INTERVAL,
     SUMS,
@@ -52,12 +61,13 @@ from odscen.results.by_place.traffic_sums import (
 if TYPE_CHECKING:
     import polars as pl
 
+    from odscen.results.by_place.facilities import FacilityData
     from odscen.results.by_place.lane_places import LanePlaces
 
 TableName = Literal["network", "segments", "junctions", "movements"]
 TABLES: tuple[TableName, ...] = get_args(TableName)
 
-_KEYS = ("segment", "movement", "junction", "control")
+_KEYS = ("segment", "movement", "junction", "control", "facility")
 _QUEUES = ("queue_max", "queue_p95")
 
 
@@ -85,13 +95,17 @@ class TrafficFigures:
         Also ``running`` (mean number under way), ``departed``, ``arrived``.
     segments
         Also ``segment``, ``travel_time`` and ``free_flow_time`` (s, along the whole segment; null
-        without vehicles), ``level``.
+        without vehicles), ``facility``, ``lane_density`` (of highways: passenger cars per km and
+        lane of the densest direction), ``level``.
     junctions
-        Also ``junction``, ``control``, ``level``, ``queue_max`` and ``queue_p95`` (vehicles that
+        Also ``junction``, ``control``, ``facility``, ``control_delay`` (s per vehicle; at a two-way
+        stop of the minor movements), ``passages`` that it is the mean of, ``level``, ``queue_max``
+        and ``queue_p95`` (vehicles that
         are stopped at one time on the approaches to it and in it; null without trajectories),
         ``throughput`` (the same as ``vehicles``).
     movements
-        Also ``movement`` (``r1>j10>r2``), ``junction``, ``control``, ``level``.
+        Also ``movement`` (``r1>j10>r2``), ``junction``, ``control``, ``facility``,
+        ``control_delay``, ``passages``, ``level``.
     """
 
     network: pl.DataFrame
@@ -101,7 +115,12 @@ class TrafficFigures:
 
 
 def traffic_figures(
-    lanes: pl.DataFrame, places: LanePlaces, *, end: float, queues: pl.DataFrame | None = None
+    lanes: pl.DataFrame,
+    places: LanePlaces,
+    *,
+    end: float,
+    queues: pl.DataFrame | None = None,
+    facilities: FacilityData | None = None,
 ) -> TrafficFigures:
     """Figures of one run.
 
@@ -113,14 +132,21 @@ def traffic_figures(
         When the run ended, s.
     queues
         From :func:`odscen.results.by_place.queues.queue_lengths`; if there are trajectories.
+    facilities
+        Kinds of facilities, control delay and density; without them levels of service are by
+        the delay of the lane data, and no road is a highway.
     """
     clock = intervals(lanes, end)
     lanes = summable(lanes)
+    segments = segment_sums(lanes, clock, places)
+    junctions = _with_queues(junction_sums(lanes, clock, places), queues)
+    movements = movement_sums(lanes, clock, places)
+    found = facilities
     return TrafficFigures(
         network=_with_rates(network_sums(lanes, clock, places)),
-        segments=_with_rates(segment_sums(lanes, clock, places)),
-        junctions=_with_rates(_with_queues(junction_sums(lanes, clock, places), queues)),
-        movements=_with_rates(movement_sums(lanes, clock, places)),
+        segments=_with_rates(with_density(segments, found)),
+        junctions=_with_rates(with_control(junctions, found, "junction")),
+        movements=_with_rates(with_control(movements, found, "movement")),
     )
 
 
@@ -129,12 +155,15 @@ def over_run(table: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     keys = [key for key in _KEYS if key in table.columns]
-    sums = [name for name in (*SUMS, "departed", "arrived") if name in table.columns]
+    summed = (*SUMS, "departed", "arrived", *CONTROL, "car_seconds")
+    sums = [name for name in summed if name in table.columns]
     added = [
         pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
     ]
     whole = [pl.col("begin").min(), pl.col("end").max(), pl.col("length").first(), *added]
     whole += [pl.col(name).max() for name in _QUEUES if name in table.columns]
+    if "lane_metres" in table.columns:
+        whole.append(pl.col("lane_metres").max())
     found = (
         table.group_by(keys, maintain_order=True).agg(whole)
         if keys
@@ -161,9 +190,12 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
         standing=col("standing_seconds") / seconds,
     )
     if "junction" in sums.columns:
-        blocked = (col("vehicles") == 0) & (col("standing") >= 1.0)
-        level = junction_level(col("delay"), col("control"))
-        rates = rates.with_columns(level=pl.when(blocked).then(pl.lit("F")).otherwise(level))
+        rates = rates.with_columns(
+            control_delay=pl.when(col("passages") > 0).then(
+                col("control_seconds") / col("passages")
+            )
+        )
+        rates = rates.with_columns(level=place_level())
         if "movement" not in sums.columns:
             rates = rates.with_columns(throughput="vehicles")
     elif "segment" in sums.columns:
@@ -172,8 +204,8 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
         rates = rates.with_columns(
             travel_time=driving.then(metres * col("seconds") / col("distance")),
             free_flow_time=driving.then(metres * free_seconds / col("distance")),
-            level=street_level(pl.when(col("seconds") > 0).then(free_seconds / col("seconds"))),
-        )
+            lane_density=col("car_seconds") / 3.6 / (seconds / 3600.0) / col("lane_metres"),
+        ).with_columns(level=segment_level(free_seconds))
     else:
         rates = rates.with_columns(running=col("seconds") / seconds)
     first = [*(key for key in _KEYS if key in sums.columns), *INTERVAL]

@@ -6,6 +6,7 @@ mean_travel_time, ...); :mod:`odscen.results.measures.registry` has them all. A 
 with a number from 0 to 1 that is written with a decimal point, or followed by ``%``, is taken as a
 share of the planned actors: ``arrived>=0.95``, ``arrived>=95%`` and ``arrived==1.0`` are shares,
 ``arrived>=1`` and ``collided==0`` are counts.
+``usable`` alone expects that the run is not "not usable".
 A unit may be another one of the same kind: ``mean_speed >= 30 km/h``; without one it is SI.
 """
 
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.errors import InputError
 from odscen.results.measures.figure import Basis, RunFigure
 from odscen.results.measures.registry import names_of, run_figure
+from odscen.results.measures.usability import UsabilityLevel, usability_score
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -52,6 +54,12 @@ class Expectation:
     share: bool
 
 
+USABLE = Expectation(
+    "usable", "usable", ">=", float(UsabilityLevel.RESERVATIONS.score), share=False
+)
+"""That the run is usable, perhaps with reservations; its value is 2, 1 or 0."""
+
+
 @dataclass(frozen=True, slots=True)
 class ExpectationVerdict:
     """An expectation and what the run had; ``value`` ``None`` if the run has no such figure."""
@@ -68,7 +76,7 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
     ----------
     text
         ``NAME OP NUMBER [UNIT]``, for example ``arrived >= 95 %`` or ``mean_delay <= 40 s``; SI
-        without a unit. The table of figures in docs/runs.md has the names.
+        without a unit. The table of figures in docs/runs.md has the names. Or ``usable``.
     own
         Further figures by name, whose values are put into the ``figures`` of the summary.
 
@@ -82,11 +90,13 @@ def parse_expectation(text: str, *, own: Mapping[str, Figure] | None = None) -> 
     InputError
         If it is not ``NAME OP NUMBER [UNIT]``, or the name is not known, or the unit does not fit.
     """
+    if text.strip() == USABLE.name:
+        return USABLE
     match = _PATTERN.fullmatch(text)
     if match is None:
         msg = (
             f"expectation {text!r} is not of the form NAME OP NUMBER, "
-            "for example arrived>=0.95 (OP is one of >= <= > < ==)"
+            "for example arrived>=0.95 (OP is one of >= <= > < ==), nor usable"
         )
         raise InputError(msg)
     name, number, unit = match["name"], match["number"], match["unit"] or ""
@@ -142,6 +152,8 @@ def _verdict(expectation: Expectation, summary: Mapping[str, Any]) -> Expectatio
 
 
 def _value(expectation: Expectation, summary: Mapping[str, Any]) -> float | None:
+    if expectation == USABLE:
+        return usability_score(summary)
     figure = run_figure(expectation.name)
     own = (summary.get("figures") or {}).get(expectation.name)
     value = own if figure is None else figure.of_summary(summary)

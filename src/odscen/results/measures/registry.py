@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from odscen.results.measures import (
     emissions,
     insertion,
+    latent_delay,
     outcome_counts,
     place_figures,
     reliability,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 RUN_FIGURES: tuple[RunFigure, ...] = (
     *outcome_counts.FIGURES,
     *insertion.FIGURES,
+    *latent_delay.FIGURES,
     *travel.FIGURES,
     *emissions.FIGURES,
     *reliability.FIGURES,

@@ -22,6 +22,22 @@ COLUMNS = (
         "time loss per vehicle: the sum of (1 - speed / desired speed) dt. Junction: from the "
         "junction before, or the start, through this one, per vehicle that enters",
     ),
+    _column(
+        "control_delay",
+        "s",
+        "control delay per vehicle that entered, from trajectories: slowing down, queue and "
+        "getting up to speed. Junction at a two-way stop: of the minor movements",
+    ),
+    _column("passages", "veh", "vehicles that `control_delay` is the mean of", whole=True),
+    _column("control_seconds", "veh*s", f"their control delay; {_SUM}"),
+    _column(
+        "lane_density",
+        "pc/km/ln",
+        "of freeways and multilane highways: passenger cars per km and lane of the densest "
+        "direction, a heavy vehicle as two",
+    ),
+    _column("car_seconds", "veh*s", f"time that passenger cars spent there; {_SUM}"),
+    _column("lane_metres", "m", "lanes of that direction"),
     _column("waiting", "s", f"stopped delay: time {_STOPPED} per vehicle; places as for `delay`"),
     _column("travel_time", "s", "segment: along all of it, at the mean speed"),
     _column("free_flow_time", "s", "segment: along all of it, at the speeds that drivers desired"),

@@ -24,11 +24,15 @@ def _throughput(run: RunData) -> float:
 
 
 def _worst_junction_delay(run: RunData) -> float | None:
+    import polars as pl
+
     if run.traffic is None:
         return None
     junctions = over_run(run.traffic.junctions)
     entered = junctions.filter(junctions["vehicles"] >= LEAST_VEHICLES)
-    worst = entered["delay"].max()
+    control = pl.when(pl.col("passages") >= LEAST_VEHICLES).then("control_delay")
+    shown = control if entered["passages"].count() else pl.col("delay")
+    worst = entered.select(shown.alias("shown"))["shown"].max()
     return worst if isinstance(worst, float) else None
 
 
@@ -58,6 +62,7 @@ FIGURES = (
         source="SUMO lane data, arrived",
         better=Better.HIGHER,
         basis=Basis.ROADS,
+        display=Display("veh/h", digits=0),
         compute=_throughput,
     ),
     RunFigure(
@@ -65,14 +70,14 @@ FIGURES = (
         unit="s",
         label="highest junction delay",
         definition="Control delay per vehicle of the junction with the highest, of those that "
-        f"{LEAST_VEHICLES} vehicles or more enter.",
-        source="HCM, 7th edition, control delay; with what is lost behind slower vehicles on the "
-        "approaches",
+        f"{LEAST_VEHICLES} vehicles or more enter; at two-way stops of the minor movements. "
+        "Without trajectories all that is lost on the approaches and in it.",
+        source="HCM, 7th edition, control delay, from trajectories",
         better=Better.LOWER,
         basis=Basis.ROADS,
         display=CLOCK,
         section=ReportSection.KEY_FIGURES,
-        note="per vehicle, on its approaches and in it",
+        note="control delay per vehicle",
         compute=_worst_junction_delay,
     ),
 )

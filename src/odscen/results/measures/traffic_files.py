@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
 from odscen.base.stored_files import documents, read_document, tables
+from odscen.results.by_place.facility_levels import with_missing
 from odscen.results.by_place.traffic import TABLES, TrafficFigures, over_run
 from odscen.results.measures.figure import Basis
 from odscen.results.measures.registry import COLUMN_UNITS, RUN_FIGURES, figure_values
@@ -55,7 +56,7 @@ def read_tables(folder: Path) -> TrafficFigures | None:
             if "begin" not in names:
                 msg = "not a table of figures: there is no column 'begin'"
                 raise InputError(msg, file=str(file))
-            found[name] = pl.read_csv(file, schema=_schema(names))
+            found[name] = with_missing(pl.read_csv(file, schema=_schema(names)))
     return TrafficFigures(**found)
 
 

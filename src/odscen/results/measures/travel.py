@@ -1,6 +1,7 @@
 """How vehicles and pedestrians travelled; apart, as the two mix badly.
 
-They are of those who have arrived, as the trips of the others are not over.
+They are of those who have arrived, as the trips of the others are not over; but for the delay,
+which is of all: see :mod:`odscen.results.measures.latent_delay`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from odscen.results.measures.figure import (
     RunFigure,
     mean,
 )
+from odscen.results.measures.latent_delay import mean_delay
 from odscen.results.records.outcomes import ActorStatus
 
 if TYPE_CHECKING:
@@ -115,15 +117,17 @@ def _of_mode(
             name=f"{prefix}mean_delay",
             unit="s",
             label=f"{who}mean delay",
-            definition=f"Mean time loss, travelling below {desired}, per {walker} that arrived.",
-            source=f"{_TRIPINFO} timeLoss",
+            definition=f"Mean of latent delay and time loss, travelling below {desired}, per "
+            f"{walker} that was due to depart, until it arrived or the run ended."
+            + (" Who was inserted and had not arrived is not in it." if afoot else ""),
+            source=f"{_TRIPINFO} timeLoss and departDelay; FHWA-HOP-18-036",
             better=Better.LOWER,
             tolerance="2 % or 0.5 s",
             display=CLOCK,
             section=section,
-            note=f"time lost below {desired}",
+            note="latent delay included",
             on_page=not afoot,
-            compute=lambda run: mean([one.delay for one in of(run)]),
+            compute=lambda run: mean_delay(of(run), run.end),
         ),
         RunFigure(
             name=f"{prefix}mean_waiting_time",

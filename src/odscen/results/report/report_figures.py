@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.markup import Markup, element, number
 from odscen.results.measures.figure import Better, ReportSection
-from odscen.results.measures.registry import RUN_FIGURES
+from odscen.results.measures.registry import RUN_FIGURES, run_figure
 from odscen.results.report.page_templates import report_section
 from odscen.results.report.report_words import duration
 
@@ -54,6 +54,16 @@ def figure_cards(section: ReportSection, values: Mapping[str, Any]) -> list[Card
         _card(figure, float(value), values)
         for figure in RUN_FIGURES
         if figure.section is section and (value := values.get(figure.name)) is not None
+    ]
+
+
+def named_cards(names: Iterable[str], values: Mapping[str, Any]) -> list[Card]:
+    """Cards of the figures of these names that the run has; ``values`` as for figure_cards."""
+    figures = [figure for name in names if (figure := run_figure(name)) is not None]
+    return [
+        _card(figure, float(value), values)
+        for figure in figures
+        if (value := values.get(figure.name)) is not None
     ]
 
 

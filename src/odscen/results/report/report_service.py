@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.markup import Markup, element, join, number, path_data
+from odscen.results.by_place.level_of_service import FEWEST
 from odscen.results.by_place.traffic import over_run
 from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.plots import legend
@@ -36,14 +37,16 @@ FEW = 20
 """Vehicles that a place has to have had to be among the worst: one unlucky driver is no jam."""
 
 
-def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Markup | None:
-    """Map and tables; ``None`` if no vehicle drove."""
-    junctions, movements = over_run(figures.junctions), over_run(figures.movements)
-    worst = _worst(junctions)
-    turns = _worst(movements)
-    parts = []
-    if shapes is not None and (drawn := _service_map(figures, shapes, worst)) is not None:
-        parts.append(drawn)
+def service_map(figures: TrafficFigures, shapes: PlaceShapes) -> Markup | None:
+    """Map of the levels over the run and in its busiest interval; ``None`` if no vehicle drove."""
+    return _service_map(figures, shapes, worst_places(over_run(figures.junctions)))
+
+
+def service_section(figures: TrafficFigures) -> Markup | None:
+    """Tables of the worst places; ``None`` if there are none."""
+    worst = worst_places(over_run(figures.junctions))
+    turns = worst_places(over_run(figures.movements))
+    parts: list[Markup] = []
     for title, place, shown, table in (
         ("Junctions with the highest delay", "junction", worst, figures.junctions),
         ("Turning movements with the highest delay", "movement", turns, figures.movements),
@@ -54,22 +57,25 @@ def service_section(figures: TrafficFigures, shapes: PlaceShapes | None) -> Mark
         return None
     explained = (
         "levels from A (free flow) to F (demand exceeds capacity), with the limits of the Highway "
-        "Capacity Manual, 7th edition: junctions and turning movements by control delay per "
-        "vehicle (here with time lost behind slower vehicles), roads by travel speed as a share "
-        "of free-flow speed. The strip shows the level "
-        "over the whole run, from left to right. A queue is the number of stopped vehicles. "
+        "Capacity Manual, 7th edition, for each kind of facility: junctions and turning movements "
+        "by control delay per vehicle, at a two-way stop of the minor movements only; streets by "
+        "travel speed as a share of free-flow speed, freeways and multilane highways by passenger "
+        f"cars per km and lane. Fewer than {FEWEST} vehicles have no level. The strip shows the "
+        "level over the whole run, from left to right. A queue is the number of stopped vehicles. "
         f"Places are named as in the editor; those with fewer than {FEW} vehicles are not listed."
     )
     return report_section("Level of service", *parts, explained=explained, ident="service")
 
 
-def _worst(rows: pl.DataFrame) -> list[dict[str, Any]]:
+def worst_places(rows: pl.DataFrame) -> list[dict[str, Any]]:
     """Return the places with the longest delay first; those with traffic only."""
     import polars as pl
 
-    busy = rows.filter((pl.col("vehicles") >= FEW) & pl.col("delay").is_not_null())
+    shown = rows.with_columns(shown=pl.coalesce("control_delay", "delay"))
+    number = pl.coalesce("passages", "vehicles")
+    busy = shown.filter((number >= FEW) & pl.col("shown").is_not_null())
     place = "movement" if "movement" in rows.columns else "junction"
-    return busy.sort(["delay", place], descending=[True, False]).head(SHOWN).to_dicts()
+    return busy.sort(["shown", place], descending=[True, False]).head(SHOWN).to_dicts()
 
 
 def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -> Markup:
@@ -87,9 +93,8 @@ def _place_table(place: str, shown: list[dict[str, Any]], table: pl.DataFrame) -
         times = table.filter(pl.col(place) == row[place]).sort("begin")
         cells = [element("th", str(row[place]).replace(">", " > "), scope="row")]
         if place == "junction":
-            control = "signal" if row["control"] == "signal" else "priority"
-            cells.append(element("td", control))
-        cells += [element("td", level_badge(row["level"])), _cell(row["delay"], 1)]
+            cells.append(element("td", row["facility"] or row["control"]))
+        cells += [element("td", graded(row)), _cell(row["shown"], 1)]
         cells.append(_cell(row["standing"], 1))
         if place == "junction":
             cells.append(_cell(row["queue_max"], 0))
@@ -105,13 +110,21 @@ def _cell(value: float | None, digits: int) -> Markup:
 
 
 def _worst_time(times: pl.DataFrame) -> str:
-    import polars as pl
 
-    known = times.filter(pl.col("delay").is_not_null())
+    control = times["passages"].count() > 0
+    known = times.with_columns(shown="control_delay" if control else "delay").drop_nulls("shown")
     if known.is_empty():
         return "-"
-    row = known.sort(["delay", "begin"], descending=[True, False]).row(0, named=True)
-    return f"{stretch(row['begin'], row['end']).split(' to ')[0]}, {number(row['delay'], 0)} s"
+    row = known.sort(["shown", "begin"], descending=[True, False]).row(0, named=True)
+    return f"{stretch(row['begin'], row['end']).split(' to ')[0]}, {number(row['shown'], 0)} s"
+
+
+def graded(row: Mapping[str, Any]) -> Markup:
+    """The letter on its colour; of a place with too few vehicles how many they were."""
+    if row["level"] is not None:
+        return level_badge(row["level"])
+    number = row["vehicles"] if row.get("passages") is None else row["passages"]
+    return Markup("-") if number >= FEWEST else element("span", f"n/a ({number:,} vehicles)")
 
 
 def level_badge(level: str | None) -> Markup:
@@ -204,7 +217,7 @@ def view_switch(group: str, views: Mapping[str, str]) -> list[Markup]:
 def level_legend() -> Markup:
     """Colours of the levels, and of places without traffic."""
     entries = [(f"los-{level.lower()}", words) for level, words in LEVELS.items()]
-    return legend([*entries, ("los-none", "no traffic")])
+    return legend([*entries, ("los-none", f"no traffic, or fewer than {FEWEST} vehicles")])
 
 
 def _busiest(network: pl.DataFrame) -> tuple[float, float] | None:
@@ -224,8 +237,9 @@ def _layer(
         row = found.get(name)
         level = None if row is None else row["level"]
         words = f"{name}: no traffic"
-        if row is not None and level is not None:
-            words = f"{name}: level {level}, {number(row['speed'] * 3.6, 0)} km/h"
+        if row is not None and row["speed"] is not None:
+            said = f"level {level}" if level else f"n/a ({row['vehicles']:,} vehicles)"
+            words = f"{name}: {said}, {number(row['speed'] * 3.6, 0)} km/h"
         parts.append(
             element("use", element("title", words), href=f"#place-{index}", class_=_style(level))
         )
@@ -239,8 +253,9 @@ def _layer(
         if row is None:
             continue
         lost = "no vehicle enters it"
-        if row["delay"] is not None:
-            lost = f"{number(row['delay'], 0)} s control delay per vehicle"
+        delay = row["delay"] if row["control_delay"] is None else row["control_delay"]
+        if delay is not None:
+            lost = f"{number(delay, 0)} s control delay per vehicle"
         words = f"{name}: level {row['level']}, {lost}"
         cx, cy = round(x * 100), round(-y * 100)
         disc = element("circle", cx=cx, cy=cy, r=radius, class_=_style(row["level"]))

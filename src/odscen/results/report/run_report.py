@@ -13,10 +13,12 @@ from odscen.results.measures.curves import presence
 from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.gridlock import find_incidents
 from odscen.results.measures.registry import figure_values
+from odscen.results.measures.usability import UsabilityLevel, run_usability
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.traces import bin_width, speed_over_time, tidy, travel
 from odscen.results.report.page_templates import html_page, page_head, report_section
 from odscen.results.report.plots import Series, line_chart
+from odscen.results.report.report_brief import brief_section
 from odscen.results.report.report_conflicts import conflict_section
 from odscen.results.report.report_corridor import corridor_section
 from odscen.results.report.report_emissions import emission_section
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.figure import Values
     from odscen.results.measures.gridlock import Incident
     from odscen.results.measures.summary import ActorOutcome
+    from odscen.results.measures.usability import Usability
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
@@ -110,14 +113,16 @@ def render_report(
     end = _end(summary, traces)
     incidents = find_incidents(plan, actors, events, end=end)
     title = plan.scenario or "Run"
-    run = RunData(actors, figures, conflicts=conflicts, visits=visits)
+    usability = run_usability(actors, incidents, end=end, until=_cut_short(summary, plan))
+    run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end)
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
     body = [
-        _head(title, plan, summary, _in_a_sentence(counts)),
+        _head(title, plan, summary, usability, _in_a_sentence(counts)),
+        brief_section({**given, **counts}, usability, figures, shapes),
         key_figure_section({**given, **counts}, traces),
         measure_section(plan.measures, int(counts["stranded"] or 0)),
-        service_section(figures, shapes) if figures else None,
+        service_section(figures) if figures else None,
         _map_section(traces, plan, actors, events, drawing, incidents, every),
         incident_section(incidents),
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
@@ -143,20 +148,31 @@ def _end(summary: Mapping[str, Any], traces: pl.DataFrame) -> float:
     return max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
 
 
-def _verdict(summary: Mapping[str, Any]) -> tuple[str, str]:
+def _cut_short(summary: Mapping[str, Any], plan: Plan) -> float | None:
+    return plan.until if summary.get("stopped") else None
+
+
+_STYLES = {
+    UsabilityLevel.USABLE: "good",
+    UsabilityLevel.RESERVATIONS: "fair",
+    UsabilityLevel.NOT_USABLE: "bad",
+}
+
+
+def _verdict(summary: Mapping[str, Any], usability: Usability) -> tuple[str, str]:
     """Class and words."""
-    status = str(summary.get("status", RunStatus.COMPLETED))
+    if summary.get("status") == RunStatus.FAILED:
+        return "bad", "The run failed"
     expectations = summary.get("expectations") or ()
     missed = sum(not row.get("passed") for row in expectations)
-    if status == RunStatus.FAILED:
-        return "bad", "The run failed"
-    words = "Completed" if status == RunStatus.COMPLETED else status
+    words = usability.level.capitalize()
     if missed:
         return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
+    style = _STYLES[usability.level]
     if expectations:
         met = "expectation met" if len(expectations) == 1 else "all expectations met"
-        return "good", f"{words}, {met}"
-    return ("good" if status == RunStatus.COMPLETED else "fair"), words
+        return style, f"{words}, {met}"
+    return style, words
 
 
 def _in_a_sentence(counts: Values) -> str:
@@ -181,8 +197,10 @@ def _in_a_sentence(counts: Values) -> str:
     return "; ".join(parts) + "."
 
 
-def _head(title: str, plan: Plan, summary: Mapping[str, Any], sentence: str) -> Markup:
-    style, words = _verdict(summary)
+def _head(
+    title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability, sentence: str
+) -> Markup:
+    style, words = _verdict(summary, usability)
     facts = [
         ("Map", summary.get("map")),
         ("Weather", summary.get("environment")),

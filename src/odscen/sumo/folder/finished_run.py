@@ -89,6 +89,15 @@ class Run:
         return 0 if self.expectations_met else 1
 
     @property
+    def usability(self) -> Mapping[str, Any]:
+        """Whether its figures can be used: ``level``, ``headline``, ``reasons``.
+
+        ``level`` is ``"usable"``, ``"usable with reservations"`` or ``"not usable"``. Empty for a
+        run of an earlier version.
+        """
+        return dict(self.summary.get("usable") or {})
+
+    @property
     def counts(self) -> Mapping[str, int]:
         """How many road users were planned, inserted, arrived, teleported, ..., by name."""
         return dict(self.summary["actors"])

@@ -4,6 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.results.by_place.control_delay import vehicle_passages
+from odscen.results.by_place.facilities import (
+    FacilityData,
+    heavy_share,
+    highway_density,
+    movement_facilities,
+    passage_sums,
+)
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import traffic_figures
@@ -21,6 +29,7 @@ from odscen.sumo.folder.recorded import (
     read_visits,
     trajectory_files,
 )
+from odscen.sumo.outputs.net_facts import read_net_facts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,10 +67,36 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
         return None
     places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
     files = trajectory_files(run)
-    queues = None
-    if files and not meso:
-        queues = queue_lengths(pl.scan_parquet(files), places, intervals(lanes, end))
-    return traffic_figures(lanes, places, end=end, queues=queues)
+    rows = pl.scan_parquet(files) if files and not meso else None
+    clock = intervals(lanes, end)
+    return traffic_figures(
+        lanes,
+        places,
+        end=end,
+        queues=None if rows is None else queue_lengths(rows, places, clock),
+        facilities=_facilities(run, lanes, places, rows, clock),
+    )
+
+
+def _facilities(
+    run: Path,
+    lanes: pl.DataFrame,
+    places: LanePlaces,
+    rows: pl.LazyFrame | None,
+    clock: pl.DataFrame,
+) -> FacilityData | None:
+    """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
+    facts = read_net_facts(run)
+    if facts is None:
+        return None
+    movements = movement_facilities(places, facts)
+    passed = None if rows is None else vehicle_passages(rows, places, facts)
+    by_junction, by_movement = (
+        (None, None) if passed is None else passage_sums(passed, movements, clock)
+    )
+    heavy = None if rows is None else heavy_share(rows, facts, clock)
+    density = highway_density(lanes, places, facts, heavy)
+    return FacilityData(movements, by_junction, by_movement, density)
 
 
 def read_run_data(

@@ -18,6 +18,7 @@ from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE
 from odscen.results.measures.summary import actors_from_json
+from odscen.results.measures.usability import failed_run, run_usability
 from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import events_from_json, rounded
@@ -127,6 +128,7 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
     summary: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
+        "usable": failed_run(ended.error).to_dict(),
         "status": RunStatus.COMPLETED if done else RunStatus.FAILED,
         "error": ended.error,
         "stopped": bool(done and done.stopped),
@@ -157,6 +159,9 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         events = events_from_json(text)
         incidents = find_incidents(plan, outcomes, events, end=done.sim_seconds)
         summary["gridlock"] = incident_summary(incidents)
+        until = plan.until if done.stopped else None
+        verdict = run_usability(outcomes, incidents, end=done.sim_seconds, until=until)
+        summary["usable"] = verdict.to_dict()
     summary["expectations"] = [
         {"expectation": v.expectation, "value": v.value, "passed": v.passed}
         for v in evaluate(prepared.settings.expectations, summary)

@@ -11,6 +11,7 @@ from pydantic import Field, create_model
 
 from odscen.results.measures.gridlock import Incident
 from odscen.results.measures.registry import COUNTS
+from odscen.results.measures.usability import UsabilityLevel, UsabilityReason
 from odscen.results.records.outcomes import RunStatus
 from odscen.web.messages import Answer
 
@@ -34,6 +35,14 @@ class GridlockInfo(Answer):
     moved_on: int
     kept_out: int
     places: list[Incident]
+
+
+class UsabilityInfo(Answer):
+    """Whether the figures of a run can be used, in one line and reason by reason."""
+
+    level: UsabilityLevel
+    headline: str
+    reasons: list[UsabilityReason] = Field(default_factory=list)
 
 
 class ExpectationInfo(Answer):
@@ -71,6 +80,7 @@ class RunSummary(Answer):
 
     format: str
     version: int
+    usable: UsabilityInfo | None = None
     status: RunStatus
     error: str | None = None
     stopped: bool = False

@@ -1,0 +1,250 @@
+"""Control delay of each vehicle at each junction, from trajectories.
+
+Control delay is what a signal, a sign or a roundabout costs: by slowing down on the approach, in
+the queue, and by getting up to speed again behind the junction (HCM, 7th edition, chapters 4 and
+19). Chapter 36 has its measurement on trajectories: time steps are added up by the share that speed
+falls short of free flow. Here, for a vehicle at speed ``v`` with desired speed ``v0`` (the limit
+of its lane times its speed factor, at most its own maximum)::
+
+    r    = min(v / v0, 1)
+    loss = (1 - r) dt
+    top  = largest r on the road between two junctions
+
+    behind a junction   loss until r has reached 0.95 top: of the junction behind
+    on the way          loss until r falls below 0.9 top: of none, unless top < 0.8
+    before a junction   all loss after that: of the junction ahead
+    in a junction       loss of that junction, against the speed of its own curve
+
+So what a slow leader costs on the road between is in no control delay, nor is getting up to speed
+after the departure. A vehicle that never got near its speed on the road (``top < 0.8``) is in the
+queue of the junction ahead from its top on.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.results.by_place.facilities import NetFacts
+    from odscen.results.by_place.lane_places import LanePlaces
+
+REACHED, SLOWED, FREE = 0.95, 0.90, 0.80
+"""Shares of the top speed that end the acceleration and begin the deceleration; share of the
+desired speed from which a vehicle counts as driving freely on the way."""
+
+_NEEDED = ("timestep_time", "vehicle_id", "vehicle_lane", "vehicle_speed")
+
+
+MOST_ROWS = 2_000_000
+"""Rows of trajectories that are held in memory at a time; more are taken vehicles by vehicles."""
+_THIN = 20_000_000
+"""Rows from which one record a second is taken: loss is the mean of its share over the steps."""
+
+
+def vehicle_passages(
+    trajectories: pl.LazyFrame, places: LanePlaces, facts: NetFacts
+) -> pl.DataFrame | None:
+    """Control delay of each vehicle at each junction of a run, however long it is.
+
+    Vehicles that serve stops are left out: their time at stops is no control delay.
+
+    Returns
+    -------
+    As :func:`passages`; ``None`` if lane or speed were not recorded.
+    """
+    import polars as pl
+
+    if not set(_NEEDED) <= set(trajectories.collect_schema()):
+        return None
+    time = pl.col("timestep_time").cast(pl.Float64)
+    number = int(trajectories.select(pl.len()).collect().item())
+    moments = trajectories.select(time.unique().sort()).collect().to_series()
+    period = float(moments.diff().min() or 0.0)  # type: ignore[arg-type]
+    if not number or period <= 0.0:
+        return None
+    end = float(moments[-1])
+    if number > _THIN and period < 1.0:
+        kept = moments.gather_every(round(1.0 / period))
+        trajectories = trajectories.filter(time.is_in(kept.implode()))
+        number, period = number * len(kept) // len(moments), period * round(1.0 / period)
+    chosen = facts.drivers.filter(~pl.col("serves"))
+    batches = -(-number // MOST_ROWS)
+    found = []
+    for batch in range(batches):
+        drivers = chosen.filter(pl.Series(range(len(chosen))) % batches == batch)
+        lost = lost_time(trajectories, places, facts.limits, drivers, period=period)
+        if lost is not None:
+            found.append(passages(lost, end=end, period=period))
+    return pl.concat(found).sort("time", "id")
+
+
+def lost_time(
+    trajectories: pl.LazyFrame,
+    places: LanePlaces,
+    limits: pl.DataFrame,
+    drivers: pl.DataFrame,
+    *,
+    period: float,
+) -> pl.DataFrame | None:
+    """Time that each vehicle lost on each stretch: a road between junctions, or a junction.
+
+    Parameters
+    ----------
+    trajectories
+        As recorded, see docs/runs.md; whole vehicles.
+    limits
+        ``lane`` and its speed ``limit``, m/s.
+    drivers
+        ``id``, ``factor`` on limits, and ``max_speed``, m/s; others are left out.
+    period
+        Seconds between two records.
+
+    Returns
+    -------
+    One row per vehicle and stretch in order of time: ``id``, ``number`` of the stretch,
+    ``junction`` and ``movement`` (null on roads), ``ahead`` (junction ahead, on roads),
+    ``approach``, ``begin`` and ``last`` (s), and seconds lost: ``behind``, ``on_the_way``,
+    ``before``, and ``inside``.
+    ``None`` if lane or speed were not recorded.
+    """
+    import polars as pl
+
+    if not set(_NEEDED) <= set(trajectories.collect_schema()):
+        return None
+    lanes = _known_lanes(places, limits)
+    known = drivers.select("id", "factor", "max_speed").with_row_index("vehicle")
+    # Numbers instead of names: there are very many rows.
+    rows = (
+        trajectories.select(
+            id=pl.col("vehicle_id").cast(str),
+            time=pl.col("timestep_time").cast(pl.Float64),
+            lane=pl.col("vehicle_lane").cast(str),
+            speed=pl.col("vehicle_speed").cast(pl.Float64),
+        )
+        .join(known.lazy(), on="id")
+        .join(lanes.lazy().select("lane", "place", "limit", "inner"), on="lane")
+        .select("vehicle", "time", "place", "inner", ratio=_share_of_desired())
+        .sort("vehicle", "time")
+    )
+    found = _stretch_sums(rows, period).collect()
+    return (
+        found.join(known.select("vehicle", "id"), on="vehicle")
+        .join(lanes.select("junction", "movement", first="place"), on="first")
+        .join(lanes.select("ahead", "approach", final="place"), on="final")
+        .sort("number")
+        .select("id", "number", "junction", "movement", "ahead", "approach", *_MEASURED)
+    )
+
+
+_MEASURED = ("begin", "last", "behind", "on_the_way", "before", "inside")
+
+
+def _known_lanes(places: LanePlaces, limits: pl.DataFrame) -> pl.DataFrame:
+    """Each lane with its limit and its junction, numbered; ``inner`` is 0 on roads."""
+    import polars as pl
+
+    within = pl.col("via").is_not_null()
+    ways = places.ways.select(
+        "lane",
+        "movement",
+        "approach",
+        ahead=pl.when(~within).then("junction"),
+        junction=pl.when(within).then("junction"),
+    )
+    rows = limits.select("lane", "limit").join(ways, on="lane", how="left", maintain_order="left")
+    inner = pl.col("junction").rank("dense").fill_null(0).cast(pl.UInt32)
+    return rows.with_columns(inner=inner).with_row_index("place")
+
+
+def _share_of_desired() -> pl.Expr:
+    import polars as pl
+
+    desired = pl.min_horizontal(pl.col("limit") * pl.col("factor"), "max_speed")
+    return (pl.col("speed") / desired).clip(0.0, 1.0)
+
+
+def _stretch_sums(rows: pl.LazyFrame, period: float) -> pl.LazyFrame:
+    """What is lost on each stretch; rows are sorted by vehicle and time."""
+    import polars as pl
+
+    col = pl.col
+    other = col("vehicle") != col("vehicle").shift(1)
+    road, top = col("inner") == 0, col("top")
+    reached, slowed = col("reached"), col("slowed")
+    return (
+        rows.with_columns(
+            number=(other | (col("inner") != col("inner").shift(1)))
+            .fill_null(value=True)
+            .cum_sum(),
+            # The first record is the insertion, before the first step is driven.
+            lost=pl.when(other.fill_null(value=True))
+            .then(0.0)
+            .otherwise((1.0 - col("ratio")) * period),
+        )
+        .with_columns(top=col("ratio").max().over("number"))
+        .with_columns(reached=(col("ratio") >= REACHED * top).cum_max().over("number"))
+        .with_columns(
+            slowed=(reached & ((col("ratio") < SLOWED * top) | (top < FREE)))
+            .cum_max()
+            .over("number")
+        )
+        .group_by("number")
+        .agg(
+            col("vehicle").first(),
+            first=col("place").first(),
+            final=col("place").last(),
+            begin=col("time").first(),
+            last=col("time").last(),
+            behind=col("lost").filter(road & ~reached).sum(),
+            on_the_way=col("lost").filter(road & reached & ~slowed).sum(),
+            before=col("lost").filter(road & slowed).sum(),
+            inside=col("lost").filter(~road).sum(),
+        )
+    )
+
+
+def passages(stretches: pl.DataFrame, *, end: float, period: float) -> pl.DataFrame:
+    """Control delay of each vehicle at each junction that it came to.
+
+    Parameters
+    ----------
+    stretches
+        From :func:`lost_time`.
+    end
+        When the run ended, s: who is slowed down before a junction then is counted with what it has
+        lost so far, without a movement.
+
+    Returns
+    -------
+    ``id``, ``junction``, ``movement`` (null for those that had not entered), ``approach``, ``time``
+    (s, when it entered, or the end) and ``control_delay`` (s).
+    """
+    import polars as pl
+
+    col = pl.col
+    around = stretches.with_columns(
+        previous=col("before").shift(1).over("id").fill_null(0.0),
+        following=col("behind").shift(-1).over("id").fill_null(0.0),
+    )
+    entered = around.filter(col("junction").is_not_null()).select(
+        "id", "junction", "movement", "approach",
+        time="begin",
+        control_delay=col("previous") + col("inside") + col("following"),
+    )  # fmt: skip
+    final = (col("number") == col("number").max().over("id")) & (col("last") > end - 2 * period)
+    queued = around.filter(
+        final
+        & col("ahead").is_not_null()
+        & (col("before") > 0.0)
+        & (col("last") > end - 2 * period)
+    ).select(
+        "id",
+        pl.lit(None, pl.String).alias("movement"),
+        "approach",
+        junction="ahead",
+        time="last",
+        control_delay="before",
+    )
+    return pl.concat([entered, queued.select(entered.columns)]).sort("time", "id")

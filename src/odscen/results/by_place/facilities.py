@@ -1,0 +1,273 @@
+"""What kind of facility a junction, a movement or a segment is, as the HCM distinguishes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from odscen.results.by_place.lane_places import LanePlaces
+
+STOP, ALL_WAY = "s", "w"
+"""SUMO's states of connections at a stop sign, and where everybody has to stop."""
+
+HIGHWAY_SPEED = 80.0 / 3.6
+"""m/s: from this limit on, and with two lanes or more in a direction, a road is a freeway or
+multilane highway of HCM chapter 12."""
+
+HEAVY_AS_CARS = 2.0
+"""Passenger cars that a truck or bus stands for on level terrain: HCM Exhibit 12-25."""
+
+
+class Facility(StrEnum):
+    """Kind of facility; each has thresholds of its own for its level of service."""
+
+    SIGNAL = "signal"
+    ROUNDABOUT = "roundabout"
+    ALL_WAY_STOP = "all-way stop"
+    TWO_WAY_STOP = "two-way stop"
+    MINOR = "minor movement"
+    MAJOR = "major movement"
+    UNCONTROLLED = "uncontrolled"
+    STREET = "street"
+    HIGHWAY = "highway"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FacilityData:
+    """What levels of service by facility are made of.
+
+    Attributes
+    ----------
+    movements
+        From :func:`movement_facilities`.
+    by_junction, by_movement
+        Control delay, from :func:`passage_sums`; ``None`` without trajectories.
+    density
+        From :func:`highway_density`.
+    """
+
+    movements: pl.DataFrame
+    by_junction: pl.DataFrame | None
+    by_movement: pl.DataFrame | None
+    density: pl.DataFrame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetFacts:
+    """What the network says that :class:`LanePlaces` does not.
+
+    Attributes
+    ----------
+    limits
+        ``lane``, its ``edge``, and its speed ``limit``, m/s.
+    links
+        One row for each connection through a junction: ``via`` (its first lane inside), its
+        ``state`` (SUMO's letter), whether it ``gives_way`` to other vehicles, and whether it leads
+        ``onto_ring`` or comes ``from_ring``, a roundabout.
+    drivers
+        ``id``, ``factor`` on limits, ``max_speed`` (m/s), whether a vehicle is ``heavy``, and
+        whether it ``serves`` stops.
+    """
+
+    limits: pl.DataFrame
+    links: pl.DataFrame
+    drivers: pl.DataFrame
+
+
+def movement_facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
+    """``movement``, ``junction``, ``approach``, ``facility`` of each way through a junction."""
+    import polars as pl
+
+    col = pl.col
+    lit = places.movements.select("movement", "control")
+    kinds = (
+        places.ways.filter(col("via").is_not_null())
+        .unique("via")
+        .join(facts.links, on="via", how="left")
+        .join(lit, on="movement", how="left")
+        .group_by("movement", "junction", "approach")
+        .agg(
+            signal=(col("control") == "signal").any(),
+            inside=col("from_ring").any(),
+            ring=col("onto_ring").any(),
+            all_way=(col("state") == ALL_WAY).any(),
+            minor=((col("state") == STOP) | col("gives_way")).any(),
+        )
+    )
+    facility = (
+        pl.when("signal").then(pl.lit(Facility.SIGNAL.value))
+        .when("inside").then(pl.lit(Facility.MAJOR.value))
+        .when("ring").then(pl.lit(Facility.ROUNDABOUT.value))
+        .when("all_way").then(pl.lit(Facility.ALL_WAY_STOP.value))
+        .when("minor").then(pl.lit(Facility.MINOR.value))
+        .otherwise(pl.lit(Facility.MAJOR.value))
+    )  # fmt: skip
+    return kinds.select("movement", "junction", "approach", facility=facility).sort(
+        "movement", "approach"
+    )
+
+
+_OF_JUNCTION = (
+    (Facility.MINOR, Facility.TWO_WAY_STOP),
+    (Facility.ALL_WAY_STOP, Facility.ALL_WAY_STOP),
+    (Facility.ROUNDABOUT, Facility.ROUNDABOUT),
+    (Facility.SIGNAL, Facility.SIGNAL),
+)
+"""A junction with such a movement is such a facility; the later ones go before."""
+
+
+def junction_facilities(movements: pl.DataFrame) -> pl.DataFrame:
+    """``junction`` and ``facility``, from those of its movements."""
+    import polars as pl
+
+    whole = pl.lit(Facility.UNCONTROLLED.value)
+    for of_movement, of_junction in _OF_JUNCTION:
+        there = (pl.col("facility") == of_movement.value).any()
+        whole = pl.when(there).then(pl.lit(of_junction.value)).otherwise(whole)
+    return movements.group_by("junction").agg(facility=whole).sort("junction")
+
+
+_SOME = (Facility.TWO_WAY_STOP.value, Facility.ROUNDABOUT.value, Facility.UNCONTROLLED.value)
+"""Junctions of which not all movements count."""
+
+
+def passage_sums(
+    passed: pl.DataFrame, movements: pl.DataFrame, clock: pl.DataFrame
+) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Control delay by junction and by movement, summed up by interval.
+
+    At a two-way stop a junction has that of its minor movements, at a roundabout of those that
+    enter it; and of who is queued on an approach from which there are no others.
+
+    Parameters
+    ----------
+    passed
+        From :func:`odscen.results.by_place.control_delay.passages`.
+    movements
+        From :func:`movement_facilities`.
+    clock
+        ``begin`` and ``end`` of each interval.
+
+    Returns
+    -------
+    Two tables with ``begin``, ``passages`` and ``control_seconds``.
+    """
+    import polars as pl
+
+    col = pl.col
+    major = movements.filter(col("facility") == Facility.MAJOR.value)
+    two_way = junction_facilities(movements).filter(col("facility").is_in(_SOME))
+    timed = (
+        passed.sort("time")
+        .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)
+        .drop_nulls("begin")
+    )
+    there = col("junction").is_in(two_way["junction"].implode())
+    first = pl.when(col("movement").is_not_null()).then(
+        col("movement").is_in(major["movement"].implode())
+    )
+    left_out = there & first.otherwise(col("approach").is_in(major["approach"].implode()))
+
+    def summed(rows: pl.DataFrame, place: str) -> pl.DataFrame:
+        return (
+            rows.drop_nulls(place)
+            .group_by(place, "begin")
+            .agg(passages=pl.len().cast(pl.Int64), control_seconds=col("control_delay").sum())
+            .sort(place, "begin")
+        )
+
+    return summed(timed.filter(~left_out), "junction"), summed(timed, "movement")
+
+
+def highway_density(
+    lanes: pl.DataFrame, places: LanePlaces, facts: NetFacts, heavy: pl.DataFrame | None
+) -> pl.DataFrame:
+    """Passenger-car seconds and metres of lane of the freeways and multilane highways.
+
+    Parameters
+    ----------
+    lanes
+        Per lane and interval, as SUMO measures them.
+    heavy
+        ``lane``, ``begin`` and ``share``: of the vehicle-seconds there, those of heavy vehicles;
+        ``None`` without trajectories, which takes their share of all vehicles.
+
+    Returns
+    -------
+    ``segment``, ``begin``, ``car_seconds`` and ``lane_metres`` of the densest direction, by SUMO
+    edge. Segments that are no highway are not in it, nor intervals without vehicles.
+    """
+    import polars as pl
+
+    col = pl.col
+    motor = places.lanes.filter("motor").join(facts.limits, on="lane")
+    one_way = places.segments.rename({"length": "road"})
+    known = (
+        motor.with_columns(own=col("length") * col("share"))
+        .group_by("segment", "edge")
+        .agg(
+            col("own").first(),
+            metres=col("own").sum(),
+            wide=pl.len() >= 2,
+            fast=col("limit").min() >= HIGHWAY_SPEED,
+        )
+        .join(one_way, on="segment")
+        .with_columns(directions=(col("own").sum().over("segment") / col("road")).round())
+        # Edges one behind the other are one direction.
+        .with_columns(edge_of=pl.when(col("directions") > 1).then("edge").otherwise(pl.lit("")))
+        .filter((col("wide") & col("fast")).all().over("segment", "edge_of"))
+        .with_columns(metres=col("metres").sum().over("segment", "edge_of"))
+    )
+    share = float(facts.drivers["heavy"].mean() or 0.0)  # type: ignore[arg-type]
+    rows = lanes.select("lane", "begin", "seconds").join(
+        motor.select("lane", "edge", "segment", part="share"), on="lane"
+    )
+    if heavy is None:
+        rows = rows.with_columns(share=pl.lit(share))
+    else:
+        rows = rows.join(heavy, on=("lane", "begin"), how="left")
+    cars = col("seconds") * col("part") * (1.0 + col("share").fill_null(0.0) * (HEAVY_AS_CARS - 1))
+    return (
+        rows.with_columns(cars=cars)
+        .join(known.select("segment", "edge", "edge_of", "metres"), on=("segment", "edge"))
+        .group_by("segment", "edge_of", "begin")
+        .agg(car_seconds=col("cars").sum(), metres=col("metres").first())
+        .with_columns(density=col("car_seconds") / col("metres"))
+        .sort("density", "edge_of")
+        .group_by("segment", "begin", maintain_order=True)
+        .agg(col("car_seconds").last(), lane_metres=col("metres").last())
+        .sort("segment", "begin")
+    )
+
+
+def heavy_share(
+    trajectories: pl.LazyFrame, facts: NetFacts, clock: pl.DataFrame
+) -> pl.DataFrame | None:
+    """Share of heavy vehicles in the vehicle-seconds of each lane and interval.
+
+    Returns
+    -------
+    ``lane``, ``begin``, ``share``; ``None`` if the lane was not recorded.
+    """
+    import polars as pl
+
+    if "vehicle_lane" not in trajectories.collect_schema():
+        return None
+    return (
+        trajectories.select(
+            id=pl.col("vehicle_id").cast(str),
+            lane=pl.col("vehicle_lane").cast(str),
+            time=pl.col("timestep_time").cast(pl.Float64),
+        )
+        .join(facts.drivers.lazy().select("id", "heavy"), on="id")
+        .sort("time")
+        .join_asof(clock.lazy().sort("begin"), left_on="time", right_on="begin", coalesce=False)
+        .drop_nulls("begin")
+        .group_by("lane", "begin")
+        .agg(share=pl.col("heavy").mean())
+        .collect()
+    )
