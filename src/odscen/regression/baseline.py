@@ -19,6 +19,7 @@ from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
+from odscen.regression.scatter import FEWEST_SEEDS
 from odscen.results.records.run_records import json_with_rows
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ _OF_CHANCE = FigureKey("run", "", "mean_travel_time")
 _LEAST_SPREAD = 0.01
 """Share of the largest value by which this figure differs, at least, where seeds vary."""
 
+_SCATTER = "scatter"
+"""Value of ``tolerance`` in the file."""
+
 _KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
 Fingerprint = dict[str, str]
@@ -48,11 +52,16 @@ Fingerprint = dict[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Figures per seed; every tuple is in the order of ``seeds``."""
+    """Figures per seed; every tuple is in the order of ``seeds``.
+
+    ``by_scatter`` says that the scatter over the seeds decides what is allowed, where that is more
+    than the figure's own tolerance; baselines of few seeds, and those of before 0.2, do not.
+    """
 
     seeds: tuple[int, ...]
     fingerprint: Fingerprint
     figures: dict[FigureKey, tuple[float | None, ...]]
+    by_scatter: bool = False
 
 
 def fingerprint(
@@ -70,6 +79,8 @@ def fingerprint(
     wished = {"duration": settings.until, "step_length": settings.step_length}
     given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
+    if settings.redraw != "open":
+        document["redraw"] = settings.redraw
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)
     found = {"map": map_sha256[:_SHORT]}
@@ -89,7 +100,10 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
     seeds = tuple(sorted(runs))
     keys = dict.fromkeys(key for seed in seeds for key in runs[seed])
     return Baseline(
-        seeds, made_of, {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys}
+        seeds,
+        made_of,
+        {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys},
+        by_scatter=len(seeds) >= FEWEST_SEEDS,
     )
 
 
@@ -100,18 +114,23 @@ def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
     if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
         return ()
     spread = f"{min(known):g} to {max(known):g} s"
-    return (f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more",)
+    return (
+        f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more, "
+        'redraw = "traffic" makes them vary',
+    )
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
     """Write a baseline; the same figures give the same text."""
-    head = {
+    head: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "scenario": scenario,
         "fingerprint": baseline.fingerprint,
         "seeds": list(baseline.seeds),
     }
+    if baseline.by_scatter:
+        head["tolerance"] = _SCATTER
     write_text(file, json_with_rows(head, "rows", _rows(baseline)))
 
 
@@ -167,7 +186,8 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
         for name, values in row.items():
             if name != kind:
                 figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)
-    return Baseline(seeds, dict(data["fingerprint"]), figures)
+    by_scatter = data.get("tolerance") == _SCATTER
+    return Baseline(seeds, dict(data["fingerprint"]), figures, by_scatter)
 
 
 def _values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:

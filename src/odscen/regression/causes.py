@@ -27,6 +27,7 @@ _LABELS = {
     "scenario.environment": "environment",
     "scenario.roi": "region of interest",
     "scenario.simulation": "settings",
+    "scenario.redraw": "settings",
     "sumo": "SUMO",
     "odscen": "odscen",
 }

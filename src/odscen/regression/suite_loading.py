@@ -180,6 +180,7 @@ class _SuiteMaps:
 
 def _settings(case: Case) -> RunSettings:
     return RunSettings(
+        redraw=case.redraw,
         until=case.until,
         step_length=case.step_length,
         recording=Recording(criticality=needs_criticality(case.expectations)),

@@ -1,0 +1,133 @@
+r"""How far a mean over seeds may be from the baseline's by chance alone, from the seeds' scatter.
+
+Other seeds of the same distributions give other means. The difference of two of them, over
+``n_0`` seeds at the baseline and ``n_1`` now, lies with probability ``1 - q`` below
+
+``allowed = t(1 - q, n_0 - 1) * s * sqrt(1 / n_0 + 1 / n_1)``
+
+where ``s`` is the standard deviation over the baseline's seeds (prediction interval of the
+difference of two means, Student's t). Where both sides have the same seeds, they are also
+compared in pairs, same traffic under two conditions, and the lesser of the two limits holds:
+
+``allowed = t(1 - q, n - 1) * s_d / sqrt(n)``
+
+with ``s_d`` of the n differences. Each of both tests takes half of q, so that together they fail
+wrongly with probability q at most (Bonferroni).
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+FALSE_ALARMS = 0.02
+"""Probability, at most, that a scenario fails by chance: half of it in figures of the run and half
+in places, each shared out evenly among the figures (Bonferroni)."""
+
+FEWEST_SEEDS = 8
+"""Seeds from which scatter is a tolerance. Of fewer the quantile of Student's t is so large that
+anything would pass: 9.6 standard errors at 5 seeds and 50 at 3, against 5.4 at 8."""
+
+CHANGE, CAUGHT = 0.05, 0.9
+"""The change, as a share of the mean, and the probability of catching it, that seeds are for."""
+
+_MOST_SEEDS = 100_000
+
+
+class Level(NamedTuple):
+    """Probability of a false alarm in one figure of the run, and in one figure of a place."""
+
+    run: float
+    place: float
+
+    @classmethod
+    def shared(cls, *, run: int, places: int) -> Level:
+        """Share out :data:`FALSE_ALARMS` among so many figures."""
+        half = FALSE_ALARMS / 2
+        return cls(half / max(1, run), half / max(1, places))
+
+
+def allowed_by_chance(
+    old: Mapping[int, float | None],
+    new: Mapping[int, float | None],
+    *,
+    level: float,
+    both_sides: bool,
+) -> float | None:
+    """Largest difference of the means that chance explains, in the unit of the figure.
+
+    Parameters
+    ----------
+    old, new
+        Values by seed.
+    level
+        Probability of a false alarm, at most.
+    both_sides
+        Whether a difference in either direction fails; else only one does.
+
+    Returns
+    -------
+    float or None
+        ``None`` where fewer than :data:`FEWEST_SEEDS` of a side have the figure.
+    """
+    one, other = _known(old), _known(new)
+    if min(len(one), len(other)) < FEWEST_SEEDS:
+        return None
+    tail = level / 2 / (2 if both_sides else 1)
+    allowed = _quantile(tail, len(one) - 1) * _spread(list(one.values()))
+    allowed *= math.sqrt(1 / len(one) + 1 / len(other))
+    if one.keys() == other.keys():
+        pairs = [other[seed] - one[seed] for seed in one]
+        paired = _quantile(tail, len(pairs) - 1) * statistics.stdev(pairs) / math.sqrt(len(pairs))
+        allowed = min(allowed, paired)
+    return allowed
+
+
+def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
+    """Seeds with which a change by :data:`CHANGE` of the mean is caught, most of the time.
+
+    Both sides have that many, and other ones; with the same seeds on both sides it takes fewer,
+    how many depends on the change.
+
+    Returns
+    -------
+    int or None
+        ``None`` where the values do not tell: fewer than two of them, or a mean of 0.
+    """
+    if len(values) < 2 or not (mean := abs(statistics.fmean(values))):
+        return None
+    share = statistics.stdev(values) / mean
+    count = FEWEST_SEEDS
+    while count < _MOST_SEEDS and _detectable(share, count, level) > CHANGE:
+        count = math.ceil(count * 1.05)
+    return count
+
+
+def _detectable(share: float, count: int, level: float) -> float:
+    """Change that is caught as often as wanted, as a share of the mean."""
+    needed = _quantile(level / 2, count - 1) + _quantile(1 - CAUGHT, count - 1)
+    return needed * share * math.sqrt(2 / count)
+
+
+def _known(values: Mapping[int, float | None]) -> dict[int, float]:
+    return {seed: value for seed, value in values.items() if value is not None}
+
+
+def _spread(values: Sequence[float]) -> float:
+    """Standard deviation; of counts at least that of one run that is off by one."""
+    spread = statistics.stdev(values)
+    if all(value.is_integer() for value in values):
+        return max(spread, 1 / math.sqrt(len(values)))
+    return spread
+
+
+@cache
+def _quantile(tail: float, freedom: int) -> float:
+    from scipy.stats import t
+
+    return float(t.isf(tail, freedom))
