@@ -19,7 +19,14 @@ from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
-from odscen.regression.scatter import FEWEST_SEEDS
+from odscen.regression.scatter import (
+    CHANGE,
+    FEWEST_SEEDS,
+    VARYING,
+    Level,
+    hardly_varying,
+    seeds_needed,
+)
 from odscen.results.records.run_records import json_with_rows
 
 if TYPE_CHECKING:
@@ -37,9 +44,7 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
-_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
-_LEAST_SPREAD = 0.01
-"""Share of the largest value by which this figure differs, at least, where seeds vary."""
+_DELAY = FigureKey("run", "", "mean_delay")
 
 _SCATTER = "scatter"
 """Value of ``tolerance`` in the file."""
@@ -109,15 +114,26 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
 
 def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
     """Warn where seeds make next to no difference, as their scatter then says little of chance."""
-    values = baseline.figures.get(_OF_CHANCE, ())
-    known = [value for value in values if value is not None]
-    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+    words = hardly_varying(baseline.figures.get(FigureKey("run", "", VARYING), ()))
+    return () if words is None else (words,)
+
+
+def seeds_for_small_changes(baseline: Baseline) -> tuple[str, ...]:
+    """Say with how many seeds a small change of the mean delay would be caught."""
+    known = [value for value in baseline.figures.get(_DELAY, ()) if value is not None]
+    run = sum(key.kind == "run" for key in baseline.figures)
+    needed = seeds_needed(known, level=Level.shared(run=run, places=1).run)
+    if needed is None or needed <= len(baseline.seeds):
         return ()
-    spread = f"{min(known):g} to {max(known):g} s"
-    return (
-        f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more, "
-        'redraw = "traffic" makes them vary',
+    words = (
+        f"a change of mean_delay by {100 * CHANGE:g} % takes {needed} seeds to be told from chance"
     )
+    if baseline.by_scatter:
+        return (f"{words}; these are {len(baseline.seeds)}",)
+    few = (
+        f"{len(baseline.seeds)} seeds are too few to know their scatter, tolerances are fixed ones"
+    )
+    return (f"{few}; with {FEWEST_SEEDS} or more they come from it; {words}",)
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:

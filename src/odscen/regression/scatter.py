@@ -36,6 +36,11 @@ anything would pass: 9.6 standard errors at 5 seeds and 50 at 3, against 5.4 at 
 CHANGE, CAUGHT = 0.05, 0.9
 """The change, as a share of the mean, and the probability of catching it, that seeds are for."""
 
+VARYING = "mean_travel_time"
+"""The figure that seeds are to vary."""
+_LEAST_SPREAD = 0.01
+"""Share of the largest value by which it differs, at least, where seeds vary."""
+
 _MOST_SEEDS = 100_000
 
 
@@ -106,6 +111,18 @@ def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
     while count < _MOST_SEEDS and _detectable(share, count, level) > CHANGE:
         count = math.ceil(count * 1.05)
     return count
+
+
+def hardly_varying(values: Sequence[float | None]) -> str | None:
+    """Say so if values of :data:`VARYING` by seed make next to no difference."""
+    known = [value for value in values if value is not None]
+    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+        return None
+    spread = f"{min(known):g} to {max(known):g} s"
+    return (
+        f"the seeds hardly vary: {VARYING} is {spread}; more of them say no more, "
+        'redraw = "traffic" makes them vary'
+    )
 
 
 def _detectable(share: float, count: int, level: float) -> float:

@@ -32,9 +32,7 @@ def test_drivers_keep_their_speed_on_average_and_the_shares_of_their_styles():
     assert 8.0 <= min(speeds) <= max(speeds) <= 12.0
     departs = [one.depart for one in after.actors if not one.ego]
     assert 20.0 <= min(departs) < 23.0 < 47.0 < max(departs) <= 50.0
-    assert Counter(one.style for one in after.actors) == Counter(
-        one.style for one in before.actors
-    )
+    assert Counter(one.style for one in after.actors) == Counter(one.style for one in before.actors)
     assert [one.style for one in after.actors] != [one.style for one in before.actors]
     assert {one.goal for one in after.actors} == {"b"}
 
