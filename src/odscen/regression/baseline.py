@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.figure import FigureKind
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.workspace.map_entry import MapEntry
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -95,6 +96,11 @@ def fingerprint(
     return found | {"odscen": __version__, "sumo": version("libsumo")}
 
 
+def map_digest(entry: MapEntry) -> str:
+    """``map`` of the fingerprint of a run on this map."""
+    return entry.sha256[:_SHORT]
+
+
 def _digest(value: object) -> str:
     text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
@@ -125,15 +131,12 @@ def seeds_for_small_changes(baseline: Baseline) -> tuple[str, ...]:
     needed = seeds_needed(known, level=Level.shared(run=run, places=1).run)
     if needed is None or needed <= len(baseline.seeds):
         return ()
-    words = (
-        f"a change of mean_delay by {100 * CHANGE:g} % takes {needed} seeds to be told from chance"
-    )
+    count = len(baseline.seeds)
+    words = f"to tell a change of mean_delay by {100 * CHANGE:g} % from chance takes {needed} seeds"
     if baseline.by_scatter:
-        return (f"{words}; these are {len(baseline.seeds)}",)
-    few = (
-        f"{len(baseline.seeds)} seeds are too few to know their scatter, tolerances are fixed ones"
-    )
-    return (f"{few}; with {FEWEST_SEEDS} or more they come from it; {words}",)
+        return (f"{words}, not {count}",)
+    few = f"{count} seeds are too few to know their scatter, so tolerances are fixed ones"
+    return (f"{few}; from {FEWEST_SEEDS} seeds on they come from it; {words}",)
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from odscen.regression.verdict import Change
 
-_VERSIONS = ("sumo", "odscen")
+_PACKAGES = ("sumo", "odscen")
 
 _LABELS = {
     "map": "map",
@@ -32,6 +32,9 @@ _LABELS = {
     "odscen": "odscen",
 }
 """What people call each part of a fingerprint, the likeliest to change traffic first."""
+
+VERSIONS = tuple(_LABELS[name] for name in _PACKAGES)
+"""Names of the causes that are versions, not inputs."""
 
 _POINTS_TO = {
     ("run", "planned"): ("demand", "actors"),
@@ -73,7 +76,7 @@ def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Caus
 
 
 def _words(name: str, old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    if name in _VERSIONS:
+    if name in _PACKAGES:
         return f"{name} {old.get(name, 'none')} -> {new.get(name, 'none')}"
     part = name.removeprefix("scenario.")
     return f"the {name}" if part == name else f"the scenario's {part}"

@@ -13,12 +13,13 @@ from odscen.app.runs import run_all
 from odscen.base.errors import in_file
 from odscen.regression.baseline import (
     baseline_of,
+    map_digest,
     seeds_for_small_changes,
     seeds_that_hardly_vary,
     write_baseline,
 )
 from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
-from odscen.regression.causes import causes_between, likeliest_first
+from odscen.regression.causes import VERSIONS, Cause, causes_between, likeliest_first
 from odscen.regression.kept_maps import change_words, changes_since, keep_map
 from odscen.regression.measure import measure
 from odscen.regression.own_figures import own_values
@@ -35,15 +36,15 @@ if TYPE_CHECKING:
     from odscen.base.errors import InputError
     from odscen.changes.map_change import MapChange
     from odscen.regression.baseline import Baseline
-    from odscen.regression.causes import Cause
     from odscen.regression.measure import Measured
-    from odscen.regression.suite import Suite
+    from odscen.regression.suite import Case, Suite
     from odscen.regression.suite_loading import UnusableCase
     from odscen.regression.suite_parts import RunCase
     from odscen.regression.verdict import Change
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
+    from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace
 
 
@@ -195,8 +196,21 @@ def _missing(baseline: Path) -> CaseResult:
 def _result(loaded: LoadedCase | UnusableCase, update: Update) -> CaseResult:
     if isinstance(loaded, LoadedCase):
         return _judge(loaded, update)
-    error = loaded.error
-    return CaseResult(loaded.case, errors=(str(error),), error_code=error.exit_code)
+    return _unusable(loaded)
+
+
+def _unusable(case: UnusableCase) -> CaseResult:
+    """A scenario that could not be run; what has changed on its map is the likeliest reason."""
+    error, entry, before = case.error, case.entry, case.baseline
+    result = CaseResult(case.case, errors=(str(error),), error_code=error.exit_code)
+    if entry is None or before is None or before.fingerprint.get("map") == map_digest(entry):
+        return result
+    cause = Cause("map", "the map")
+    changes = _map_changes(case.case, entry, before)
+    if changes is None:
+        return replace(result, causes=(cause,))
+    notes = tuple(one.words for one in changes[:_MAP_CHANGES])
+    return replace(result, causes=(_in_words(cause, changes),), notes=notes)
 
 
 def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
@@ -253,12 +267,11 @@ def _held(
     worst = sorted(verdict.failing, key=lambda change: -change.score)
     causes = likeliest_first(causes_between(baseline.fingerprint, loaded.made_of), worst)
     names = {cause.name for cause in causes}
-    changes = _map_changes(result, baseline) if "map" in names else None
+    changes = _map_changes(case, result.entry, baseline) if "map" in names else None
     if changes is not None:
         causes = tuple(_in_words(cause, changes) for cause in causes)
     failures = [*result.failures, *(change.words for change in verdict.failing)]
-    if case.map_fails and "map" in names:
-        failures.append("the map has changed, which this suite does not allow")
+    failures += _forbidden(case, names)
     # Scatter is known for seeds that the baseline does not have, but only on request.
     own = () if case.other_seeds and baseline.by_scatter else baseline.seeds
     return replace(
@@ -276,12 +289,22 @@ def _held(
     )
 
 
-def _map_changes(result: CaseResult, baseline: Baseline) -> tuple[MapChange, ...] | None:
+def _forbidden(case: Case, changed: Collection[str]) -> list[str]:
+    """Changed inputs that the suite does not allow, whatever becomes of the figures."""
+    watched = set(changed) - set(VERSIONS) if case.inputs_fail else set()
+    watched |= {"map"} & set(changed) if case.map_fails else set()
+    said = "this suite allows no change of"
+    return [f"{said} {', '.join(sorted(watched))}"] if watched else []
+
+
+def _map_changes(
+    case: Case, entry: MapEntry | None, baseline: Baseline
+) -> tuple[MapChange, ...] | None:
     """What has changed on the map since the baseline, where its map is kept."""
-    file, digest = result.case.baseline, baseline.fingerprint.get("map", "")
-    if file is None or result.entry is None or digest == result.made_of["map"]:
+    file, digest = case.baseline, baseline.fingerprint.get("map", "")
+    if file is None or entry is None or digest == map_digest(entry):
         return None
-    return changes_since(file.parent, digest, result.entry)
+    return changes_since(file.parent, digest, entry)
 
 
 def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:

@@ -81,6 +81,7 @@ class _Settings(Part):
     time_limit: Annotated[float, Field(gt=0)] | None = None
     better: Literal["pass", "fail"] | None = None
     map: Literal["report", "fail"] | None = None
+    inputs: Literal["report", "fail"] | None = None
 
 
 class _ScenarioEntry(_Settings):
@@ -115,6 +116,9 @@ class Case:
         Whether a figure fails, too, that is better than its tolerance allows.
     map_fails
         Whether it fails when its map has changed since the baseline.
+    inputs_fail
+        Whether it fails when anything that it is made of has changed, versions of odscen and SUMO
+        apart.
     redraw
         What a seed draws.
     other_seeds
@@ -133,6 +137,7 @@ class Case:
     time_limit: float | None = None
     better_fails: bool = False
     map_fails: bool = False
+    inputs_fail: bool = False
     redraw: Redraw = "open"
     other_seeds: bool = False
 
@@ -280,6 +285,7 @@ def _case(
         time_limit=entry.time_limit or document.time_limit,
         better_fails=(entry.better or document.better) == "fail",
         map_fails=(entry.map or document.map) == "fail",
+        inputs_fail=(entry.inputs or document.inputs) == "fail",
         redraw=entry.redraw or document.redraw or "open",
     )
 

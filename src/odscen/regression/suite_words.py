@@ -28,7 +28,8 @@ def headline(case: CaseResult) -> str:
     """
     if case.status in (CaseStatus.ERROR, CaseStatus.MISSING, CaseStatus.NEW):
         first = case.problems[0].splitlines()
-        return first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+        said = first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+        return f"{case.causes[0].words}: {said}" if case.errors and case.causes else said
     if case.status is CaseStatus.FAILED:
         return f"{_cause(case)}{'; '.join(_worst(case))}"
     return "; ".join([*_better(case)[:_IN_HEADLINE], *([why] if (why := _inputs(case)) else [])])
