@@ -90,7 +90,7 @@ def test_a_figure_may_change_by_what_chance_explains_but_not_less_than_its_own_t
     assert hold_against(before, other, USUAL).failing == ()
     worse = {seed: {DELAY: figures[DELAY] + 15} for seed, figures in other.items()}
     (change,) = hold_against(before, worse, USUAL).failing
-    assert change.words.endswith(" s by chance)")
+    assert change.words.endswith(" s by scatter)")
     steady = baseline_of(runs([20.0] * 10), {})
     assert hold_against(steady, runs([20.4] * 10), USUAL).failing == ()  # 2 % or 0.5 s
     (change,) = hold_against(steady, runs([20.6] * 10), USUAL).failing

@@ -232,7 +232,7 @@ def _by_scatter(
     known = [value for value in one.old.values() if value is not None]
     if allowed is None or allowed <= usual.allowed(sum(known) / len(known)):
         return usual
-    return Tolerance(absolute=allowed, by_chance=True)
+    return Tolerance(absolute=allowed, by_scatter=True)
 
 
 def _change(
