@@ -451,7 +451,7 @@ def test_seeds_redraw_placed_traffic_and_their_scatter_decides(store, tiny):
     suite.write_text(text.replace('redraw = "traffic"', ""))
     (changed,) = run(store, suite).cases
     assert changed.causes[0].name == "settings"
-    assert changed.changed_inputs == ("the scenario's redraw",)
+    assert changed.changed_inputs == ("redraw traffic -> open",)
 
 
 def test_other_seeds_than_those_of_the_baseline_need_its_scatter(store, tiny):

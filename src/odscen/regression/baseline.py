@@ -85,14 +85,14 @@ def fingerprint(
     wished = {"duration": settings.until, "step_length": settings.step_length}
     given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
-    if settings.redraw != "open":
-        document["redraw"] = settings.redraw
     for other in ("format", "version", "name", "description", "map", "seed"):
         document.pop(other, None)
     found = {"map": map_sha256[:_SHORT]}
     if network is not None:
         found["network"] = network[:_SHORT]
     found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
+    if settings.redraw != "open":
+        found["redraw"] = settings.redraw
     return found | {"odscen": __version__, "sumo": version("libsumo")}
 
 

@@ -27,7 +27,7 @@ _LABELS = {
     "scenario.environment": "environment",
     "scenario.roi": "region of interest",
     "scenario.simulation": "settings",
-    "scenario.redraw": "settings",
+    "redraw": "settings",
     "sumo": "SUMO",
     "odscen": "odscen",
 }
@@ -76,8 +76,9 @@ def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Caus
 
 
 def _words(name: str, old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    if name in _PACKAGES:
-        return f"{name} {old.get(name, 'none')} -> {new.get(name, 'none')}"
+    if name in _PACKAGES or name == "redraw":
+        without = "open" if name == "redraw" else "none"
+        return f"{name} {old.get(name, without)} -> {new.get(name, without)}"
     part = name.removeprefix("scenario.")
     return f"the {name}" if part == name else f"the scenario's {part}"
 
