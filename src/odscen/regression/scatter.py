@@ -3,11 +3,12 @@ r"""How far a mean over seeds may be from the baseline's by chance alone, from t
 Other seeds of the same distributions give other means. The difference of two of them, over
 ``n_0`` seeds at the baseline and ``n_1`` now, lies with probability ``1 - q`` below
 
-``allowed = t(1 - q, n_0 - 1) * s * sqrt(1 / n_0 + 1 / n_1)``
+``allowed = t(1 - q, n_0 + n_1 - 2) * s * sqrt(1 / n_0 + 1 / n_1)``
 
-where ``s`` is the standard deviation over the baseline's seeds (prediction interval of the
-difference of two means, Student's t). Where both sides have the same seeds, they are also
-compared in pairs, same traffic under two conditions, and the lesser of the two limits holds:
+where ``s`` is the standard deviation over the seeds of either side, pooled (Student's t). That of
+the baseline alone would not do: waiting times are skewed, and a rare long one that only the new
+seeds have would be an alarm. Where both sides have the same seeds, they are also compared in pairs,
+same traffic under two conditions, and the lesser of the two limits holds:
 
 ``allowed = t(1 - q, n - 1) * s_d / sqrt(n)``
 
@@ -31,7 +32,11 @@ in places, each shared out evenly among the figures (Bonferroni)."""
 
 FEWEST_SEEDS = 8
 """Seeds from which scatter is a tolerance. Of fewer the quantile of Student's t is so large that
-anything would pass: with 30 figures 55 standard errors at 3 seeds, 11 at 5, 6.5 at 8, 4.4 at 20."""
+anything would pass: in pairs 55 standard errors at 3 seeds, 11 at 5, 6.5 at 8 and 4.4 at 20."""
+
+FLOOR = 0.5
+"""Share of a figure's own tolerance that is allowed however little its seeds scatter: smaller
+differences matter to no one, and figures that never vary would fail for the last digit."""
 
 CHANGE, CAUGHT = 0.05, 0.9
 """The change, as a share of the mean, and the probability of catching it, that seeds are for."""
@@ -84,7 +89,9 @@ def allowed_by_chance(
     if min(len(one), len(other)) < FEWEST_SEEDS:
         return None
     tail = level / 2 / (2 if both_sides else 1)
-    allowed = _quantile(tail, len(one) - 1) * _spread(list(one.values()))
+    freedom = len(one) + len(other) - 2
+    squares = sum((len(side) - 1) * statistics.variance(side.values()) for side in (one, other))
+    allowed = _quantile(tail, freedom) * math.sqrt(squares / freedom)
     allowed *= math.sqrt(1 / len(one) + 1 / len(other))
     if one.keys() == other.keys():
         pairs = [other[seed] - one[seed] for seed in one]
@@ -127,20 +134,13 @@ def hardly_varying(values: Sequence[float | None]) -> str | None:
 
 def _detectable(share: float, count: int, level: float) -> float:
     """Change that is caught as often as wanted, as a share of the mean."""
-    needed = _quantile(level / 2, count - 1) + _quantile(1 - CAUGHT, count - 1)
+    freedom = 2 * count - 2
+    needed = _quantile(level / 2, freedom) + _quantile(1 - CAUGHT, freedom)
     return needed * share * math.sqrt(2 / count)
 
 
 def _known(values: Mapping[int, float | None]) -> dict[int, float]:
     return {seed: value for seed, value in values.items() if value is not None}
-
-
-def _spread(values: Sequence[float]) -> float:
-    """Standard deviation; of counts at least that of one run that is off by one."""
-    spread = statistics.stdev(values)
-    if all(value.is_integer() for value in values):
-        return max(spread, 1 / math.sqrt(len(values)))
-    return spread
 
 
 @cache

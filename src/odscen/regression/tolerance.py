@@ -33,6 +33,10 @@ class Tolerance:
         """Return the largest difference that passes, in the unit of the figure."""
         return max(self.relative * abs(baseline), self.absolute)
 
+    def times(self, factor: float) -> Tolerance:
+        """Return a part of it."""
+        return Tolerance(factor * self.relative, factor * self.absolute)
+
     def words(self, figure: Figure) -> str:
         """``"5 % or 1.50 s"``, as it may be written in a suite, or ``"1.50 s by scatter"``."""
         if self.by_scatter:

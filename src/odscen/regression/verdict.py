@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.regression.scatter import Level, allowed_by_chance
+from odscen.regression.scatter import FLOOR, Level, allowed_by_chance
 from odscen.regression.tolerance import EXACT, Tolerance
 from odscen.results.measures.comparison import compare_figure
 from odscen.results.measures.figure import Better
@@ -141,7 +141,7 @@ def hold_against(
 
     Figures of the run that the baseline does not have are newer than it, and are not judged. What
     is allowed is what the suite says; else, of a baseline by scatter, what chance explains, but not
-    less than the figure's entry says; else what the entry says.
+    less than half of what the figure's entry says; else what the entry says.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _by_scatter(
     *,
     better_fails: bool,
 ) -> Tolerance:
-    """What chance explains, where that is more than what the figure's entry allows."""
+    """What chance explains, where that is more than the least that matters."""
     allowed = allowed_by_chance(
         one.old,
         one.new,
@@ -230,8 +230,11 @@ def _by_scatter(
         both_sides=better_fails or tolerances.entry(one.key).better is Better.NEITHER,
     )
     known = [value for value in one.old.values() if value is not None]
-    if allowed is None or allowed <= usual.allowed(sum(known) / len(known)):
+    if allowed is None:
         return usual
+    floor = usual.times(FLOOR)
+    if allowed <= floor.allowed(sum(known) / len(known)):
+        return floor
     return Tolerance(absolute=allowed, by_scatter=True)
 
 
