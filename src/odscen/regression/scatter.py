@@ -45,6 +45,8 @@ VARYING = "mean_travel_time"
 """The figure that seeds are to vary."""
 _LEAST_SPREAD = 0.01
 """Share of the largest value by which it differs, at least, where seeds vary."""
+_LEAST_SEEDS = 3
+"""Two may well be alike."""
 
 _MOST_SEEDS = 100_000
 
@@ -123,7 +125,7 @@ def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
 def hardly_varying(values: Sequence[float | None]) -> str | None:
     """Say so if values of :data:`VARYING` by seed make next to no difference."""
     known = [value for value in values if value is not None]
-    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+    if len(known) < _LEAST_SEEDS or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
         return None
     spread = f"{min(known):g} to {max(known):g} s"
     return (
