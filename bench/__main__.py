@@ -15,7 +15,6 @@ ALL = (
     "netconvert_maps",
     "capacity",
     "saturation",
-    "false_alarms",
     "signal_timing",
     "recording",
     "long_run",
