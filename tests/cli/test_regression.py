@@ -130,3 +130,31 @@ def test_brackets_of_an_extra_are_written_as_they_are(workspace, tmp_path):
 def test_the_help_says_what_is_done_without_an_option():
     words = re.sub(r"[\s│]+", " ", odscen("run", "--help").out)
     assert "Folder for the runs. (default: the workspace's runs)" in words
+
+
+def test_the_results_of_parts_are_merged_to_one_verdict(suite, workspace, tmp_path):
+    for part in (1, 2):
+        file = tmp_path / "parts" / str(part) / "results.json"
+        options = ("--shard", f"{part}/2", "--results", file, "--workspace", workspace)
+        assert odscen("test", suite, *options).code == 0
+    junit = tmp_path / "junit.xml"
+    options = ("--merge", tmp_path / "parts", "--junit", junit, "--json", "--workspace", workspace)
+    done = odscen("test", suite, *options)
+    assert done.code == 0, done.err
+    assert done.json["verdicts"] == {"passed": 3}
+    assert etree.parse(junit).getroot().get("tests") == "6"
+    done = odscen("test", suite, "--merge", tmp_path / "parts" / "1", "--workspace", workspace)
+    assert done.code == 2
+    assert "b: none of the parts has run it" in done.err
+
+
+def test_other_seeds_are_chosen_on_the_command_line(suite, workspace, tmp_path):
+    shutil.copytree(suite.parent, tmp_path / "copy")
+    copy = tmp_path / "copy" / suite.name
+    options = ("--workspace", workspace, "--json")
+    done = odscen("test", copy, "--seeds", "9", "--shard", "1/3", "--update-baseline", *options)
+    assert done.code == 0, done.err
+    assert done.json["cases"][0]["seeds"] == list(range(1, 10))
+    done = odscen("test", copy, "--seeds", "101-108", "--shard", "1/3", *options)
+    assert done.code == 0, done.err
+    assert done.json["cases"][0]["seeds"] == list(range(101, 109))

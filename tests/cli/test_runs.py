@@ -205,3 +205,51 @@ def test_emissions_are_recorded_unless_they_are_not_wanted(workspace, scenario, 
     assert lanes[0]["co2"].sum() > 0.0
     assert "co2" not in lanes[1].columns
     assert lanes[0].select(lanes[1].columns).equals(lanes[1])
+
+
+def test_a_scenario_runs_with_several_seeds_that_redraw_it(workspace, scenario, tmp_path):
+    out = tmp_path / "runs"
+    options = ("--until", "60", "--json", "--workspace", workspace)
+    drawn = ("--seeds", "1,3-4", "--redraw", "traffic")
+    done = odscen("run", scenario, "--out", out, *drawn, *options)
+    assert done.code == 0, done.err
+    name = Path(scenario).name.removesuffix(".scenario.json")
+    names = [f"{name}-seed-{seed}" for seed in (1, 3, 4)]
+    assert sorted(path.name for path in out.iterdir() if path.is_dir()) == names
+    assert [run["seed"] for run in done.json["runs"]] == [1, 3, 4]
+    goals = [[one["goal"] for one in json.loads((out / name / "plan.json").read_text())["actors"]]
+             for name in names]  # fmt: skip
+    assert goals[0] != goals[1] != goals[2]
+    again = odscen(
+        "run", scenario, "--out", tmp_path / "again", "--seed", "3", *drawn[2:], *options
+    )
+    assert again.code == 0
+    plan = (out / names[1] / "plan.json").read_bytes()
+    assert (tmp_path / "again" / name / "plan.json").read_bytes() == plan
+    compared = odscen("compare", out, out, "--json")
+    assert compared.json["a"]["seeds"] == [1, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--seeds", "few"), "'few' are no seeds; write for example 10"),
+        (("--seeds", "0"), "at least 1 and at most 1000 seeds"),
+        (("--seeds", "1-2000"), "at least 1 and at most 1000 seeds"),
+        (("--seeds", "3", "--seed", "4"), "give --seed or --seeds, not both"),
+        (("--redraw", "all"), "redraw must be one of open, drivers, traffic, not 'all'"),
+    ],
+)
+def test_seeds_and_redraws_that_are_none_are_refused(workspace, scenario, options, words):
+    done = odscen("run", scenario, *options, "--workspace", workspace)
+    assert (done.code, words in " ".join(done.err.split())) == (2, True), done.err
+
+
+def test_seeds_that_hardly_vary_are_warned_of(workspace, scenario, tmp_path):
+    document = json.loads(Path(scenario).read_text())
+    cars = [one for one in document["actors"] if one["category"] == "car"][:1]
+    file = tmp_path / "alone.scenario.json"
+    file.write_text(json.dumps(document | {"actors": cars, "flows": []}))
+    done = odscen("run", file, "--seeds", "3", "--out", tmp_path, "--workspace", workspace)
+    assert done.code == 0
+    assert "the seeds hardly vary: mean_travel_time is" in done.err

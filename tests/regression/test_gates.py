@@ -1,6 +1,7 @@
 import json
 import os
 import re
+import shutil
 
 import pytest
 from lxml import etree
@@ -10,6 +11,7 @@ from odscen.regression.gates import Update, run_suite
 from odscen.regression.junit import junit_xml
 from odscen.regression.suite import read_suite
 from odscen.regression.suite_page import suite_page
+from odscen.regression.suite_parts import read_parts, results_json
 from odscen.regression.suite_summary import suite_summary
 from odscen.regression.suite_words import headline, lines, to_dict
 from tests.regression.conftest import copy_suite, edit_json, write_tiny
@@ -313,7 +315,7 @@ def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
     suite.write_text('map = "fail"\n' + suite.read_text())
     result = run(store, suite)
     assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
-    assert headline(result.cases[0]).startswith("the map: the map has changed")
+    assert headline(result.cases[0]) == "the map: this suite allows no change of map"
 
 
 def test_a_map_that_is_only_written_otherwise_is_said_to_mean_the_same(store, tiny):
@@ -438,3 +440,128 @@ def test_a_suite_can_test_networks_by_netconvert_with_baselines_of_their_own(sto
     (case_,) = run_suite(store, read_suite(file)).cases
     assert case_.changed_inputs == ("the network",)
     assert case_.entry.converter == "odscen"
+
+
+def test_seeds_redraw_placed_traffic_and_their_scatter_decides(store, tiny):
+    suite = tiny("one")
+    text = suite.read_text().replace("seeds = [1]", 'seeds = 8\nredraw = "traffic"')
+    suite.write_text(text)
+    written = run(store, suite, update=Update(True))
+    assert written.exit_code == 0
+    path = suite.parent / "baselines" / "one.json"
+    before = path.read_bytes()
+    data = json.loads(before)
+    assert data["tolerance"] == "scatter"
+    assert data["seeds"] == [1, 2, 3, 4, 5, 6, 7, 8]
+    (row,) = [row for row in data["rows"] if row.get("figure") == "mean_travel_time"]
+    assert len(set(row["values"])) >= 5
+    again = run(store, suite, update=Update(True))
+    assert path.read_bytes() == before
+    (note,) = again.cases[0].notes
+    assert re.fullmatch(
+        r"to tell a change of mean_delay by 5 % from chance takes \d+ seeds, not 8", note
+    )
+    unchanged = run(store, suite).cases[0]
+    assert (unchanged.status, lines(unchanged)) == ("passed", [])
+    others = run_suite(store, read_suite(suite).with_seeds(tuple(range(101, 110))))
+    assert (statuses(others), others.exit_code) == ({"one": "passed"}, 0)
+    suite.write_text(text.replace('redraw = "traffic"', ""))
+    (changed,) = run(store, suite).cases
+    assert changed.causes[0].name == "settings"
+    assert changed.changed_inputs == ("redraw traffic -> open",)
+
+
+def test_other_seeds_than_those_of_the_baseline_need_its_scatter(store, tiny):
+    suite = read_suite(tiny("one")).with_seeds((7, 8))
+    (found,) = run_suite(store, suite).cases
+    assert found.status == "missing"
+    assert found.problems == (
+        "the baseline has seed 1, which was not run; write it with --update-baseline",
+        "the baseline has no seed 7, 8; write it with --update-baseline",
+    )
+
+
+def test_seeds_that_hardly_vary_are_warned_of_in_every_test(store, tiny):
+    suite = tiny("one")
+    document = json.loads((suite.parent / "one.scenario.json").read_text())
+    alone = [document["actors"][0] | {"speed": 8.0}]
+    edit_scenario(suite, "one", actors=alone)
+    text = suite.read_text().replace("seeds = [1]", "seeds = 3")
+    suite.write_text(text.replace("until = 20", "until = 60"))
+    run(store, suite, update=Update(True))
+    (same,) = run(store, suite).cases
+    assert same.status == "passed"
+    (warning,) = lines(same)
+    assert warning.startswith("the seeds hardly vary: mean_travel_time is ")
+    assert warning.endswith('redraw = "traffic" makes them vary')
+
+
+@pytest.fixture
+def in_parts(store, tiny, tmp_path):
+    """A suite of three with one broken and one changed, and the results of its three parts."""
+    suite = tiny("a", "b", "c")
+    actors = json.loads((suite.parent / "a.scenario.json").read_text())["actors"]
+    edit_scenario(suite, "a", actors=[actors[0] | {"spawn": "9.9.9.9"}])
+    edit_scenario(suite, "b", actors=[actor | {"speed": 3.0} for actor in actors])
+    files = []
+    for part in (1, 2, 3):
+        folder = tmp_path / "parts" / str(part)
+        result = run_suite(store, read_suite(suite).shard(part, 3), out=folder / "runs")
+        files.append(folder / "results.json")
+        folder.mkdir(parents=True, exist_ok=True)
+        files[-1].write_text(results_json(result, beside=folder))
+    return suite, files
+
+
+def test_parts_are_judged_together_as_if_they_had_run_here(store, in_parts, tmp_path):
+    suite, _ = in_parts
+    (tmp_path / "elsewhere").mkdir()
+    shutil.move(tmp_path / "parts", tmp_path / "elsewhere" / "parts")
+    merged = run_suite(store, read_suite(suite), parts=read_parts([tmp_path / "elsewhere"]))
+    here = run(store, suite)
+    assert statuses(merged) == statuses(here) == {"a": "error", "b": "failed", "c": "passed"}
+    assert [lines(case) for case in merged.cases] == [lines(case) for case in here.cases]
+    assert merged.exit_code == here.exit_code == 2
+    times = re.compile(r' time="[\d.]+"|\s*<property name="artefact.*')
+    assert times.sub("", junit_xml(merged)) == times.sub("", junit_xml(here))
+    page = suite_page(merged, workspace=store, beside=tmp_path)
+    assert 'href="elsewhere/parts/2/runs/b/seed-1/report.html"' in page
+    assert "2 of 3 scenarios do not pass" in page
+
+
+def test_a_part_that_is_not_there_is_the_error_of_its_scenarios(store, in_parts):
+    suite, files = in_parts
+    merged = run_suite(store, read_suite(suite), parts=read_parts(files[:2]))
+    assert statuses(merged) == {"a": "error", "b": "failed", "c": "error"}
+    assert "none of the parts has run it" in headline(case(merged, "c"))
+
+
+def test_a_part_from_other_inputs_is_refused_for_what_has_changed(store, in_parts):
+    suite, files = in_parts
+    edit_scenario(suite, "c", environment={"preset": "WetNoon"})
+    merged = run_suite(store, read_suite(suite), parts=read_parts(files))
+    assert case(merged, "c").status == "error"
+    words = "with other inputs than are here: the scenario's environment"
+    assert words in headline(case(merged, "c"))
+
+
+def test_parts_that_do_not_fit_together_or_to_the_suite_are_refused(store, in_parts):
+    suite, files = in_parts
+    with pytest.raises(InputError, match=r"results\.json: b is in .*2/results\.json as well"):
+        read_parts([files[1], files[1]])
+    with pytest.raises(InputError, match=r"no results\.json in this folder"):
+        read_parts([suite.parent])
+    files[0].write_text('{"format": "odscen-baseline", "version": 1}')
+    with pytest.raises(InputError, match="is not results of a suite"):
+        read_parts(files)
+    (suite.parent / "b.scenario.json").unlink()
+    with pytest.raises(InputError, match="the suite has no scenario 'b', which was run here"):
+        run_suite(store, read_suite(suite), parts=read_parts(files[1:]))
+
+
+def test_baselines_are_written_from_parts(store, in_parts):
+    suite, files = in_parts
+    merged = run_suite(store, read_suite(suite), parts=read_parts(files), update=Update(True))
+    assert [one.updated for one in merged.cases] == [False, True, True]
+    assert run(store, suite).exit_code == 2
+    assert case(run(store, suite), "b").status == "passed"

@@ -14,7 +14,7 @@ The command line, the page, suites of tests, and CARLA beside or instead of SUMO
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -310,6 +310,7 @@ def run_many(
     scenarios: Sequence[Scenario | Path],
     *,
     settings: RunSettings = AS_DESIGNED,
+    seeds: Sequence[int] | None = None,
     out: Path | None = None,
     processes: int = 1,
     progress: Callable[[RunJob, Progress], None] | None = None,
@@ -326,6 +327,8 @@ def run_many(
         Scenarios, or their files.
     settings
         How each is run.
+    seeds
+        Runs each scenario once with each of these, as ``NAME-seed-N``.
     out
         Folder that gets one folder per scenario; the workspace's ``runs`` if not given.
     processes
@@ -338,7 +341,8 @@ def run_many(
     Returns
     -------
     tuple of Run
-        In the order of ``scenarios``; each completed or failed, see ``status``.
+        In the order of ``scenarios``, and of ``seeds`` for each; completed or failed, see
+        ``status``.
 
     Raises
     ------
@@ -353,7 +357,8 @@ def run_many(
     runs = []
     for scenario in scenarios:
         own = _own_name(scenario_name(scenario), names)
-        runs.append(check_given(workspace, scenario, name=own, out=out, settings=settings))
+        checked = check_given(workspace, scenario, name=own, out=out, settings=settings)
+        runs += [checked] if seeds is None else [_with_seed(checked, seed) for seed in seeds]
     return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
 
 
@@ -368,6 +373,12 @@ def _job(run: CheckedRun, *, report: bool) -> RunJob:
         write_report(folder, summary, loaded=kept.pop())
 
     return RunJob(run.name, get_ready, run.folder, finish if report else None)
+
+
+def _with_seed(run: CheckedRun, seed: int) -> CheckedRun:
+    name = f"{run.name}-seed-{seed}"
+    settings = replace(run.settings, seed=seed)
+    return replace(run, name=name, folder=run.folder.with_name(name), settings=settings)
 
 
 def _own_name(name: str, taken: set[str]) -> str:

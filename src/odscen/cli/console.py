@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -44,6 +45,37 @@ BuildMinutesOption = Annotated[
         help="Minutes of computing time that building a map may use. "
         "[default: $ODSCEN_BUILD_MINUTES, else by the size of the map]",
         show_default=False,
+    ),
+]
+
+_MOST_SEEDS = 1000
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    """Read ``10`` (1 to 10), ``1,2,7`` or ``101-150``."""
+    found: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,10})(?:-(\d{1,10}))?\s*", part)
+        if match is None:
+            msg = f"{text!r} are no seeds; write for example 10 (for 1 to 10), 1,2,7 or 101-150"
+            raise typer.BadParameter(msg)
+        first = int(match[1])
+        found += range(first, min(int(match[2] or first), first + _MOST_SEEDS) + 1)
+    if len(found) == 1 and text.strip().isdecimal():
+        found = list(range(1, min(found[0], _MOST_SEEDS + 1) + 1))
+    if not 0 < len(found) <= _MOST_SEEDS or max(found) >= 2**31:
+        msg = f"{text!r}: at least 1 and at most {_MOST_SEEDS} seeds, below 2^31"
+        raise typer.BadParameter(msg)
+    return tuple(dict.fromkeys(found))
+
+
+SeedsOption = Annotated[
+    Any,
+    typer.Option(
+        "--seeds",
+        parser=_seeds,
+        metavar="SEEDS",
+        help="Seeds: 10 for 1 to 10, or a list such as 1,2,7 or 101-150.",
     ),
 ]
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.cli.console import (
+    JsonOption,
+    SeedsOption,
+    WorkspaceOption,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
 
 if TYPE_CHECKING:
     from odscen.regression.case_results import SuiteResult
@@ -47,6 +55,15 @@ def gate(
             parser=_shard, metavar="K/N", help="Only the K-th of N parts, for N jobs side by side."
         ),
     ] = None,
+    seeds: SeedsOption = None,
+    merge: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Run nothing, but judge what other jobs wrote with --results: a file, or a folder "
+            "with results.json files at any depth; repeatable.",
+            metavar="PATH",
+        ),
+    ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
     out: Annotated[
         Path | None, typer.Option(help="Keep the runs in this folder; they are deleted without.")
@@ -62,6 +79,10 @@ def gate(
             dir_okay=False,
         ),
     ] = None,
+    results: Annotated[
+        Path | None,
+        typer.Option(help="Write the figures of all runs, for --merge.", dir_okay=False),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -72,12 +93,15 @@ def gate(
     """
     from odscen.regression.gates import Update, run_suite
     from odscen.regression.suite import read_suite
+    from odscen.regression.suite_parts import read_parts
     from odscen.regression.suite_words import to_dict
     from odscen.workspace.store import Workspace
 
     read, store = read_suite(suite), Workspace.open(workspace)
     if force and not update_baseline:
         raise typer.BadParameter("it goes with --update-baseline", param_hint="--force")
+    if seeds is not None:
+        read = read.with_seeds(seeds)
     if shard is not None:
         read = read.shard(*shard)
     with progress("testing") as step:
@@ -88,8 +112,9 @@ def gate(
             update=Update(update_baseline, force),
             out=out,
             progress=step,
+            parts=read_parts(merge) if merge else None,
         )
-    _write(result, store, junit=junit, html=html, summary=summary)
+    _write(result, store, junit=junit, html=html, summary=summary, results=results)
     if as_json:
         print_json(to_dict(result))
     _show(result, as_json=as_json)
@@ -103,14 +128,18 @@ def _write(
     junit: Path | None,
     html: Path | None,
     summary: Path | None,
+    results: Path | None,
 ) -> None:
     from odscen.base.text_files import write_text
     from odscen.regression.junit import junit_xml
     from odscen.regression.suite_page import suite_page
+    from odscen.regression.suite_parts import results_json
     from odscen.regression.suite_summary import suite_summary
 
     if junit is not None:
         write_text(junit, junit_xml(result))
+    if results is not None:
+        write_text(results, results_json(result, beside=results.parent))
     if html is not None:
         write_text(html, suite_page(result, workspace=workspace, beside=html.parent))
     if summary is not None:

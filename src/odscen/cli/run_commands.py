@@ -5,20 +5,29 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from odscen.base.durations import clock, parse_duration
 from odscen.base.errors import InputError
 from odscen.base.shown import visible
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+from odscen.cli.console import (
+    JsonOption,
+    SeedsOption,
+    WorkspaceOption,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
 from odscen.results.measures.usability import UsabilityLevel
 from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from odscen.scenario.sampling.redrawn_traffic import Redraw
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import SliceLength
     from odscen.sumo.runner.run_jobs import RunJob
@@ -57,6 +66,15 @@ def run(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Instead of the scenario's own seed.")
     ] = None,
+    seeds: SeedsOption = None,
+    redraw: Annotated[
+        str,
+        typer.Option(
+            help="What a seed draws: open, what the scenario leaves open; drivers, also later "
+            "departures, desired speeds and styles of placed actors; traffic, also their goals.",
+            metavar="[open|drivers|traffic]",
+        ),
+    ] = "open",
     until: Annotated[
         float | None,
         typer.Option(
@@ -139,8 +157,11 @@ def run(
     slice_length: SliceLength = "auto" if slice_ == "auto" else None
     if slice_ not in ("auto", "none"):
         slice_length = parse_duration(slice_)
+    if seeds is not None and seed is not None:
+        raise typer.BadParameter("give --seed or --seeds, not both", param_hint="--seeds")
     settings = RunSettings(
         seed=seed,
+        redraw=cast("Redraw", redraw),  # which refuses what is none
         until=until,
         step_length=step_length,
         weather=weather,
@@ -157,13 +178,27 @@ def run(
             store,
             paths,
             settings=settings,
+            seeds=seeds,
             out=out,
             processes=jobs,
-            progress=_follow(step, len(paths)),
+            progress=_follow(step, len(paths) * len(seeds or (None,))),
             tell=log,
         )
-    show_results(results, as_json=as_json, several=len(paths) > 1 or scenarios[0].is_dir())
+    show_results(results, as_json=as_json, several=len(results) > 1 or scenarios[0].is_dir())
+    if seeds is not None:
+        _warn_of_seeds(results, len(seeds))
     raise typer.Exit(max(result.exit_code for result in results))
+
+
+def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:
+    """Say of which scenario the seeds hardly vary; runs of one scenario follow each other."""
+    from odscen.regression.scatter import VARYING, hardly_varying
+
+    for first in range(0, len(results), seeds):
+        runs = [run for run in results[first : first + seeds] if run.status is RunStatus.COMPLETED]
+        words = hardly_varying([run.summary["figures"].get(VARYING) for run in runs])
+        if words is not None:
+            log(f"{runs[0].summary['scenario']}: {words}")
 
 
 def resume(

@@ -19,6 +19,14 @@ from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
 from odscen.regression.measure import FigureKey
+from odscen.regression.scatter import (
+    CHANGE,
+    FEWEST_SEEDS,
+    VARYING,
+    Level,
+    hardly_varying,
+    seeds_needed,
+)
 from odscen.results.records.run_records import json_with_rows
 
 if TYPE_CHECKING:
@@ -29,6 +37,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.figure import FigureKind
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.workspace.map_entry import MapEntry
 
 FORMAT = "odscen-baseline"
 VERSION = 1
@@ -36,9 +45,10 @@ VERSION = 1
 _SHORT = 16
 """Hexadecimal digits of a digest; 64 bits are enough to tell versions of one file apart."""
 
-_OF_CHANCE = FigureKey("run", "", "mean_travel_time")
-_LEAST_SPREAD = 0.01
-"""Share of the largest value by which this figure differs, at least, where seeds vary."""
+_DELAY = FigureKey("run", "", "mean_delay")
+
+_SCATTER = "scatter"
+"""Value of ``tolerance`` in the file."""
 
 _KINDS: tuple[FigureKind, ...] = ("segment", "junction", "actor")
 
@@ -48,11 +58,16 @@ Fingerprint = dict[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """Figures per seed; every tuple is in the order of ``seeds``."""
+    """Figures per seed; every tuple is in the order of ``seeds``.
+
+    ``by_scatter`` says that the scatter over the seeds decides what is allowed, where that is more
+    than the figure's own tolerance; baselines of few seeds, and those of before 0.2, do not.
+    """
 
     seeds: tuple[int, ...]
     fingerprint: Fingerprint
     figures: dict[FigureKey, tuple[float | None, ...]]
+    by_scatter: bool = False
 
 
 def fingerprint(
@@ -76,7 +91,14 @@ def fingerprint(
     if network is not None:
         found["network"] = network[:_SHORT]
     found |= {f"scenario.{part}": _digest(value) for part, value in document.items()}
+    if settings.redraw != "open":
+        found["redraw"] = settings.redraw
     return found | {"odscen": __version__, "sumo": version("libsumo")}
+
+
+def map_digest(entry: MapEntry) -> str:
+    """``map`` of the fingerprint of a run on this map."""
+    return entry.sha256[:_SHORT]
 
 
 def _digest(value: object) -> str:
@@ -89,29 +111,45 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
     seeds = tuple(sorted(runs))
     keys = dict.fromkeys(key for seed in seeds for key in runs[seed])
     return Baseline(
-        seeds, made_of, {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys}
+        seeds,
+        made_of,
+        {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys},
+        by_scatter=len(seeds) >= FEWEST_SEEDS,
     )
 
 
 def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
     """Warn where seeds make next to no difference, as their scatter then says little of chance."""
-    values = baseline.figures.get(_OF_CHANCE, ())
-    known = [value for value in values if value is not None]
-    if len(known) < 2 or max(known) - min(known) > _LEAST_SPREAD * abs(max(known)):
+    words = hardly_varying(baseline.figures.get(FigureKey("run", "", VARYING), ()))
+    return () if words is None else (words,)
+
+
+def seeds_for_small_changes(baseline: Baseline) -> tuple[str, ...]:
+    """Say with how many seeds a small change of the mean delay would be caught."""
+    known = [value for value in baseline.figures.get(_DELAY, ()) if value is not None]
+    run = sum(key.kind == "run" for key in baseline.figures)
+    needed = seeds_needed(known, level=Level.shared(run=run, places=1).run)
+    if needed is None or needed <= len(baseline.seeds):
         return ()
-    spread = f"{min(known):g} to {max(known):g} s"
-    return (f"the seeds hardly vary: {_OF_CHANCE.name} is {spread}; more of them say no more",)
+    count = len(baseline.seeds)
+    words = f"to tell a change of mean_delay by {100 * CHANGE:g} % from chance takes {needed} seeds"
+    if baseline.by_scatter:
+        return (f"{words}, not {count}",)
+    few = f"{count} seeds are too few to know their scatter, so tolerances are fixed ones"
+    return (f"{few}; from {FEWEST_SEEDS} seeds on they come from it; {words}",)
 
 
 def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
     """Write a baseline; the same figures give the same text."""
-    head = {
+    head: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "scenario": scenario,
         "fingerprint": baseline.fingerprint,
         "seeds": list(baseline.seeds),
     }
+    if baseline.by_scatter:
+        head["tolerance"] = _SCATTER
     write_text(file, json_with_rows(head, "rows", _rows(baseline)))
 
 
@@ -167,7 +205,8 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
         for name, values in row.items():
             if name != kind:
                 figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)
-    return Baseline(seeds, dict(data["fingerprint"]), figures)
+    by_scatter = data.get("tolerance") == _SCATTER
+    return Baseline(seeds, dict(data["fingerprint"]), figures, by_scatter)
 
 
 def _values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:

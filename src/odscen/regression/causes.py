@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from odscen.regression.verdict import Change
 
-_VERSIONS = ("sumo", "odscen")
+_PACKAGES = ("sumo", "odscen")
 
 _LABELS = {
     "map": "map",
@@ -27,10 +27,14 @@ _LABELS = {
     "scenario.environment": "environment",
     "scenario.roi": "region of interest",
     "scenario.simulation": "settings",
+    "redraw": "settings",
     "sumo": "SUMO",
     "odscen": "odscen",
 }
 """What people call each part of a fingerprint, the likeliest to change traffic first."""
+
+VERSIONS = tuple(_LABELS[name] for name in _PACKAGES)
+"""Names of the causes that are versions, not inputs."""
 
 _POINTS_TO = {
     ("run", "planned"): ("demand", "actors"),
@@ -72,8 +76,9 @@ def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Caus
 
 
 def _words(name: str, old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    if name in _VERSIONS:
-        return f"{name} {old.get(name, 'none')} -> {new.get(name, 'none')}"
+    if name in _PACKAGES or name == "redraw":
+        without = "open" if name == "redraw" else "none"
+        return f"{name} {old.get(name, without)} -> {new.get(name, without)}"
     part = name.removeprefix("scenario.")
     return f"the {name}" if part == name else f"the scenario's {part}"
 

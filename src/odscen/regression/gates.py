@@ -11,14 +11,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.app.runs import run_all
 from odscen.base.errors import in_file
-from odscen.regression.baseline import baseline_of, seeds_that_hardly_vary, write_baseline
+from odscen.regression.baseline import (
+    baseline_of,
+    map_digest,
+    seeds_for_small_changes,
+    seeds_that_hardly_vary,
+    write_baseline,
+)
 from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
-from odscen.regression.causes import causes_between, likeliest_first
+from odscen.regression.causes import VERSIONS, Cause, causes_between, likeliest_first
 from odscen.regression.kept_maps import change_words, changes_since, keep_map
 from odscen.regression.measure import measure
 from odscen.regression.own_figures import own_values
 from odscen.regression.suite import missing_case
 from odscen.regression.suite_loading import LoadedCase, load_cases
+from odscen.regression.suite_parts import take_parts
 from odscen.regression.verdict import hold_against
 from odscen.results.measures.expectations import USABLE, evaluate
 from odscen.results.records.outcomes import RunStatus
@@ -29,14 +36,15 @@ if TYPE_CHECKING:
     from odscen.base.errors import InputError
     from odscen.changes.map_change import MapChange
     from odscen.regression.baseline import Baseline
-    from odscen.regression.causes import Cause
     from odscen.regression.measure import Measured
-    from odscen.regression.suite import Suite
+    from odscen.regression.suite import Case, Suite
     from odscen.regression.suite_loading import UnusableCase
+    from odscen.regression.suite_parts import RunCase
     from odscen.regression.verdict import Change
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
+    from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace
 
 
@@ -60,6 +68,7 @@ def run_suite(
     update: Update = NO_UPDATE,
     out: Path | None = None,
     progress: Callable[[str, float], None] | None = None,
+    parts: Mapping[str, RunCase] | None = None,
 ) -> SuiteResult:
     """Run every scenario of a suite with every seed, and judge what comes out.
 
@@ -74,19 +83,26 @@ def run_suite(
         Whether baselines are written anew of what comes out, instead of holding it against them.
     out
         Keeps the runs there, one folder per scenario and seed, with reports; else they are deleted.
+    parts
+        What was run elsewhere, by scenario: nothing is run then, and that is judged.
 
     Raises
     ------
     InputError
-        If the suite names a map that is not there and that no scenario is on.
+        If the suite names a map that is not there and that no scenario is on, or a part has a
+        scenario that the suite does not have.
     WorkspaceError
         If the workspace or ``out`` cannot be written.
     """
     cases = load_cases(workspace, suite, with_baseline=not update.wanted)
     loaded = [case for case in cases if isinstance(case, LoadedCase)]
-    with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
-        root = out or Path(temporary)
-        _run_all(loaded, suite, root, keep=out is not None, processes=processes, tell=progress)
+    if parts is not None:
+        take_parts(cases, loaded, parts)
+    else:
+        with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
+            root = out or Path(temporary)
+            keep = out is not None
+            _run_all(loaded, suite, root, keep=keep, processes=processes, tell=progress)
     judged = [_result(case, update) for case in cases]
     return SuiteResult(suite, (*judged, *map(_missing, suite.missing)))
 
@@ -192,8 +208,21 @@ def _missing(baseline: Path) -> CaseResult:
 def _result(loaded: LoadedCase | UnusableCase, update: Update) -> CaseResult:
     if isinstance(loaded, LoadedCase):
         return _judge(loaded, update)
-    error = loaded.error
-    return CaseResult(loaded.case, errors=(str(error),), error_code=error.exit_code)
+    return _unusable(loaded)
+
+
+def _unusable(case: UnusableCase) -> CaseResult:
+    """A scenario that could not be run; what has changed on its map is the likeliest reason."""
+    error, entry, before = case.error, case.entry, case.baseline
+    result = CaseResult(case.case, errors=(str(error),), error_code=error.exit_code)
+    if entry is None or before is None or before.fingerprint.get("map") == map_digest(entry):
+        return result
+    cause = Cause("map", "the map")
+    changes = _map_changes(case.case, entry, before)
+    if changes is None:
+        return replace(result, causes=(cause,))
+    notes = tuple(one.words for one in changes[:_MAP_CHANGES])
+    return replace(result, causes=(_in_words(cause, changes),), notes=notes)
 
 
 def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
@@ -216,6 +245,7 @@ def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
     if case.baseline is None or result.errors:
         return result
     figures = {run.seed: run.figures for run in runs}
+    result = replace(result, notes=seeds_that_hardly_vary(baseline_of(figures, {})))
     if update.wanted:
         return _updated(result, figures, force=update.force)
     if loaded.baseline is None:
@@ -232,12 +262,12 @@ def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool
     if result.failures and not force:
         kept = "is left as it was" if file.is_file() else "is not written"
         note = f"the baseline {kept}, as expectations are not met; --force writes it"
-        return replace(result, notes=(note,))
+        return replace(result, notes=(*result.notes, note))
     baseline = baseline_of(figures, result.made_of)
     write_baseline(baseline, file, scenario=result.name)
     if result.entry is not None:
         keep_map(file.parent, result.entry, result.made_of["map"])
-    return replace(result, updated=True, notes=seeds_that_hardly_vary(baseline))
+    return replace(result, updated=True, notes=(*result.notes, *seeds_for_small_changes(baseline)))
 
 
 def _held(
@@ -249,32 +279,44 @@ def _held(
     worst = sorted(verdict.failing, key=lambda change: -change.score)
     causes = likeliest_first(causes_between(baseline.fingerprint, loaded.made_of), worst)
     names = {cause.name for cause in causes}
-    changes = _map_changes(result, baseline) if "map" in names else None
+    changes = _map_changes(case, result.entry, baseline) if "map" in names else None
     if changes is not None:
         causes = tuple(_in_words(cause, changes) for cause in causes)
     failures = [*result.failures, *(change.words for change in verdict.failing)]
-    if case.map_fails and "map" in names:
-        failures.append("the map has changed, which this suite does not allow")
+    failures += _forbidden(case, names)
+    # Scatter is known for seeds that the baseline does not have, but only on request.
+    own = () if case.other_seeds and baseline.by_scatter else baseline.seeds
     return replace(
         result,
         causes=causes,
         verdict=verdict,
         failures=tuple(failures),
-        missing=_seeds(baseline.seeds, figures, "the baseline has seed {}, which was not run"),
-        new=_seeds(figures, baseline.seeds, "the baseline has no seed {}"),
+        missing=_seeds(own, figures, "the baseline has seed {}, which was not run"),
+        new=_seeds(figures, own, "the baseline has no seed {}") if own else (),
         notes=(
+            *result.notes,
             *_notes(loaded, verdict.figures, names),
             *(one.words for one in (changes or ())[:_MAP_CHANGES]),
         ),
     )
 
 
-def _map_changes(result: CaseResult, baseline: Baseline) -> tuple[MapChange, ...] | None:
+def _forbidden(case: Case, changed: Collection[str]) -> list[str]:
+    """Changed inputs that the suite does not allow, whatever becomes of the figures."""
+    watched = set(changed) - set(VERSIONS) if case.inputs_fail else set()
+    watched |= {"map"} & set(changed) if case.map_fails else set()
+    said = "this suite allows no change of"
+    return [f"{said} {', '.join(sorted(watched))}"] if watched else []
+
+
+def _map_changes(
+    case: Case, entry: MapEntry | None, baseline: Baseline
+) -> tuple[MapChange, ...] | None:
     """What has changed on the map since the baseline, where its map is kept."""
-    file, digest = result.case.baseline, baseline.fingerprint.get("map", "")
-    if file is None or result.entry is None or digest == result.made_of["map"]:
+    file, digest = case.baseline, baseline.fingerprint.get("map", "")
+    if file is None or entry is None or digest == map_digest(entry):
         return None
-    return changes_since(file.parent, digest, result.entry)
+    return changes_since(file.parent, digest, entry)
 
 
 def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:

@@ -7,7 +7,7 @@ import tomllib
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, ValidationError, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, ValidationInfo
 
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
@@ -18,6 +18,7 @@ from odscen.results.measures.expectations import USABLE, parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.validation import validation_problems
+from odscen.scenario.sampling.redrawn_traffic import Redraw  # noqa: TC001 (pydantic)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +29,20 @@ if TYPE_CHECKING:
     from odscen.results.measures.expectations import Expectation
     from odscen.results.measures.figure import Figure
 
+MOST_SEEDS = 1000
+
+
+def _counted(seeds: object) -> object:
+    """``20`` stands for the seeds 1 to 20."""
+    if isinstance(seeds, int) and not isinstance(seeds, bool) and 0 < seeds <= MOST_SEEDS:
+        return list(range(1, seeds + 1))
+    return seeds
+
+
 Seeds = Annotated[
-    tuple[Annotated[int, Field(ge=0, lt=2**31)], ...], Field(min_length=1, max_length=1000)
+    tuple[Annotated[int, Field(ge=0, lt=2**31)], ...],
+    Field(min_length=1, max_length=MOST_SEEDS),
+    BeforeValidator(_counted),
 ]
 ToleranceTable = dict[str, str | dict[str, str]]
 
@@ -58,6 +71,7 @@ class _Settings(Part):
     """What may stand at the top, for all scenarios, or at one of them."""
 
     seeds: Seeds | None = None
+    redraw: Redraw | None = None
     expect: tuple[Annotated[str, AfterValidator(_expectation)], ...] = ()
     usable: bool | None = None
     tolerance: Annotated[ToleranceTable, AfterValidator(_tolerance_table)] = Field(
@@ -68,6 +82,7 @@ class _Settings(Part):
     time_limit: Annotated[float, Field(gt=0)] | None = None
     better: Literal["pass", "fail"] | None = None
     map: Literal["report", "fail"] | None = None
+    inputs: Literal["report", "fail"] | None = None
 
 
 class _ScenarioEntry(_Settings):
@@ -102,6 +117,14 @@ class Case:
         Whether a figure fails, too, that is better than its tolerance allows.
     map_fails
         Whether it fails when its map has changed since the baseline.
+    inputs_fail
+        Whether it fails when anything that it is made of has changed, versions of odscen and SUMO
+        apart.
+    redraw
+        What a seed draws.
+    other_seeds
+        Whether the seeds were given in place of the suite's: a baseline whose scatter decides is
+        then good for seeds that it does not have.
     """
 
     name: str
@@ -115,6 +138,9 @@ class Case:
     time_limit: float | None = None
     better_fails: bool = False
     map_fails: bool = False
+    inputs_fail: bool = False
+    redraw: Redraw = "open"
+    other_seeds: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +170,11 @@ class Suite:
     missing: tuple[Path, ...] = ()
     figures: Mapping[str, Figure] = field(default_factory=dict)
     whole: bool = True
+
+    def with_seeds(self, seeds: tuple[int, ...]) -> Suite:
+        """Return the suite with other seeds for all scenarios."""
+        cases = [replace(case, seeds=seeds, other_seeds=True) for case in self.cases]
+        return replace(self, cases=tuple(cases))
 
     def shard(self, number: int, count: int) -> Suite:
         """Return the ``number``-th of ``count`` parts, from 1: every scenario is in one of them.
@@ -258,6 +289,8 @@ def _case(
         time_limit=entry.time_limit or document.time_limit,
         better_fails=(entry.better or document.better) == "fail",
         map_fails=(entry.map or document.map) == "fail",
+        inputs_fail=(entry.inputs or document.inputs) == "fail",
+        redraw=entry.redraw or document.redraw or "open",
     )
 
 

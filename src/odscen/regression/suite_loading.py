@@ -6,6 +6,7 @@ What is wrong with one scenario is an error of that scenario; the others go on.
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -47,10 +48,12 @@ class LoadedCase:
 
 @dataclass(frozen=True, slots=True)
 class UnusableCase:
-    """A case that cannot be run, and why."""
+    """A case that cannot be run, and why; with its map and baseline, where those are there."""
 
     case: Case
     error: InputError | ToolError
+    entry: MapEntry | None = None
+    baseline: Baseline | None = None
 
 
 def load_cases(
@@ -69,10 +72,18 @@ def load_cases(
         try:
             loaded.append(_load(workspace, case, maps, with_baseline=with_baseline))
         except (InputError, ToolError) as error:
-            loaded.append(UnusableCase(case, error))
+            loaded.append(_unusable(case, error, maps))
     if suite.whole:
         maps.refuse_unused()
     return loaded
+
+
+def _unusable(case: Case, error: InputError | ToolError, maps: _SuiteMaps) -> UnusableCase:
+    with suppress(InputError, ToolError):  # which may be the error itself
+        entry = maps.of(read_scenario(case.file))
+        baseline = None if case.baseline is None else read_baseline(case.baseline)
+        return UnusableCase(case, error, entry, baseline)
+    return UnusableCase(case, error)
 
 
 def _load(workspace: Workspace, case: Case, maps: _SuiteMaps, *, with_baseline: bool) -> LoadedCase:
@@ -180,6 +191,7 @@ class _SuiteMaps:
 
 def _settings(case: Case) -> RunSettings:
     return RunSettings(
+        redraw=case.redraw,
         until=case.until,
         step_length=case.step_length,
         recording=Recording(criticality=needs_criticality(case.expectations)),

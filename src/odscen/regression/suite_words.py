@@ -28,7 +28,8 @@ def headline(case: CaseResult) -> str:
     """
     if case.status in (CaseStatus.ERROR, CaseStatus.MISSING, CaseStatus.NEW):
         first = case.problems[0].splitlines()
-        return first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+        said = first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+        return f"{case.causes[0].words}: {said}" if case.errors and case.causes else said
     if case.status is CaseStatus.FAILED and case.unusable:
         return f"usable: {case.unusable[0]}"
     if case.status is CaseStatus.FAILED:

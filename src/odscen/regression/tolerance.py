@@ -20,17 +20,27 @@ _PART = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>%|[A-Za-z][A-Za-z/]*
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """Allowed are ``relative`` times the baseline or ``absolute``, whichever is more."""
+    """Allowed are ``relative`` times the baseline or ``absolute``, whichever is more.
+
+    ``by_scatter`` says that ``absolute`` is what the scatter of the seeds explains.
+    """
 
     relative: float = 0.0
     absolute: float = 0.0
+    by_scatter: bool = False
 
     def allowed(self, baseline: float) -> float:
         """Return the largest difference that passes, in the unit of the figure."""
         return max(self.relative * abs(baseline), self.absolute)
 
+    def times(self, factor: float) -> Tolerance:
+        """Return a part of it."""
+        return Tolerance(factor * self.relative, factor * self.absolute)
+
     def words(self, figure: Figure) -> str:
-        """``"5 % or 1.50 s"``, as it may be written in a suite."""
+        """``"5 % or 1.50 s"``, as it may be written in a suite, or ``"1.50 s by scatter"``."""
+        if self.by_scatter:
+            return f"{figure.written(self.absolute)} by scatter"
         parts = [f"{100 * self.relative:g} %"] if self.relative else []
         if self.absolute or not parts:
             parts.append(figure.written(self.absolute))

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.regression.tolerance import EXACT
+from odscen.regression.scatter import FLOOR, Level, allowed_by_chance
+from odscen.regression.tolerance import EXACT, Tolerance
 from odscen.results.measures.comparison import compare_figure
+from odscen.results.measures.figure import Better
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.regression.baseline import Baseline
     from odscen.regression.measure import FigureKey, Measured
-    from odscen.regression.tolerance import Tolerance, Tolerances
+    from odscen.regression.tolerance import Tolerances
     from odscen.results.measures.comparison import Difference
     from odscen.results.measures.figure import Figure
 
@@ -137,28 +139,23 @@ def hold_against(
 ) -> BaselineVerdict:
     """Hold new runs, given by seed, against a baseline, by the means over the seeds of both.
 
-    Figures of the run that the baseline does not have are newer than it, and are not judged.
+    Figures of the run that the baseline does not have are newer than it, and are not judged. What
+    is allowed is what the suite says; else, of a baseline by scatter, what chance explains, but not
+    less than half of what the figure's entry says; else what the entry says.
 
     Parameters
     ----------
     better_fails
         Whether a figure fails, too, that is better than its tolerance allows.
     """
-    seeds = [seed for seed in baseline.seeds if seed in runs]
-    position = {seed: index for index, seed in enumerate(baseline.seeds)}
-    found = (key for seed in seeds for key in runs[seed] if key.kind != "run")
-    keys = dict.fromkeys((*baseline.figures, *found))
+    compared = _compared(baseline, runs)
+    level = _level(compared, tolerances)
     changes = []
-    for key in keys:
-        stored = baseline.figures.get(key)
-        old: dict[int, float | None]
-        old = {seed: None if stored is None else stored[position[seed]] for seed in seeds}
-        new = {seed: runs[seed].get(key) for seed in seeds}
-        if key.place and key.figure == "vehicles":  # a place that no vehicle passes has no row
-            old = {seed: value or 0.0 for seed, value in old.items()}
-            new = {seed: value or 0.0 for seed, value in new.items()}
-        weight = _vehicles(key, baseline, runs, seeds, position)
-        change = _change(key, compare_figure(old, new), tolerances, weight)
+    for one in compared:
+        tolerance = tolerances.of(one.key)
+        if baseline.by_scatter and (one.key.kind, one.key.figure) not in tolerances.given:
+            tolerance = _by_scatter(one, tolerance, tolerances, level, better_fails=better_fails)
+        change = _change(one, tolerance, tolerances, by_scatter=baseline.by_scatter)
         if change is not None:
             if better_fails and change.effect is Effect.BETTER:
                 change = replace(change, effect=Effect.FAILS)
@@ -172,13 +169,86 @@ def hold_against(
     return BaselineVerdict(of("run"), of("segment", "junction"), of("actor"))
 
 
+class _Compared(NamedTuple):
+    """A figure on both sides, by seed, and how many vehicles it rests on."""
+
+    key: FigureKey
+    old: dict[int, float | None]
+    new: dict[int, float | None]
+    weight: float
+
+
+def _compared(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compared]:
+    """Figures of the seeds that both have; by scatter also of other seeds, if those differ."""
+    common = [seed for seed in baseline.seeds if seed in runs]
+    others = baseline.by_scatter and set(runs) != set(baseline.seeds)
+    before, now = (list(baseline.seeds), list(runs)) if others else (common, common)
+    position = {seed: index for index, seed in enumerate(baseline.seeds)}
+    found = (key for seed in now for key in runs[seed] if key.kind != "run")
+    compared = []
+    for key in dict.fromkeys((*baseline.figures, *found)):
+        stored = baseline.figures.get(key)
+        old: dict[int, float | None]
+        old = {seed: None if stored is None else stored[position[seed]] for seed in before}
+        new = {seed: runs[seed].get(key) for seed in now}
+        if key.place and key.figure == "vehicles":  # a place that no vehicle passes has no row
+            old = {seed: value or 0.0 for seed, value in old.items()}
+            new = {seed: value or 0.0 for seed, value in new.items()}
+        compared.append(_Compared(key, old, new, 1.0))
+    passed = {
+        one.key: tuple(_mean_count(side) for side in (one.old, one.new))
+        for one in compared
+        if one.key.figure == "vehicles"
+    }
+    return [one._replace(weight=_vehicles(one.key, passed)) for one in compared]
+
+
+def _level(compared: Sequence[_Compared], tolerances: Tolerances) -> Level:
+    """Share out false alarms among the figures that can fail by scatter."""
+    run = places = 0
+    for one in compared:
+        if (one.key.kind, one.key.figure) in tolerances.given or one.key.kind == "actor":
+            continue
+        run += one.key.kind == "run"
+        places += one.key.kind != "run" and one.weight >= FEWEST
+    return Level.shared(run=run, places=places)
+
+
+def _by_scatter(
+    one: _Compared,
+    usual: Tolerance,
+    tolerances: Tolerances,
+    level: Level,
+    *,
+    better_fails: bool,
+) -> Tolerance:
+    """What chance explains, where that is more than the least that matters."""
+    allowed = allowed_by_chance(
+        one.old,
+        one.new,
+        level=level.run if one.key.kind == "run" else level.place,
+        both_sides=better_fails or tolerances.entry(one.key).better is Better.NEITHER,
+    )
+    known = [value for value in one.old.values() if value is not None]
+    if allowed is None:
+        return usual
+    floor = usual.times(FLOOR)
+    if allowed <= floor.allowed(sum(known) / len(known)):
+        return floor
+    return Tolerance(absolute=allowed, by_scatter=True)
+
+
 def _change(
-    key: FigureKey, difference: Difference, tolerances: Tolerances, weight: float
+    one: _Compared, tolerance: Tolerance, tolerances: Tolerances, *, by_scatter: bool
 ) -> Change | None:
-    tolerance, entry = tolerances.of(key), tolerances.entry(key)
+    key, entry = one.key, tolerances.entry(one.key)
+    difference = compare_figure(one.old, one.new)
     if difference.a is None or difference.b is None:
         # Places and actors without a figure are seen by who passed and who arrived.
         if difference.a is difference.b or key.kind != "run":
+            return None
+        there = one.old if difference.b is None else one.new
+        if by_scatter and None in there.values():  # with other seeds there may be none, too
             return None
         return Change(key, entry, difference, EXACT, 1.0, Effect.FAILS)
     allowed = tolerance.allowed(difference.a)
@@ -186,8 +256,8 @@ def _change(
     if size <= allowed + _NOISE:
         return None
     # A mean over n vehicles varies by chance with 1 / sqrt(n). Where none is allowed, one counts.
-    score = size / (allowed or 1.0) * math.sqrt(weight)
-    effect = _effect(key, tolerances, weight, better=entry.improves(difference.difference))
+    score = size / (allowed or 1.0) * math.sqrt(one.weight)
+    effect = _effect(key, tolerances, one.weight, better=entry.improves(difference.difference))
     return Change(key, entry, difference, tolerance, score, effect)
 
 
@@ -201,19 +271,13 @@ def _effect(
     return Effect.BETTER if better else Effect.FAILS
 
 
-def _vehicles(
-    key: FigureKey,
-    baseline: Baseline,
-    runs: Mapping[int, Measured],
-    seeds: list[int],
-    position: Mapping[int, int],
-) -> float:
+def _vehicles(key: FigureKey, passed: Mapping[FigureKey, tuple[float, ...]]) -> float:
     """Vehicles that a figure of a place rests on: mean over the seeds, the lesser of both sides."""
     if key.kind not in ("segment", "junction"):
         return 1.0
-    own = key._replace(figure="vehicles")
-    stored = baseline.figures.get(own)
-    old = sum((stored[position[seed]] or 0.0) if stored else 0.0 for seed in seeds)
-    new = sum(runs[seed].get(own) or 0.0 for seed in seeds)
-    chosen = max(old, new) if key.figure == "vehicles" else min(old, new)
-    return chosen / max(1, len(seeds))
+    sides = passed.get(key._replace(figure="vehicles"), (0.0, 0.0))
+    return max(sides) if key.figure == "vehicles" else min(sides)
+
+
+def _mean_count(values: Mapping[int, float | None]) -> float:
+    return sum(value or 0.0 for value in values.values()) / max(1, len(values))

@@ -22,6 +22,7 @@ from odscen.results.records.run_records import Plan, PlannedActor
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.placing.region import Region
+from odscen.scenario.sampling.redrawn_traffic import redrawn
 from odscen.scenario.signals.detectors import without_detectors
 from odscen.sumo.folder.layout import (
     CLOSURES_FILE,
@@ -132,6 +133,7 @@ def realize(
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map)))
     if settings.seed is not None:
         scenario = scenario.model_copy(update={"seed": settings.seed})
+    scenario = redrawn(scenario, settings.redraw)
     recording, (until, step_length) = settings.recorded, settings.times(scenario)
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from odscen.base.errors import InputError
 from odscen.results.measures.expectations import Expectation, needs_criticality, parse_expectation
+from odscen.scenario.sampling.redrawn_traffic import REDRAWS
 from odscen.sumo.realize.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sampling.redrawn_traffic import Redraw
 
 SliceLength = float | Literal["auto"] | None
 """Seconds of the slices of a long run; ``auto`` what suits it, ``None`` none."""
@@ -38,6 +40,10 @@ class RunSettings:
     ----------
     seed
         Random seed, 0 to 2^31 - 1; the scenario's own if ``None``.
+    redraw
+        What the seed draws: ``open`` what the scenario leaves open; ``drivers`` also departures,
+        desired speeds and styles of placed actors; ``traffic`` also their goals
+        (:func:`odscen.scenario.sampling.redrawn_traffic.redrawn`).
     until
         Simulated time at which the run ends at the latest, above 0; the scenario's own duration if
         ``None``.
@@ -65,6 +71,7 @@ class RunSettings:
     """
 
     seed: int | None = None
+    redraw: Redraw = "open"
     until: float | None = None
     step_length: float | None = None
     weather: bool = True
@@ -77,6 +84,9 @@ class RunSettings:
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed < _SEEDS:
             msg = f"seed must lie between 0 and {_SEEDS - 1}, not {self.seed}"
+            raise InputError(msg)
+        if self.redraw not in REDRAWS:
+            msg = f"redraw must be one of {', '.join(REDRAWS)}, not {self.redraw!r}"
             raise InputError(msg)
         _refuse_time("until", self.until, most=_LONGEST)
         _refuse_time("step_length", self.step_length, most=1.0)
