@@ -1097,6 +1097,26 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * Action
+         * @description One kind of action, or several that run together.
+         */
+        Action: {
+            speed: components["schemas"]["SpeedChange"] | null;
+            brake: components["schemas"]["Braking"] | null;
+            stop: components["schemas"]["Stopping"] | null;
+            go: components["schemas"]["Going"] | null;
+            lane: components["schemas"]["LaneChange"] | null;
+            offset: components["schemas"]["LateralMove"] | null;
+            keep_gap: components["schemas"]["GapKeeping"] | null;
+            walk: components["schemas"]["Walking"] | null;
+            arrive: components["schemas"]["Arriving"] | null;
+            vanish: components["schemas"]["Vanishing"] | null;
+            ignore: components["schemas"]["Ignoring"] | null;
+            release: components["schemas"]["Releasing"] | null;
+            /** Together */
+            together: components["schemas"]["Action"][] | null;
+        };
+        /**
          * Actor
          * @description One road user, placed by hand or sampled.
          *
@@ -1104,7 +1124,8 @@ export interface components {
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario.
+         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     ``None`` is from rest.
          */
         Actor: {
             /** Id */
@@ -1128,6 +1149,8 @@ export interface components {
              * @default 0
              */
             depart: number;
+            /** Initial Speed */
+            initial_speed: number | null;
             /**
              * Style
              * @default normal
@@ -1174,6 +1197,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Style */
             style?: string;
             /** Ego */
@@ -1218,6 +1243,48 @@ export interface components {
             speed?: number | null;
             /** Profile */
             profile?: string | null;
+        };
+        /**
+         * AfterRule
+         * @description Another rule has started, or has ended, at least once.
+         */
+        AfterRule: {
+            /** Id */
+            id: string;
+            /**
+             * Has
+             * @default ended
+             * @enum {string}
+             */
+            has: "started" | "ended";
+        };
+        /**
+         * AfterTime
+         * @description Simulated time is ``after`` seconds or more.
+         */
+        AfterTime: {
+            /** After */
+            after: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         */
+        Arriving: {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
         };
         /**
          * AssetsInfo
@@ -1344,6 +1411,16 @@ export interface components {
             name?: string | null;
         };
         /**
+         * Braking
+         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
+         */
+        Braking: {
+            /** By */
+            by: number;
+            /** Hold */
+            hold: number | null;
+        };
+        /**
          * BrokenMapInfo
          * @description A map of the catalogue that cannot be used, and why.
          */
@@ -1412,6 +1489,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Style */
             style?: string;
             /** Ego */
@@ -1504,6 +1583,46 @@ export interface components {
             kind: "clear_timing";
             /** Junction */
             junction: string;
+        };
+        /**
+         * Condition
+         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
+         *
+         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
+         *     from the instant at which it comes true, and not if it is true when it is first looked at.
+         */
+        Condition: {
+            time: components["schemas"]["AfterTime"] | null;
+            ttc: components["schemas"]["PairBounded"] | null;
+            headway: components["schemas"]["PairBounded"] | null;
+            distance: components["schemas"]["DistanceBounded"] | null;
+            relative_speed: components["schemas"]["PairBounded"] | null;
+            speed: components["schemas"]["OwnBounded"] | null;
+            acceleration: components["schemas"]["OwnBounded"] | null;
+            stopped: components["schemas"]["Standing"] | null;
+            reaches: components["schemas"]["Reaching"] | null;
+            travelled: components["schemas"]["OwnBounded"] | null;
+            signal: components["schemas"]["SignalShows"] | null;
+            rule: components["schemas"]["AfterRule"] | null;
+            appeared: components["schemas"]["OneActor"] | null;
+            touched: components["schemas"]["Touching"] | null;
+            off_road: components["schemas"]["OneActor"] | null;
+            /** All */
+            all: components["schemas"]["Condition"][] | null;
+            /** Any */
+            any: components["schemas"]["Condition"][] | null;
+            not: components["schemas"]["Condition"] | null;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay: number;
+            /**
+             * Edge
+             * @default none
+             * @enum {string}
+             */
+            edge: "none" | "rising";
         };
         /**
          * Constant
@@ -1841,6 +1960,36 @@ export interface components {
             ][];
         };
         /**
+         * DistanceBounded
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         */
+        DistanceBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Along
+             * @default straight
+             * @enum {string}
+             */
+            along: "straight" | "longitudinal" | "lateral" | "lane";
+            /**
+             * Free
+             * @default true
+             */
+            free: boolean;
+        };
+        /**
          * DrawingColumns
          * @description What is drawn of a map, see ``docs/drawings.md``.
          *
@@ -2085,9 +2234,10 @@ export interface components {
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
+         *     What a rule does is reported of its actor, at the instant, which may lie inside a step.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "rule_started" | "rule_ended" | "rule_failed" | "rule_overridden";
         /**
          * ExpectationInfo
          * @description An expectation, what came of it, and whether it was met.
@@ -2222,6 +2372,25 @@ export interface components {
             profile: string | null;
         };
         /**
+         * GapKeeping
+         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         */
+        GapKeeping: {
+            /** To */
+            to: string;
+            /** Metres */
+            metres: number | null;
+            /** Seconds */
+            seconds: number | null;
+            /** Lasting */
+            lasting: number | null;
+            /**
+             * Rate
+             * @default 3
+             */
+            rate: number;
+        };
+        /**
          * GoOn
          * @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`.
          */
@@ -2239,6 +2408,11 @@ export interface components {
             /** Goals */
             goals: string[];
         };
+        /**
+         * Going
+         * @description SUMO chooses the speed again.
+         */
+        Going: Record<string, never>;
         /**
          * GraphColumns
          * @description The lane graph, the segments and the pedestrian graph.
@@ -2347,6 +2521,22 @@ export interface components {
             workspace: string;
         };
         /**
+         * Ignoring
+         * @description Heed neither red lights nor right of way, or one of the two.
+         */
+        Ignoring: {
+            /**
+             * Red
+             * @default true
+             */
+            red: boolean;
+            /**
+             * Right Of Way
+             * @default false
+             */
+            right_of_way: boolean;
+        };
+        /**
          * Incident
          * @description Vehicles gridlocked, teleported or not inserted at a place.
          *
@@ -2447,6 +2637,18 @@ export interface components {
              * @default null
              */
             queue?: number;
+            /**
+             * Rule
+             * @default null
+             */
+            rule?: string;
+            /**
+             * Values
+             * @default null
+             */
+            values?: {
+                [key: string]: number;
+            };
         };
         /**
          * IncidentKind
@@ -2548,6 +2750,32 @@ export interface components {
             plans: components["schemas"]["DayPlan-Output"][];
             /** Bus Priority */
             bus_priority: boolean | null;
+        };
+        /**
+         * LaneChange
+         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         */
+        LaneChange: {
+            /** By */
+            by: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over: number;
+        };
+        /**
+         * LateralMove
+         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
+         */
+        LateralMove: {
+            /** To */
+            to: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over: number;
         };
         /**
          * LightGroupInfo
@@ -2946,6 +3174,26 @@ export interface components {
             version: number;
         };
         /**
+         * OneActor
+         * @description An actor, the rule's own if none is named.
+         */
+        OneActor: {
+            /** Of */
+            of: string | null;
+        };
+        /**
+         * OwnBounded
+         * @description A value of one actor: ``of``, or the rule's own.
+         */
+        OwnBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+        };
+        /**
          * PackedLines
          * @description Lines or rings: how many points each has, and centimetres from each point to the next.
          */
@@ -2954,6 +3202,20 @@ export interface components {
             sizes: number[];
             /** Steps */
             steps: number[];
+        };
+        /**
+         * PairBounded
+         * @description A value between two actors.
+         */
+        PairBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string;
         };
         /**
          * Path
@@ -3137,6 +3399,29 @@ export interface components {
              */
             on_call: boolean;
         };
+        /**
+         * Reaching
+         * @description The centre of an actor's body is within so many metres of a place.
+         */
+        Reaching: {
+            /** Of */
+            of: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ];
+            /**
+             * Within
+             * @default 1
+             */
+            within: number;
+        };
+        /**
+         * Releasing
+         * @description SUMO drives as if there had been no rule.
+         */
+        Releasing: Record<string, never>;
         /**
          * RemovalInfo
          * @description What stays behind, and needs what is to be removed.
@@ -3699,6 +3984,11 @@ export interface components {
              *     }
              */
             simulation: components["schemas"]["Simulation"];
+            /**
+             * Rules
+             * @default []
+             */
+            rules: components["schemas"]["StoryRule"][];
         };
         /**
          * ScenarioRow
@@ -4352,6 +4642,23 @@ export interface components {
             value: number | null;
         };
         /**
+         * SignalShows
+         * @description A movement of a traffic light shows a colour.
+         *
+         *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
+         */
+        SignalShows: {
+            /** Light */
+            light: string;
+            /** Movement */
+            movement: string;
+            /**
+             * Shows
+             * @enum {string}
+             */
+            shows: "red" | "yellow" | "green";
+        };
+        /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
@@ -4439,6 +4746,28 @@ export interface components {
             done: components["schemas"]["SliceInfo"][];
         };
         /**
+         * SpeedChange
+         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
+         *
+         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         */
+        SpeedChange: {
+            /** To */
+            to: number;
+            /**
+             * Shape
+             * @default linear
+             * @enum {string}
+             */
+            shape: "step" | "linear" | "cosine";
+            /** Rate */
+            rate: number | null;
+            /** Over */
+            over: number | null;
+            /** Within */
+            within: number | null;
+        };
+        /**
          * StageInfo
          * @description A stage in the cycle of a plan; seconds.
          *
@@ -4471,6 +4800,19 @@ export interface components {
             picture: string;
         };
         /**
+         * Standing
+         * @description An actor has been stopped for so many seconds.
+         */
+        Standing: {
+            /** Of */
+            of: string | null;
+            /**
+             * Seconds
+             * @default 0
+             */
+            seconds: number;
+        };
+        /**
          * StopLineInfo
          * @description A stop line from end to end.
          */
@@ -4491,6 +4833,35 @@ export interface components {
          * @enum {string}
          */
         StopReason: "vehicles wait for each other in a circle" | "its lane does not lead on along its way" | "it did not get to the lane that its way needs" | "a red light" | "people on a crossing" | "it has to give way to traffic that does not end" | "no room on the road ahead" | "no room where they start" | "the reason does not show";
+        /**
+         * Stopping
+         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
+         */
+        Stopping: {
+            /** Within */
+            within: number | null;
+        };
+        /**
+         * StoryRule
+         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
+         *
+         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
+         *     does is over.
+         */
+        StoryRule: {
+            /** Id */
+            id: string;
+            /** Actor */
+            actor: string;
+            when: components["schemas"]["Condition"];
+            /** Then */
+            then: components["schemas"]["Action"][];
+            /**
+             * Times
+             * @default 1
+             */
+            times: number;
+        };
         /**
          * SummaryCounts
          * @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.
@@ -4519,6 +4890,16 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * Touching
+         * @description The body of an actor touches that of another one, or of any that a rule names.
+         */
+        Touching: {
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string | null;
+        };
         /**
          * Transit
          * @description Stops and lines of a scenario.
@@ -4636,6 +5017,11 @@ export interface components {
             high: number;
         };
         /**
+         * Vanishing
+         * @description Leave the simulation.
+         */
+        Vanishing: Record<string, never>;
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -4727,6 +5113,27 @@ export interface components {
             target: number[];
             /** Kind */
             kind: number[];
+        };
+        /**
+         * Walking
+         * @description Walk straight to a place, through others if given, wherever that leads.
+         */
+        Walking: {
+            /** To */
+            to: string | [
+                number,
+                number
+            ];
+            /**
+             * Through
+             * @default []
+             */
+            through: (string | [
+                number,
+                number
+            ])[];
+            /** Speed */
+            speed: number | null;
         };
         /**
          * WeatherInfo
@@ -4906,6 +5313,41 @@ export interface components {
         };
         LiveMessage: components["schemas"]["LiveHello"] | components["schemas"]["LiveState"] | components["schemas"]["LiveLights"] | components["schemas"]["LiveDetectors"] | components["schemas"]["LiveIncidents"] | components["schemas"]["LiveEnd"];
         /**
+         * Action
+         * @description One kind of action, or several that run together.
+         */
+        "Action-File": {
+            /** @default null */
+            speed?: components["schemas"]["SpeedChange-File"] | null;
+            /** @default null */
+            brake?: components["schemas"]["Braking-File"] | null;
+            /** @default null */
+            stop?: components["schemas"]["Stopping-File"] | null;
+            /** @default null */
+            go?: components["schemas"]["Going-File"] | null;
+            /** @default null */
+            lane?: components["schemas"]["LaneChange-File"] | null;
+            /** @default null */
+            offset?: components["schemas"]["LateralMove-File"] | null;
+            /** @default null */
+            keep_gap?: components["schemas"]["GapKeeping-File"] | null;
+            /** @default null */
+            walk?: components["schemas"]["Walking-File"] | null;
+            /** @default null */
+            arrive?: components["schemas"]["Arriving-File"] | null;
+            /** @default null */
+            vanish?: components["schemas"]["Vanishing-File"] | null;
+            /** @default null */
+            ignore?: components["schemas"]["Ignoring-File"] | null;
+            /** @default null */
+            release?: components["schemas"]["Releasing-File"] | null;
+            /**
+             * Together
+             * @default null
+             */
+            together?: components["schemas"]["Action-File"][] | null;
+        };
+        /**
          * Actor
          * @description One road user, placed by hand or sampled.
          *
@@ -4913,7 +5355,8 @@ export interface components {
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario.
+         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     ``None`` is from rest.
          */
         "Actor-File": {
             /** Id */
@@ -4947,6 +5390,11 @@ export interface components {
              */
             depart?: number;
             /**
+             * Initial Speed
+             * @default null
+             */
+            initial_speed?: number | null;
+            /**
              * Style
              * @default normal
              */
@@ -4966,6 +5414,48 @@ export interface components {
              * @default false
              */
             ignores_red?: boolean;
+        };
+        /**
+         * AfterRule
+         * @description Another rule has started, or has ended, at least once.
+         */
+        "AfterRule-File": {
+            /** Id */
+            id: string;
+            /**
+             * Has
+             * @default ended
+             * @enum {string}
+             */
+            has?: "started" | "ended";
+        };
+        /**
+         * AfterTime
+         * @description Simulated time is ``after`` seconds or more.
+         */
+        "AfterTime-File": {
+            /** After */
+            after: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         */
+        "Arriving-File": {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
         };
         /**
          * Background
@@ -5019,6 +5509,19 @@ export interface components {
             trips?: number | null;
         };
         /**
+         * Braking
+         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
+         */
+        "Braking-File": {
+            /** By */
+            by: number;
+            /**
+             * Hold
+             * @default null
+             */
+            hold?: number | null;
+        };
+        /**
          * Category
          * @description Exactly seven; the order is that of the interface.
          * @enum {string}
@@ -5041,6 +5544,68 @@ export interface components {
              * @default null
              */
             weights?: number[] | null;
+        };
+        /**
+         * Condition
+         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
+         *
+         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
+         *     from the instant at which it comes true, and not if it is true when it is first looked at.
+         */
+        "Condition-File": {
+            /** @default null */
+            time?: components["schemas"]["AfterTime-File"] | null;
+            /** @default null */
+            ttc?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            headway?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            distance?: components["schemas"]["DistanceBounded-File"] | null;
+            /** @default null */
+            relative_speed?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            speed?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            acceleration?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            stopped?: components["schemas"]["Standing-File"] | null;
+            /** @default null */
+            reaches?: components["schemas"]["Reaching-File"] | null;
+            /** @default null */
+            travelled?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            signal?: components["schemas"]["SignalShows-File"] | null;
+            /** @default null */
+            rule?: components["schemas"]["AfterRule-File"] | null;
+            /** @default null */
+            appeared?: components["schemas"]["OneActor-File"] | null;
+            /** @default null */
+            touched?: components["schemas"]["Touching-File"] | null;
+            /** @default null */
+            off_road?: components["schemas"]["OneActor-File"] | null;
+            /**
+             * All
+             * @default null
+             */
+            all?: components["schemas"]["Condition-File"][] | null;
+            /**
+             * Any
+             * @default null
+             */
+            any?: components["schemas"]["Condition-File"][] | null;
+            /** @default null */
+            not?: components["schemas"]["Condition-File"] | null;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay?: number;
+            /**
+             * Edge
+             * @default none
+             * @enum {string}
+             */
+            edge?: "none" | "rising";
         };
         /**
          * Constant
@@ -5166,6 +5731,51 @@ export interface components {
              * @default []
              */
             background?: components["schemas"]["Background-File"][];
+        };
+        /**
+         * DistanceBounded
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         */
+        "DistanceBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
+            /**
+             * Place
+             * @default null
+             */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Along
+             * @default straight
+             * @enum {string}
+             */
+            along?: "straight" | "longitudinal" | "lateral" | "lane";
+            /**
+             * Free
+             * @default true
+             */
+            free?: boolean;
         };
         /**
          * DriverSet
@@ -5309,6 +5919,55 @@ export interface components {
             profile?: string | null;
         };
         /**
+         * GapKeeping
+         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         */
+        "GapKeeping-File": {
+            /** To */
+            to: string;
+            /**
+             * Metres
+             * @default null
+             */
+            metres?: number | null;
+            /**
+             * Seconds
+             * @default null
+             */
+            seconds?: number | null;
+            /**
+             * Lasting
+             * @default null
+             */
+            lasting?: number | null;
+            /**
+             * Rate
+             * @default 3
+             */
+            rate?: number;
+        };
+        /**
+         * Going
+         * @description SUMO chooses the speed again.
+         */
+        "Going-File": Record<string, never>;
+        /**
+         * Ignoring
+         * @description Heed neither red lights nor right of way, or one of the two.
+         */
+        "Ignoring-File": {
+            /**
+             * Red
+             * @default true
+             */
+            red?: boolean;
+            /**
+             * Right Of Way
+             * @default false
+             */
+            right_of_way?: boolean;
+        };
+        /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
          *
@@ -5385,6 +6044,32 @@ export interface components {
             bus_priority?: boolean | null;
         };
         /**
+         * LaneChange
+         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         */
+        "LaneChange-File": {
+            /** By */
+            by: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
+         * LateralMove
+         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
+         */
+        "LateralMove-File": {
+            /** To */
+            to: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
          * MapReference
          * @description The map, by name *and* content, and the spacing of the graph that node names refer to.
          */
@@ -5457,6 +6142,61 @@ export interface components {
             low: number;
             /** High */
             high: number;
+        };
+        /**
+         * OneActor
+         * @description An actor, the rule's own if none is named.
+         */
+        "OneActor-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+        };
+        /**
+         * OwnBounded
+         * @description A value of one actor: ``of``, or the rule's own.
+         */
+        "OwnBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+        };
+        /**
+         * PairBounded
+         * @description A value between two actors.
+         */
+        "PairBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /** To */
+            to: string;
         };
         /**
          * Profile
@@ -5535,6 +6275,32 @@ export interface components {
             on_call?: boolean;
         };
         /**
+         * Reaching
+         * @description The centre of an actor's body is within so many metres of a place.
+         */
+        "Reaching-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ];
+            /**
+             * Within
+             * @default 1
+             */
+            within?: number;
+        };
+        /**
+         * Releasing
+         * @description SUMO drives as if there had been no rule.
+         */
+        "Releasing-File": Record<string, never>;
+        /**
          * ServedStop
          * @description A stop on a line.
          *
@@ -5585,6 +6351,23 @@ export interface components {
              * @default 3
              */
             gap?: number;
+        };
+        /**
+         * SignalShows
+         * @description A movement of a traffic light shows a colour.
+         *
+         *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
+         */
+        "SignalShows-File": {
+            /** Light */
+            light: string;
+            /** Movement */
+            movement: string;
+            /**
+             * Shows
+             * @enum {string}
+             */
+            shows: "red" | "yellow" | "green";
         };
         /**
          * Signals
@@ -5652,6 +6435,101 @@ export interface components {
              * @enum {string}
              */
             pedestrians?: "striping" | "nonInteracting";
+        };
+        /**
+         * SpeedChange
+         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
+         *
+         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         */
+        "SpeedChange-File": {
+            /** To */
+            to: number;
+            /**
+             * Shape
+             * @default linear
+             * @enum {string}
+             */
+            shape?: "step" | "linear" | "cosine";
+            /**
+             * Rate
+             * @default null
+             */
+            rate?: number | null;
+            /**
+             * Over
+             * @default null
+             */
+            over?: number | null;
+            /**
+             * Within
+             * @default null
+             */
+            within?: number | null;
+        };
+        /**
+         * Standing
+         * @description An actor has been stopped for so many seconds.
+         */
+        "Standing-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * Seconds
+             * @default 0
+             */
+            seconds?: number;
+        };
+        /**
+         * Stopping
+         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
+         */
+        "Stopping-File": {
+            /**
+             * Within
+             * @default null
+             */
+            within?: number | null;
+        };
+        /**
+         * StoryRule
+         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
+         *
+         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
+         *     does is over.
+         */
+        "StoryRule-File": {
+            /** Id */
+            id: string;
+            /** Actor */
+            actor: string;
+            when: components["schemas"]["Condition-File"];
+            /** Then */
+            then: components["schemas"]["Action-File"][];
+            /**
+             * Times
+             * @default 1
+             */
+            times?: number;
+        };
+        /**
+         * Touching
+         * @description The body of an actor touches that of another one, or of any that a rule names.
+         */
+        "Touching-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
         };
         /**
          * Transit
@@ -5767,6 +6645,11 @@ export interface components {
             high: number;
         };
         /**
+         * Vanishing
+         * @description Leave the simulation.
+         */
+        "Vanishing-File": Record<string, never>;
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -5838,6 +6721,30 @@ export interface components {
                 string,
                 number
             ][];
+        };
+        /**
+         * Walking
+         * @description Walk straight to a place, through others if given, wherever that leads.
+         */
+        "Walking-File": {
+            /** To */
+            to: string | [
+                number,
+                number
+            ];
+            /**
+             * Through
+             * @default []
+             */
+            through?: (string | [
+                number,
+                number
+            ])[];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
         };
         /**
          * Zone
@@ -5948,6 +6855,11 @@ export interface components {
              *     }
              */
             simulation?: components["schemas"]["Simulation-File"];
+            /**
+             * Rules
+             * @default []
+             */
+            rules?: components["schemas"]["StoryRule-File"][];
         };
     };
     responses: never;

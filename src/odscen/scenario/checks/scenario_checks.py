@@ -12,6 +12,7 @@ from odscen.scenario.checks.actor_checks import (
     flow_problems,
 )
 from odscen.scenario.checks.demand_checks import demand_problems
+from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.checks.start_overlaps import start_overlaps
 from odscen.scenario.checks.transit_checks import transit_problems
@@ -69,6 +70,7 @@ def check(
     if lights is not None:
         clock, until = scenario.demand.clock, scenario.simulation.duration
         found += signal_problems(scenario.signals, lights, clock=clock, until=until)
+    found += rule_problems(scenario, region, lights)
     found += shared_nodes(scenario)
     found += start_overlaps(scenario, region, assets)
     return tuple(found)

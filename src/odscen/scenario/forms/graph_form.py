@@ -51,7 +51,9 @@ _One = TypeVar("_One", bound=Actor | Flow)
 GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
-_JSON = ("roi", "environment", "drivers", "demand", "transit", "signals", "simulation")
+_JSON = (
+    "roi", "environment", "drivers", "demand", "transit", "signals", "simulation", "rules"
+)  # fmt: skip
 """Graph attributes that hold JSON."""
 
 
@@ -125,7 +127,11 @@ def from_graphml(text: str, *, file: str | None = None) -> Scenario:
 def _about(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json")
     for name in OPTIONAL:
-        data[name] = getattr(scenario, name).model_dump(mode="json", exclude_defaults=True)
+        part = getattr(scenario, name)
+        if isinstance(part, tuple):
+            data[name] = [one.model_dump(mode="json", exclude_defaults=True) for one in part]
+        else:
+            data[name] = part.model_dump(mode="json", exclude_defaults=True)
     held = [name for name in _JSON if name not in OPTIONAL or data[name]]
     return {
         "format": FORMAT,

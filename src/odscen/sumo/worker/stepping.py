@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from odscen.sumo.worker.lockstep import LockstepWatch
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.story_run import StoryRun
     from odscen.sumo.worker.watch import Watch
 
 MESSAGE_PAUSE = 0.25
@@ -40,11 +41,18 @@ class Stepper:
         What has happened.
     steps
         Made so far.
+    story
+        The rules of the run, if it has any.
     """
 
     def __init__(
-        self, plan: Plan, send: Callable[[Message], None], watch: Watch | LockstepWatch | None
+        self,
+        plan: Plan,
+        send: Callable[[Message], None],
+        watch: Watch | LockstepWatch | None,
+        story: StoryRun | None = None,
     ) -> None:
+        self.story = story
         self.recorder = Recorder(plan)
         self.steps = 0
         self._plan = plan
@@ -68,7 +76,9 @@ class Stepper:
             Whether road users are to come that this simulation does not know of.
         """
         watch, record, clock = self._watch, self.recorder.record, time.monotonic
-        now = session.time
+        story, now = self.story, session.time
+        if story is not None:
+            story.begin(session)
         if self._start is None:
             self._start = now, self.recorder.departed
         begin, waited = clock(), 0.0
@@ -80,6 +90,8 @@ class Stepper:
                 waited += clock() - asked
             after = session.step()
             record(session, now)
+            if story is not None:
+                story.after_step(now, self.recorder)
             now = after
             self.steps += 1
             if clock() - self._sent >= MESSAGE_PAUSE:
