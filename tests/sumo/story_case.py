@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import math
+import shutil
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -38,7 +40,9 @@ LEFT, MIDDLE, RIGHT = -4.875, -8.625, -12.375
 
 @cache
 def workspace() -> Workspace:
-    return Workspace.open(Path(mkdtemp(prefix="odscen-story-")))
+    folder = Path(mkdtemp(prefix="odscen-story-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Workspace.open(folder)
 
 
 @cache
