@@ -10,6 +10,7 @@ export const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   speed: null,
   lateral_offset: 0.5,
   depart: 0,
+  initial_speed: null,
   style: "normal",
   ego: false,
   crosses_anywhere: false,
@@ -57,6 +58,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
     teleport_after: 300,
     pedestrians: "striping",
   },
+  rules: [],
 });
 export const problem = (where: string, nodes: string[] = []): Problem => ({
   severity: "error",

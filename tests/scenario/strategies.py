@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from odscen.base.categories import Category
 from odscen.scenario.document.distributions import Constant, Uniform
 from odscen.scenario.document.drivers_document import Drivers, DriverSet
+from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (
     Actor,
     Background,
@@ -35,6 +36,7 @@ actors = st.builds(
     speed=st.none() | st.floats(0, 100, exclude_min=True),
     lateral_offset=st.floats(-10, 10),
     depart=st.floats(0, 1e6),
+    initial_speed=st.none() | st.floats(0, 100),
     style=st.sampled_from(["cautious", "normal", "sporty"]),
     ego=st.booleans(),
     crosses_anywhere=st.booleans(),
@@ -139,6 +141,16 @@ demands = st.builds(
         st.builds(Background, **windows, per_km=st.floats(0.5, 100)), max_size=2
     ).map(tuple),
 )
+RULES = (
+    StoryRule.model_validate(
+        {
+            "id": "cut-in",
+            "actor": "van",
+            "when": {"any": [{"not": {"speed": {"above": 3.5}}}, {"ttc": {"to": "b", "below": 3}}]},
+            "then": [{"lane": {"by": -1}}, {"together": [{"stop": {}}, {"ignore": {}}]}],
+        }
+    ),
+)
 scenarios = st.builds(
     Scenario,
     name=labels,
@@ -152,4 +164,5 @@ scenarios = st.builds(
     flows=st.lists(flows, max_size=3).map(tuple),
     signals=signals,
     demand=demands,
+    rules=st.sampled_from([(), RULES]),
 )

@@ -1097,6 +1097,26 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * Action
+         * @description One kind of action, or several that run together.
+         */
+        Action: {
+            speed: components["schemas"]["SpeedChange"] | null;
+            brake: components["schemas"]["Braking"] | null;
+            stop: components["schemas"]["Stopping"] | null;
+            go: components["schemas"]["Going"] | null;
+            lane: components["schemas"]["LaneChange"] | null;
+            offset: components["schemas"]["LateralMove"] | null;
+            keep_gap: components["schemas"]["GapKeeping"] | null;
+            walk: components["schemas"]["Walking"] | null;
+            arrive: components["schemas"]["Arriving"] | null;
+            vanish: components["schemas"]["Vanishing"] | null;
+            ignore: components["schemas"]["Ignoring"] | null;
+            release: components["schemas"]["Releasing"] | null;
+            /** Together */
+            together: components["schemas"]["Action"][] | null;
+        };
+        /**
          * Actor
          * @description One road user, placed by hand or sampled.
          *
@@ -1104,7 +1124,8 @@ export interface components {
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario.
+         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     ``None`` is from rest.
          */
         Actor: {
             /** Id */
@@ -1128,6 +1149,8 @@ export interface components {
              * @default 0
              */
             depart: number;
+            /** Initial Speed */
+            initial_speed: number | null;
             /**
              * Style
              * @default normal
@@ -1174,6 +1197,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Style */
             style?: string;
             /** Ego */
@@ -1218,6 +1243,48 @@ export interface components {
             speed?: number | null;
             /** Profile */
             profile?: string | null;
+        };
+        /**
+         * AfterRule
+         * @description Another rule has started, or has ended, at least once.
+         */
+        AfterRule: {
+            /** Id */
+            id: string;
+            /**
+             * Has
+             * @default ended
+             * @enum {string}
+             */
+            has: "started" | "ended";
+        };
+        /**
+         * AfterTime
+         * @description Simulated time is ``after`` seconds or more.
+         */
+        AfterTime: {
+            /** After */
+            after: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         */
+        Arriving: {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
         };
         /**
          * AssetsInfo
@@ -1344,6 +1411,16 @@ export interface components {
             name?: string | null;
         };
         /**
+         * Braking
+         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
+         */
+        Braking: {
+            /** By */
+            by: number;
+            /** Hold */
+            hold: number | null;
+        };
+        /**
          * BrokenMapInfo
          * @description A map of the catalogue that cannot be used, and why.
          */
@@ -1412,6 +1489,8 @@ export interface components {
             lateral_offset?: number;
             /** Depart */
             depart?: number;
+            /** Initial Speed */
+            initial_speed?: number | null;
             /** Style */
             style?: string;
             /** Ego */
@@ -1536,6 +1615,46 @@ export interface components {
             kind: "clear_timing";
             /** Junction */
             junction: string;
+        };
+        /**
+         * Condition
+         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
+         *
+         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
+         *     from the instant at which it comes true, and not if it is true when it is first looked at.
+         */
+        Condition: {
+            time: components["schemas"]["AfterTime"] | null;
+            ttc: components["schemas"]["PairBounded"] | null;
+            headway: components["schemas"]["PairBounded"] | null;
+            distance: components["schemas"]["DistanceBounded"] | null;
+            relative_speed: components["schemas"]["PairBounded"] | null;
+            speed: components["schemas"]["OwnBounded"] | null;
+            acceleration: components["schemas"]["OwnBounded"] | null;
+            stopped: components["schemas"]["Standing"] | null;
+            reaches: components["schemas"]["Reaching"] | null;
+            travelled: components["schemas"]["OwnBounded"] | null;
+            signal: components["schemas"]["SignalShows"] | null;
+            rule: components["schemas"]["AfterRule"] | null;
+            appeared: components["schemas"]["OneActor"] | null;
+            touched: components["schemas"]["Touching"] | null;
+            off_road: components["schemas"]["OneActor"] | null;
+            /** All */
+            all: components["schemas"]["Condition"][] | null;
+            /** Any */
+            any: components["schemas"]["Condition"][] | null;
+            not: components["schemas"]["Condition"] | null;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay: number;
+            /**
+             * Edge
+             * @default none
+             * @enum {string}
+             */
+            edge: "none" | "rising";
         };
         /**
          * Constant
@@ -1873,6 +1992,36 @@ export interface components {
             ][];
         };
         /**
+         * DistanceBounded
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         */
+        DistanceBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Along
+             * @default straight
+             * @enum {string}
+             */
+            along: "straight" | "longitudinal" | "lateral" | "lane";
+            /**
+             * Free
+             * @default true
+             */
+            free: boolean;
+        };
+        /**
          * DrawingColumns
          * @description What is drawn of a map, see ``docs/drawings.md``.
          *
@@ -2119,9 +2268,10 @@ export interface components {
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
          *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
          *     and end; their id stands for that of an actor.
+         *     What a rule does is reported of its actor, at the instant, which may lie inside a step.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_ended" | "rule_failed" | "rule_overridden";
         /**
          * ExpectationInfo
          * @description An expectation, what came of it, and whether it was met.
@@ -2256,6 +2406,25 @@ export interface components {
             profile: string | null;
         };
         /**
+         * GapKeeping
+         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         */
+        GapKeeping: {
+            /** To */
+            to: string;
+            /** Metres */
+            metres: number | null;
+            /** Seconds */
+            seconds: number | null;
+            /** Lasting */
+            lasting: number | null;
+            /**
+             * Rate
+             * @default 3
+             */
+            rate: number;
+        };
+        /**
          * GoOn
          * @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`.
          */
@@ -2273,6 +2442,11 @@ export interface components {
             /** Goals */
             goals: string[];
         };
+        /**
+         * Going
+         * @description SUMO chooses the speed again.
+         */
+        Going: Record<string, never>;
         /**
          * GraphColumns
          * @description The lane graph, the segments and the pedestrian graph.
@@ -2381,6 +2555,22 @@ export interface components {
             workspace: string;
         };
         /**
+         * Ignoring
+         * @description Heed neither red lights nor right of way, or one of the two.
+         */
+        Ignoring: {
+            /**
+             * Red
+             * @default true
+             */
+            red: boolean;
+            /**
+             * Right Of Way
+             * @default false
+             */
+            right_of_way: boolean;
+        };
+        /**
          * Incident
          * @description Vehicles gridlocked, teleported or not inserted at a place.
          *
@@ -2481,6 +2671,18 @@ export interface components {
              * @default null
              */
             queue?: number;
+            /**
+             * Rule
+             * @default null
+             */
+            rule?: string;
+            /**
+             * Values
+             * @default null
+             */
+            values?: {
+                [key: string]: number;
+            };
         };
         /**
          * IncidentKind
@@ -2584,6 +2786,19 @@ export interface components {
             bus_priority: boolean | null;
         };
         /**
+         * LaneChange
+         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         */
+        LaneChange: {
+            /** By */
+            by: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over: number;
+        };
+        /**
          * LaneIncident
          * @description A broken-down vehicle that blocks a lane.
          *
@@ -2614,6 +2829,19 @@ export interface components {
              * @default 5
              */
             length: number;
+        };
+        /**
+         * LateralMove
+         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
+         */
+        LateralMove: {
+            /** To */
+            to: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over: number;
         };
         /**
          * LightGroupInfo
@@ -3012,6 +3240,26 @@ export interface components {
             version: number;
         };
         /**
+         * OneActor
+         * @description An actor, the rule's own if none is named.
+         */
+        OneActor: {
+            /** Of */
+            of: string | null;
+        };
+        /**
+         * OwnBounded
+         * @description A value of one actor: ``of``, or the rule's own.
+         */
+        OwnBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+        };
+        /**
          * PackedLines
          * @description Lines or rings: how many points each has, and centimetres from each point to the next.
          */
@@ -3020,6 +3268,20 @@ export interface components {
             sizes: number[];
             /** Steps */
             steps: number[];
+        };
+        /**
+         * PairBounded
+         * @description A value between two actors.
+         */
+        PairBounded: {
+            /** Below */
+            below: number | null;
+            /** Above */
+            above: number | null;
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string;
         };
         /**
          * Path
@@ -3203,6 +3465,29 @@ export interface components {
              */
             on_call: boolean;
         };
+        /**
+         * Reaching
+         * @description The centre of an actor's body is within so many metres of a place.
+         */
+        Reaching: {
+            /** Of */
+            of: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ];
+            /**
+             * Within
+             * @default 1
+             */
+            within: number;
+        };
+        /**
+         * Releasing
+         * @description SUMO drives as if there had been no rule.
+         */
+        Releasing: Record<string, never>;
         /**
          * RemovalInfo
          * @description What stays behind, and needs what is to be removed.
@@ -3827,6 +4112,11 @@ export interface components {
              *     }
              */
             simulation: components["schemas"]["Simulation"];
+            /**
+             * Rules
+             * @default []
+             */
+            rules: components["schemas"]["StoryRule"][];
         };
         /**
          * ScenarioRow
@@ -4511,6 +4801,23 @@ export interface components {
             shows: "off" | "flashing";
         };
         /**
+         * SignalShows
+         * @description A movement of a traffic light shows a colour.
+         *
+         *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
+         */
+        SignalShows: {
+            /** Light */
+            light: string;
+            /** Movement */
+            movement: string;
+            /**
+             * Shows
+             * @enum {string}
+             */
+            shows: "red" | "yellow" | "green";
+        };
+        /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
@@ -4598,6 +4905,28 @@ export interface components {
             done: components["schemas"]["SliceInfo"][];
         };
         /**
+         * SpeedChange
+         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
+         *
+         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         */
+        SpeedChange: {
+            /** To */
+            to: number;
+            /**
+             * Shape
+             * @default linear
+             * @enum {string}
+             */
+            shape: "step" | "linear" | "cosine";
+            /** Rate */
+            rate: number | null;
+            /** Over */
+            over: number | null;
+            /** Within */
+            within: number | null;
+        };
+        /**
          * SpeedLimit
          * @description Another speed limit, m/s; of several at a place the lowest holds.
          */
@@ -4654,6 +4983,19 @@ export interface components {
             picture: string;
         };
         /**
+         * Standing
+         * @description An actor has been stopped for so many seconds.
+         */
+        Standing: {
+            /** Of */
+            of: string | null;
+            /**
+             * Seconds
+             * @default 0
+             */
+            seconds: number;
+        };
+        /**
          * StopLineInfo
          * @description A stop line from end to end.
          */
@@ -4674,6 +5016,35 @@ export interface components {
          * @enum {string}
          */
         StopReason: "vehicles wait for each other in a circle" | "its lane does not lead on along its way" | "it did not get to the lane that its way needs" | "a red light" | "people on a crossing" | "it has to give way to traffic that does not end" | "no room on the road ahead" | "no room where they start" | "the reason does not show";
+        /**
+         * Stopping
+         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
+         */
+        Stopping: {
+            /** Within */
+            within: number | null;
+        };
+        /**
+         * StoryRule
+         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
+         *
+         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
+         *     does is over.
+         */
+        StoryRule: {
+            /** Id */
+            id: string;
+            /** Actor */
+            actor: string;
+            when: components["schemas"]["Condition"];
+            /** Then */
+            then: components["schemas"]["Action"][];
+            /**
+             * Times
+             * @default 1
+             */
+            times: number;
+        };
         /**
          * SummaryCounts
          * @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.
@@ -4704,6 +5075,16 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * Touching
+         * @description The body of an actor touches that of another one, or of any that a rule names.
+         */
+        Touching: {
+            /** Of */
+            of: string | null;
+            /** To */
+            to: string | null;
+        };
         /**
          * Transit
          * @description Stops and lines of a scenario.
@@ -4876,6 +5257,11 @@ export interface components {
             places: string[];
         };
         /**
+         * Vanishing
+         * @description Leave the simulation.
+         */
+        Vanishing: Record<string, never>;
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -4967,6 +5353,27 @@ export interface components {
             target: number[];
             /** Kind */
             kind: number[];
+        };
+        /**
+         * Walking
+         * @description Walk straight to a place, through others if given, wherever that leads.
+         */
+        Walking: {
+            /** To */
+            to: string | [
+                number,
+                number
+            ];
+            /**
+             * Through
+             * @default []
+             */
+            through: (string | [
+                number,
+                number
+            ])[];
+            /** Speed */
+            speed: number | null;
         };
         /**
          * WeatherInfo
@@ -5146,6 +5553,41 @@ export interface components {
         };
         LiveMessage: components["schemas"]["LiveHello"] | components["schemas"]["LiveState"] | components["schemas"]["LiveLights"] | components["schemas"]["LiveDetectors"] | components["schemas"]["LiveIncidents"] | components["schemas"]["LiveEnd"];
         /**
+         * Action
+         * @description One kind of action, or several that run together.
+         */
+        "Action-File": {
+            /** @default null */
+            speed?: components["schemas"]["SpeedChange-File"] | null;
+            /** @default null */
+            brake?: components["schemas"]["Braking-File"] | null;
+            /** @default null */
+            stop?: components["schemas"]["Stopping-File"] | null;
+            /** @default null */
+            go?: components["schemas"]["Going-File"] | null;
+            /** @default null */
+            lane?: components["schemas"]["LaneChange-File"] | null;
+            /** @default null */
+            offset?: components["schemas"]["LateralMove-File"] | null;
+            /** @default null */
+            keep_gap?: components["schemas"]["GapKeeping-File"] | null;
+            /** @default null */
+            walk?: components["schemas"]["Walking-File"] | null;
+            /** @default null */
+            arrive?: components["schemas"]["Arriving-File"] | null;
+            /** @default null */
+            vanish?: components["schemas"]["Vanishing-File"] | null;
+            /** @default null */
+            ignore?: components["schemas"]["Ignoring-File"] | null;
+            /** @default null */
+            release?: components["schemas"]["Releasing-File"] | null;
+            /**
+             * Together
+             * @default null
+             */
+            together?: components["schemas"]["Action-File"][] | null;
+        };
+        /**
          * Actor
          * @description One road user, placed by hand or sampled.
          *
@@ -5153,7 +5595,8 @@ export interface components {
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario.
+         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     ``None`` is from rest.
          */
         "Actor-File": {
             /** Id */
@@ -5187,6 +5630,11 @@ export interface components {
              */
             depart?: number;
             /**
+             * Initial Speed
+             * @default null
+             */
+            initial_speed?: number | null;
+            /**
              * Style
              * @default normal
              */
@@ -5206,6 +5654,48 @@ export interface components {
              * @default false
              */
             ignores_red?: boolean;
+        };
+        /**
+         * AfterRule
+         * @description Another rule has started, or has ended, at least once.
+         */
+        "AfterRule-File": {
+            /** Id */
+            id: string;
+            /**
+             * Has
+             * @default ended
+             * @enum {string}
+             */
+            has?: "started" | "ended";
+        };
+        /**
+         * AfterTime
+         * @description Simulated time is ``after`` seconds or more.
+         */
+        "AfterTime-File": {
+            /** After */
+            after: number;
+        };
+        /**
+         * Arriving
+         * @description Be at a place at the instant at which ``to`` is at another one.
+         *
+         *     ``at`` is where the actor is to be, ``when_at`` where the other one is then.
+         */
+        "Arriving-File": {
+            /** At */
+            at: string | [
+                number,
+                number
+            ];
+            /** To */
+            to: string;
+            /** When At */
+            when_at: string | [
+                number,
+                number
+            ];
         };
         /**
          * Background
@@ -5257,6 +5747,19 @@ export interface components {
              * @default null
              */
             trips?: number | null;
+        };
+        /**
+         * Braking
+         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
+         */
+        "Braking-File": {
+            /** By */
+            by: number;
+            /**
+             * Hold
+             * @default null
+             */
+            hold?: number | null;
         };
         /**
          * Category
@@ -5316,6 +5819,68 @@ export interface components {
              * @default null
              */
             weights?: number[] | null;
+        };
+        /**
+         * Condition
+         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
+         *
+         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
+         *     from the instant at which it comes true, and not if it is true when it is first looked at.
+         */
+        "Condition-File": {
+            /** @default null */
+            time?: components["schemas"]["AfterTime-File"] | null;
+            /** @default null */
+            ttc?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            headway?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            distance?: components["schemas"]["DistanceBounded-File"] | null;
+            /** @default null */
+            relative_speed?: components["schemas"]["PairBounded-File"] | null;
+            /** @default null */
+            speed?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            acceleration?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            stopped?: components["schemas"]["Standing-File"] | null;
+            /** @default null */
+            reaches?: components["schemas"]["Reaching-File"] | null;
+            /** @default null */
+            travelled?: components["schemas"]["OwnBounded-File"] | null;
+            /** @default null */
+            signal?: components["schemas"]["SignalShows-File"] | null;
+            /** @default null */
+            rule?: components["schemas"]["AfterRule-File"] | null;
+            /** @default null */
+            appeared?: components["schemas"]["OneActor-File"] | null;
+            /** @default null */
+            touched?: components["schemas"]["Touching-File"] | null;
+            /** @default null */
+            off_road?: components["schemas"]["OneActor-File"] | null;
+            /**
+             * All
+             * @default null
+             */
+            all?: components["schemas"]["Condition-File"][] | null;
+            /**
+             * Any
+             * @default null
+             */
+            any?: components["schemas"]["Condition-File"][] | null;
+            /** @default null */
+            not?: components["schemas"]["Condition-File"] | null;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay?: number;
+            /**
+             * Edge
+             * @default none
+             * @enum {string}
+             */
+            edge?: "none" | "rising";
         };
         /**
          * Constant
@@ -5441,6 +6006,51 @@ export interface components {
              * @default []
              */
             background?: components["schemas"]["Background-File"][];
+        };
+        /**
+         * DistanceBounded
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         */
+        "DistanceBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
+            /**
+             * Place
+             * @default null
+             */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Along
+             * @default straight
+             * @enum {string}
+             */
+            along?: "straight" | "longitudinal" | "lateral" | "lane";
+            /**
+             * Free
+             * @default true
+             */
+            free?: boolean;
         };
         /**
          * DriverSet
@@ -5584,6 +6194,55 @@ export interface components {
             profile?: string | null;
         };
         /**
+         * GapKeeping
+         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         */
+        "GapKeeping-File": {
+            /** To */
+            to: string;
+            /**
+             * Metres
+             * @default null
+             */
+            metres?: number | null;
+            /**
+             * Seconds
+             * @default null
+             */
+            seconds?: number | null;
+            /**
+             * Lasting
+             * @default null
+             */
+            lasting?: number | null;
+            /**
+             * Rate
+             * @default 3
+             */
+            rate?: number;
+        };
+        /**
+         * Going
+         * @description SUMO chooses the speed again.
+         */
+        "Going-File": Record<string, never>;
+        /**
+         * Ignoring
+         * @description Heed neither red lights nor right of way, or one of the two.
+         */
+        "Ignoring-File": {
+            /**
+             * Red
+             * @default true
+             */
+            red?: boolean;
+            /**
+             * Right Of Way
+             * @default false
+             */
+            right_of_way?: boolean;
+        };
+        /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
          *
@@ -5660,6 +6319,19 @@ export interface components {
             bus_priority?: boolean | null;
         };
         /**
+         * LaneChange
+         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         */
+        "LaneChange-File": {
+            /** By */
+            by: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
          * LaneIncident
          * @description A broken-down vehicle that blocks a lane.
          *
@@ -5693,6 +6365,19 @@ export interface components {
              * @default 5
              */
             length?: number;
+        };
+        /**
+         * LateralMove
+         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
+         */
+        "LateralMove-File": {
+            /** To */
+            to: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
         };
         /**
          * MapReference
@@ -5767,6 +6452,61 @@ export interface components {
             low: number;
             /** High */
             high: number;
+        };
+        /**
+         * OneActor
+         * @description An actor, the rule's own if none is named.
+         */
+        "OneActor-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+        };
+        /**
+         * OwnBounded
+         * @description A value of one actor: ``of``, or the rule's own.
+         */
+        "OwnBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+        };
+        /**
+         * PairBounded
+         * @description A value between two actors.
+         */
+        "PairBounded-File": {
+            /**
+             * Below
+             * @default null
+             */
+            below?: number | null;
+            /**
+             * Above
+             * @default null
+             */
+            above?: number | null;
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /** To */
+            to: string;
         };
         /**
          * Profile
@@ -5844,6 +6584,32 @@ export interface components {
              */
             on_call?: boolean;
         };
+        /**
+         * Reaching
+         * @description The centre of an actor's body is within so many metres of a place.
+         */
+        "Reaching-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ];
+            /**
+             * Within
+             * @default 1
+             */
+            within?: number;
+        };
+        /**
+         * Releasing
+         * @description SUMO drives as if there had been no rule.
+         */
+        "Releasing-File": Record<string, never>;
         /**
          * RoadClosure
          * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
@@ -5999,6 +6765,23 @@ export interface components {
             shows?: "off" | "flashing";
         };
         /**
+         * SignalShows
+         * @description A movement of a traffic light shows a colour.
+         *
+         *     ``light`` is the junction, ``movement`` a name as in signal programs, ``r1>r2`` or ``walk r1``.
+         */
+        "SignalShows-File": {
+            /** Light */
+            light: string;
+            /** Movement */
+            movement: string;
+            /**
+             * Shows
+             * @enum {string}
+             */
+            shows: "red" | "yellow" | "green";
+        };
+        /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
@@ -6066,6 +6849,37 @@ export interface components {
             pedestrians?: "striping" | "nonInteracting";
         };
         /**
+         * SpeedChange
+         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
+         *
+         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         */
+        "SpeedChange-File": {
+            /** To */
+            to: number;
+            /**
+             * Shape
+             * @default linear
+             * @enum {string}
+             */
+            shape?: "step" | "linear" | "cosine";
+            /**
+             * Rate
+             * @default null
+             */
+            rate?: number | null;
+            /**
+             * Over
+             * @default null
+             */
+            over?: number | null;
+            /**
+             * Within
+             * @default null
+             */
+            within?: number | null;
+        };
+        /**
          * SpeedLimit
          * @description Another speed limit, m/s; of several at a place the lowest holds.
          */
@@ -6091,6 +6905,70 @@ export interface components {
             places: string[];
             /** Speed */
             speed: number;
+        };
+        /**
+         * Standing
+         * @description An actor has been stopped for so many seconds.
+         */
+        "Standing-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * Seconds
+             * @default 0
+             */
+            seconds?: number;
+        };
+        /**
+         * Stopping
+         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
+         */
+        "Stopping-File": {
+            /**
+             * Within
+             * @default null
+             */
+            within?: number | null;
+        };
+        /**
+         * StoryRule
+         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
+         *
+         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
+         *     does is over.
+         */
+        "StoryRule-File": {
+            /** Id */
+            id: string;
+            /** Actor */
+            actor: string;
+            when: components["schemas"]["Condition-File"];
+            /** Then */
+            then: components["schemas"]["Action-File"][];
+            /**
+             * Times
+             * @default 1
+             */
+            times?: number;
+        };
+        /**
+         * Touching
+         * @description The body of an actor touches that of another one, or of any that a rule names.
+         */
+        "Touching-File": {
+            /**
+             * Of
+             * @default null
+             */
+            of?: string | null;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | null;
         };
         /**
          * Transit
@@ -6206,6 +7084,11 @@ export interface components {
             high: number;
         };
         /**
+         * Vanishing
+         * @description Leave the simulation.
+         */
+        "Vanishing-File": Record<string, never>;
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -6277,6 +7160,30 @@ export interface components {
                 string,
                 number
             ][];
+        };
+        /**
+         * Walking
+         * @description Walk straight to a place, through others if given, wherever that leads.
+         */
+        "Walking-File": {
+            /** To */
+            to: string | [
+                number,
+                number
+            ];
+            /**
+             * Through
+             * @default []
+             */
+            through?: (string | [
+                number,
+                number
+            ])[];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
         };
         /**
          * Zone
@@ -6392,6 +7299,11 @@ export interface components {
              *     }
              */
             simulation?: components["schemas"]["Simulation-File"];
+            /**
+             * Rules
+             * @default []
+             */
+            rules?: components["schemas"]["StoryRule-File"][];
         };
     };
     responses: never;

@@ -93,6 +93,7 @@ export const MARK_COLOR: Record<MarkKind, string> = {
   collision: "#c92a2a",
   braking: "#b8500b",
   teleported: "#5f3dc4",
+  rule: "#1864ab",
   met: "#0b7285",
   unmet: "#d9480f",
 };

@@ -180,6 +180,11 @@ const SIGN: Record<MarkKind, (context: CanvasRenderingContext2D) => void> = {
     line(context, -3.5, -1, 0, -5);
     line(context, 3.5, -1, 0, -5);
   },
+  rule: (context) => {
+    line(context, -3, -4, 4, 0);
+    line(context, 4, 0, -3, 4);
+    line(context, -3, 4, -3, -4);
+  },
   met: (context) => {
     line(context, -4, 0.5, -1, 3.5);
     line(context, -1, 3.5, 4, -3.5);

@@ -82,4 +82,4 @@ export interface Mark {
   fresh: boolean;
 }
 
-export type MarkKind = "collision" | "braking" | "teleported" | "met" | "unmet";
+export type MarkKind = "collision" | "braking" | "teleported" | "rule" | "met" | "unmet";

@@ -13,12 +13,17 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   emergency_stop: "braking",
   teleport_start: "teleported",
   teleport_end: "teleported",
+  rule_started: "rule",
+  rule_ended: "rule",
+  rule_failed: "rule",
+  rule_overridden: "rule",
 };
 
 export const MARK_WORD: Record<MarkKind, string> = {
   collision: "Collision",
   braking: "Emergency braking",
   teleported: "Teleported",
+  rule: "Rule",
   met: "Count met",
   unmet: "Count not met",
 };
@@ -45,9 +50,24 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return `Measure ${incident.actor} began`;
     case "measure_end":
       return `Measure ${incident.actor} ended`;
+    case "rule_started":
+      return `${who} began rule ${incident.rule}${values(incident)}`;
+    case "rule_ended":
+      return `${who} has done rule ${incident.rule}`;
+    case "rule_failed":
+      return `${who} could not do rule ${incident.rule ?? ""}: ${incident.detail ?? ""}`;
+    case "rule_overridden":
+      return `${who} stopped rule ${incident.rule}: ${incident.detail ?? ""}`;
     default:
       return `${who}: ${incident.kind.replaceAll("_", " ")}`;
   }
+}
+
+function values(incident: Incident): string {
+  const known = Object.entries(incident.values ?? {});
+  return known.length === 0
+    ? ""
+    : ` (${known.map(([name, value]) => `${name} ${value.toFixed(2)}`).join(", ")})`;
 }
 
 function named(id: string, categories: ReadonlyMap<string, Category>): string {

@@ -14,6 +14,8 @@ import markupsafe
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from odscen.base.arrays import FloatArray, IntArray
 
 _VOID = frozenset({"meta", "input", "br"})
@@ -120,3 +122,9 @@ def path_data(xy: FloatArray, start: IntArray, *, closed: bool = False, unit: fl
                 f"M{words[begin]} {words[begin + 1]}l{' '.join(words[begin + 2 : stop])}{end}"
             )
     return "".join(parts).replace(" -", "-")
+
+
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Table of a document in Markdown; cells are written as they are."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)

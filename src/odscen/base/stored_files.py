@@ -131,8 +131,10 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
 
 
 def _types(hint: Any) -> tuple[type, ...]:
-    """Types of a hint: those of a union, the tuple itself of one with rows."""
-    return (tuple,) if get_origin(hint) is tuple else get_args(hint) or (hint,)
+    """Types of a hint: those of a union; of a tuple or an object that itself, not what is in it."""
+    if get_origin(hint) in (tuple, dict):
+        return (get_origin(hint),)
+    return tuple(get_origin(one) or one for one in get_args(hint)) or (hint,)
 
 
 def _accepted(types: tuple[type, ...]) -> frozenset[type]:

@@ -19,6 +19,7 @@ _LONGEST = 80
 _SINGULAR = {
     "actors": "actor",
     "flows": "flow",
+    "rules": "rule",
     "zones": "zone",
     "profiles": "profile",
     "inputs": "vehicle input",

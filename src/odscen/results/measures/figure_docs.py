@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.base.markup import markdown_table
 from odscen.results.measures.figure import Better, Figure
 from odscen.results.measures.registry import RUN_FIGURES
 from odscen.results.measures.table_columns import COLUMNS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
 _BETTER = {Better.LOWER: "lower", Better.HIGHER: "higher", Better.NEITHER: ""}
 
@@ -17,13 +18,13 @@ _BETTER = {Better.LOWER: "lower", Better.HIGHER: "higher", Better.NEITHER: ""}
 def run_figure_table() -> str:
     """Figures of a run: names, units, what they are, who says so and what a suite allows."""
     heads = ("name", "unit", "what it is", "source", "better", "tolerance")
-    return _markdown(heads, (_row(figure) for figure in RUN_FIGURES))
+    return markdown_table(heads, (_row(figure) for figure in RUN_FIGURES))
 
 
 def column_table() -> str:
     """Columns of the tables by place and time."""
     heads = ("column", "unit", "meaning")
-    return _markdown(
+    return markdown_table(
         heads, ((f"`{column.name}`", column.unit, column.definition) for column in COLUMNS)
     )
 
@@ -50,8 +51,3 @@ def _row(figure: Figure) -> Sequence[str]:
     what = f"**{figure.label}**: {figure.definition}"
     better = _BETTER[figure.better]
     return (f"`{figure.name}`", figure.unit, what, figure.source, better, tolerance)
-
-
-def _markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)

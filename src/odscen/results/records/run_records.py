@@ -197,6 +197,7 @@ class EventKind(StrEnum):
     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
     and end; their id stands for that of an actor.
+    What a rule does is reported of its actor, at the instant, which may lie inside a step.
     """
 
     DEPARTED = "departed"
@@ -211,6 +212,10 @@ class EventKind(StrEnum):
     STRANDED = "stranded"
     MEASURE_BEGIN = "measure_begin"
     MEASURE_END = "measure_end"
+    RULE_STARTED = "rule_started"
+    RULE_ENDED = "rule_ended"
+    RULE_FAILED = "rule_failed"
+    RULE_OVERRIDDEN = "rule_overridden"
 
 
 class Event(NamedTuple):
@@ -219,7 +224,8 @@ class Event(NamedTuple):
     Attributes
     ----------
     x, y
-        Body centre (departures), front (everything else), OpenDRIVE frame; ``None`` if unknown.
+        Body centre (departures, rules), middle of where bodies overlap (collisions found by
+        odscen), front (everything else), OpenDRIVE frame; ``None`` if unknown.
     lane
         SUMO lane, where SUMO names one.
     partner
@@ -229,12 +235,18 @@ class Event(NamedTuple):
     travel_time
         Arrivals: seconds since departure.
     detail
-        SUMO's word for the kind of collision; why a vehicle was gridlocked (teleports, jams); what
-        a measure does.
+        SUMO's word for the kind of collision, or ``bodies`` where odscen has found it; why a
+        vehicle was gridlocked (teleports, jams); what a measure does; why a rule could not do what
+        it says.
     waited
         Seconds that the first vehicle in a jam, or a teleported one, was stopped there.
     queue
         How many vehicles are stopped in a jam.
+    rule
+        The rule that has started, ended, failed, or given way to another.
+    values
+        Rules: what the conditions were about, by their place in ``when``. Collisions found by
+        odscen: ``impact_speed``, m/s.
     """
 
     time: float
@@ -249,6 +261,8 @@ class Event(NamedTuple):
     detail: str | None = None
     waited: float | None = None
     queue: int | None = None
+    rule: str | None = None
+    values: dict[str, float] | None = None
 
 
 def event_row(event: Event) -> dict[str, Any]:
@@ -343,7 +357,12 @@ def row_text(row: Mapping[str, Any]) -> str:
 def rounded(row: Mapping[str, Any]) -> dict[str, Any]:
     """Round the floats of a row to 1e-6."""
     return {
-        name: round(value, 6) if isinstance(value, float) else value for name, value in row.items()
+        name: rounded(value)
+        if isinstance(value, dict)
+        else round(value, 6)
+        if isinstance(value, float)
+        else value
+        for name, value in row.items()
     }
 
 

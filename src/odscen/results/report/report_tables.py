@@ -47,6 +47,16 @@ EVENT_WORDS = {
     ),
     EventKind.MEASURE_BEGIN: ("began", ""),
     EventKind.MEASURE_END: ("ended", ""),
+    EventKind.RULE_STARTED: ("began to do what a rule says", ""),
+    EventKind.RULE_ENDED: ("has done what a rule says", ""),
+    EventKind.RULE_FAILED: (
+        "could not do what a rule says",
+        "The scenario, or what traffic did before, does not allow it.",
+    ),
+    EventKind.RULE_OVERRIDDEN: (
+        "stopped doing what a rule says",
+        "Another rule acts on the same actor instead.",
+    ),
 }
 """What happened and why that may be, for the events that are reported."""
 
@@ -91,6 +101,10 @@ def event_list(
         "teleports, collisions and actors that were not inserted are listed here, because each is "
         "a place where the scenario, the map or the traffic is worth a second look."
     )
+    if any(event.rule for event in events):
+        explained += (
+            " So is what rules did, each with its instant and what its conditions were about."
+        )
     if not listed and not before:
         nothing = element("p", "Nothing unusual happened.", class_="good")
         return report_section("Events", nothing, explained=explained, ident="events")
@@ -105,19 +119,26 @@ def event_list(
 
 def _event(event: Event) -> Markup:
     words, reason = EVENT_WORDS[event.kind]
+    if event.rule:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in (event.values or {}).items())
+        words += f": {event.rule}" + (f" ({values})" if values else "")
     if event.partner:
         words += f" with {event.partner}"
     if event.x is not None and event.y is not None:
         words += f" at x {number(event.x, 1)} m, y {number(event.y, 1)} m"
+    if event.kind is EventKind.COLLISION and event.values:
+        words += f", {number(event.values.get('impact_speed', 0.0), 1)} m/s faster"
     if event.detail:
-        words += f" ({reason_label(stop_reason(event.detail))})"
-    return _item(event.time, event.actor, words, reason)
+        of_rule = event.kind is EventKind.RULE_FAILED or event.rule
+        said = event.detail if of_rule else reason_label(stop_reason(event.detail))
+        words += f" ({said})"
+    return _item(event.time, event.actor, words, reason, digits=2 if event.rule else 1)
 
 
-def _item(time: float, actor: str, words: str, reason: str) -> Markup:
+def _item(time: float, actor: str, words: str, reason: str, *, digits: int = 1) -> Markup:
     return element(
         "li",
-        element("time", f"{number(time, 1)} s"),
+        element("time", f"{number(time, digits)} s"),
         element("b", actor),
         f" {words}. ",
         element("small", reason) if reason else None,

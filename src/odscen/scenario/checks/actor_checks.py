@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -104,17 +105,35 @@ def actor_problems(
             f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
             f"{scenario.simulation.duration:g} s; depart earlier or run longer",
         )
-    if actor.crosses_anywhere:  # R45; no run acts on it so far
+    if actor.crosses_anywhere:  # R45; no run acts on it by itself
         yield warning(
             "not_acted_on",
             f"{subject.where}.crosses_anywhere",
-            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks",
+            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks; a rule with "
+            "'walk' lets it cross where you like",
         )
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:
+        yield from _initial_speed_problems(subject, actor, spawn)
         yield from goal_problems(subject, spawn)
         yield from _body_problems(subject, actor, spawn, body_of(actor, assets))
+
+
+def _initial_speed_problems(subject: Subject, actor: Actor, spawn: NodePlace) -> Iterator[Problem]:
+    """Yield what is odd about the speed at departure, which SUMO bounds."""
+    if actor.initial_speed is None or spawn.walk:
+        return
+    limit = float(subject.region.graph.lanes.speed_limit[spawn.node])
+    # Who wants to be faster than the limit may be.
+    allowed = actor.speed or (limit if math.isfinite(limit) else math.inf)
+    if actor.initial_speed > allowed + 1e-9:
+        yield warning(
+            "initial_speed_too_high",
+            f"{subject.where}.initial_speed",
+            f"{subject.name} is to depart with {actor.initial_speed:g} m/s, but its lane and its "
+            f"desired speed allow {allowed:g} m/s: it departs with that",
+        )
 
 
 def flow_problems(scenario: Scenario, region: Region, index: int) -> Iterator[Problem]:

@@ -13,6 +13,7 @@ from odscen.scenario.checks.actor_checks import (
 )
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.measure_checks import measure_problems
+from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.checks.start_overlaps import start_overlaps
 from odscen.scenario.checks.transit_checks import transit_problems
@@ -71,6 +72,7 @@ def check(
         clock, until = scenario.demand.clock, scenario.simulation.duration
         found += signal_problems(scenario.signals, lights, clock=clock, until=until)
     found += measure_problems(scenario, region, lights)
+    found += rule_problems(scenario, region, lights)
     found += shared_nodes(scenario)
     found += start_overlaps(scenario, region, assets)
     return tuple(found)

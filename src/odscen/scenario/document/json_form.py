@@ -12,7 +12,7 @@ from odscen.base.errors import ScenarioError
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
 from odscen.scenario.document.validation import validation_problems
 
-OPTIONAL = ("drivers", "demand", "transit", "signals", "measures")
+OPTIONAL = ("drivers", "demand", "transit", "signals", "measures", "rules")
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
 """Fields of the simulation that are written always."""
@@ -47,11 +47,11 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
 def dumps(scenario: Scenario) -> str:
     """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
 
-    Fields of actors, flows, drivers and demand that have their default value are left out, and so
-    are signals that are all the map's, and measures if there are none. The same scenario gives the
-    same text, and :func:`loads` gives the same scenario back.
+    Fields of actors, flows, rules, drivers and demand that have their default value are left out,
+    and so are signals that are all the map's, and measures if there are none. The same scenario
+    gives the same text, and :func:`loads` gives the same scenario back.
     """
-    data = scenario.model_dump(mode="json", exclude={"actors", "flows", "demand", "measures"})
+    data = scenario.model_dump(mode="json", exclude={"actors", "flows", *OPTIONAL})
     for key in type(scenario).model_fields:
         if key in ("actors", "flows", *OPTIONAL):
             data[key] = without_defaults(scenario, key)

@@ -15,7 +15,7 @@ from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document.distributions import Constant, Distribution, Normal, Uniform
 from odscen.scenario.document.document_parts import Label, Part
-from odscen.scenario.document.drivers_document import DrivingStyle  # noqa: TC001 (pydantic)
+from odscen.scenario.document.drivers_document import DrivingStyle
 from odscen.scenario.document.validation import validated, validation_problems
 
 Share = Annotated[float, Field(ge=0)]

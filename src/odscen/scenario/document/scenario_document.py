@@ -15,7 +15,8 @@ from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 from odscen.base.categories import Category
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
-from odscen.scenario.document.measures_document import Measure  # noqa: TC001 - read by pydantic
+from odscen.scenario.document.measures_document import Measure
+from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.transit_document import Transit
 
@@ -26,6 +27,9 @@ FORMAT: Final = "odscen-scenario"
 VERSION: Final = 1
 
 _PROSE = r"^[^\x00-\x08\x0b-\x1f\x7f\ufffe\uffff]*$"
+
+STEP_WITH_RULES: Final = 0.1
+"""Seconds of a step of a scenario with rules that does not say how long steps are."""
 
 Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
@@ -66,7 +70,8 @@ class Actor(Part):
     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-    driver set of the scenario.
+    driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+    ``None`` is from rest.
     """
 
     id: Identifier
@@ -77,6 +82,7 @@ class Actor(Part):
     speed: Speed | None = None
     lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
     depart: Seconds = 0.0
+    initial_speed: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] | None = None
     style: Identifier = "normal"
     ego: bool = False
     crosses_anywhere: bool = False
@@ -287,6 +293,8 @@ class Scenario(Part):
         Closures, roadworks, incidents, limits, permissions and signal outages, each with its times.
     simulation
         Duration and step length, s.
+    rules
+        What actors do, and when.
     """
 
     model_config = ConfigDict(json_schema_extra=_first_paragraph)
@@ -307,3 +315,12 @@ class Scenario(Part):
     signals: Signals = Signals()
     measures: tuple[Measure, ...] = ()
     simulation: Simulation = Simulation()
+    rules: tuple[StoryRule, ...] = ()
+
+    @model_validator(mode="after")
+    def _fine_steps(self) -> Self:
+        """With rules, steps are short unless the document says how long."""
+        if self.rules and "step_length" not in self.simulation.model_fields_set:
+            fine = self.simulation.model_copy(update={"step_length": STEP_WITH_RULES})
+            self.__dict__["simulation"] = fine  # frozen, but not yet handed out
+        return self

@@ -53,6 +53,7 @@ GOAL = "goal"
 
 _JSON = (
     "roi", "environment", "drivers", "demand", "transit", "signals", "measures", "simulation",
+    "rules",
 )  # fmt: skip
 """Graph attributes that hold JSON."""
 

@@ -62,6 +62,9 @@ class Checkpoint:
         What it remembers, see :meth:`odscen.sumo.worker.recorder.Recorder.state`.
     files
         SHA-256 by name.
+    story
+        What rules remember, see :meth:`odscen.sumo.worker.story_run.StoryRun.state`; nothing if
+        there are none.
     """
 
     number: int
@@ -77,6 +80,7 @@ class Checkpoint:
     recorder: dict[str, Any]
     files: dict[str, str]
     lanes: dict[str, int] = field(default_factory=dict)
+    story: dict[str, Any] = field(default_factory=dict)
 
 
 def slice_folder(run: Path, number: int) -> Path:

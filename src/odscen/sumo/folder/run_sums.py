@@ -37,6 +37,7 @@ _START = (
             layout.NET_FILE,
             layout.ROUTES_FILE,
             layout.SIGNALS_FILE,
+            layout.STORY_FILE,
             layout.REGION_FILE,
             layout.MEASURES_FILE,
             layout.CONFIG_FILE,

@@ -32,6 +32,7 @@ from odscen.sumo.folder.layout import (
     ROUTES_FILE,
     SIGNALS_FILE,
     STOPS_FILE,
+    STORY_FILE,
 )
 from odscen.sumo.realize.departures import demand_users, road_users
 from odscen.sumo.realize.driving import KINDS, driver, factor_of, kind_of
@@ -43,6 +44,7 @@ from odscen.sumo.realize.recording import region_xml
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
+from odscen.sumo.realize.rules.story_files import story_plan
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.realize.sumocfg import SSM_PARAMETER, SumocfgSettings, sumo_config
 from odscen.sumo.realize.traffic_measures.breakdowns import breakdowns
@@ -178,6 +180,10 @@ def realize(
             closures=actions.xml,
         ),
     }
+    if scenario.rules and settings.meso:
+        writer.notes.append("meso: the rules of the scenario are left out")
+    elif scenario.rules:
+        files[STORY_FILE] = story_plan(scenario, sumo_map).to_json()
     return Realization(
         files,
         plan,
@@ -311,6 +317,7 @@ class _Writer:
         self._stops = stops
         self._bays = {name for name, stop in stops.items() if stop.bay}
         self._effect = effect
+        self._net, self._lane_places = sumo_map.net, sumo_map.lane_places
         self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
         self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
@@ -368,9 +375,23 @@ class _Writer:
             if isinstance(planned.route, Walk):
                 self.demand.add_walk(user, behaviour, planned.route)
             else:
-                self.demand.add_vehicle(user, behaviour, planned.route, bays=self._bays)
+                self.demand.add_vehicle(
+                    user,
+                    behaviour,
+                    planned.route,
+                    bays=self._bays,
+                    speed=self._initial_speed(user, behaviour),
+                )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
         return self._planned(user, body, behaviour, planned)
+
+    def _initial_speed(self, user: RoadUser, behaviour: Driver) -> float:
+        """Speed at departure, m/s: SUMO ends a run in which one is above what the lane allows."""
+        wanted, place = user.design.initial_speed, self._lane_places.of(user.spawn)
+        if not wanted or place is None:
+            return 0.0
+        allowed = self._net.lanes[place[0]].speed * behaviour.speed_factor
+        return min(wanted, allowed, behaviour.max_speed)
 
     def _driver(self, user: RoadUser, body: Body) -> Driver:
         limit = None if user.person else float(self._graph.lanes.speed_limit[user.spawn])

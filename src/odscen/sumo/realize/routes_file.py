@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
@@ -40,7 +41,13 @@ class RoutesFile:
         self._breakdowns: list[str] = []
 
     def add_vehicle(
-        self, user: RoadUser, driver: Driver, route: Route, *, bays: Collection[str] = ()
+        self,
+        user: RoadUser,
+        driver: Driver,
+        route: Route,
+        *,
+        bays: Collection[str] = (),
+        speed: float = 0.0,
     ) -> None:
         """Add a vehicle that drives ``route``.
 
@@ -48,6 +55,8 @@ class RoutesFile:
         ----------
         bays
             Stops at which vehicles stand beside the lane.
+        speed
+            At departure, m/s, of one that does not enter from outside.
         """
         attributes = [
             ("id", user.id),
@@ -57,7 +66,7 @@ class RoutesFile:
             ("departPos", number(route.depart_pos, digits=4)),
             # That of the vehicles ahead: a free lane then takes what HCM gives it. With "max" a
             # lane of a motorway takes a tenth less at steps of 1 s.
-            ("departSpeed", "avg" if user.entering else "0"),
+            ("departSpeed", "avg" if user.entering else number(_bounded(speed), digits=4)),
             ("departPosLat", number(route.depart_pos_lat, digits=4)),
             ("arrivalLane", "current" if route.arrival_lane is None else str(route.arrival_lane)),
             ("arrivalPos", number(route.arrival_pos, digits=4)),
@@ -140,6 +149,11 @@ def _stop(visit: StopVisit, *, bay: bool) -> str:
     if bay:
         attributes.append(("parking", "true"))
     return f"        <stop{_xml(attributes)}/>"
+
+
+def _bounded(speed: float) -> float:
+    """Round down: SUMO ends a run in which a vehicle departs faster than its lane allows."""
+    return math.floor(speed * 1e4) / 1e4
 
 
 def _xml(attributes: Iterable[tuple[str, str]]) -> str:

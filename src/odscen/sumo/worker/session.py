@@ -20,6 +20,7 @@ import numpy as np
 
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.detours import LaneLink
+from odscen.sumo.worker.moved_actors import MovedActors
 from odscen.sumo.worker.observed import (
     Ahead,
     Front,
@@ -216,6 +217,10 @@ class Session:
         """Lane of each person (empty: none) and metres along it."""
         lane, pos = self._sumo.person.getLaneID, self._sumo.person.getLanePosition
         return [(lane(name), pos(name)) for name in ids]
+
+    def moved_actors(self) -> MovedActors:
+        """Hand of rules on single road users."""
+        return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits)
 
     def place(self, vehicle: str, at: EgoPose) -> bool:
         """Put a vehicle where another program has driven it; false if SUMO cannot.

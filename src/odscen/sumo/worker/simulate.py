@@ -32,6 +32,7 @@ from odscen.sumo.folder.layout import (
     CONFIG_FILE,
     LIGHTS_FILE,
     LOG_FILE,
+    STORY_FILE,
     SUMO_FOLDER,
     TRAJECTORIES_FILE,
     TRIPS_FILE,
@@ -60,6 +61,8 @@ from odscen.sumo.worker.watch import Watch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from odscen.sumo.worker.story_run import StoryRun
 
 
 def main() -> int:
@@ -112,7 +115,7 @@ def simulate(
     SimulationError
         If SUMO refuses to start or stops with an error.
     """
-    stepper = Stepper(plan, send, watch)
+    stepper = Stepper(plan, send, watch, _story(plan, folder))
     if plan.slice_length is not None:
         return run_slice(plan, folder, stepper)
     done = _in_one_piece(plan, folder, stepper)
@@ -121,6 +124,15 @@ def simulate(
     outcomes.hear(events, trips_in(folder / TRIPS_FILE))
     write_results(folder, map(event_line, events), outcomes.rows())
     return done
+
+
+def _story(plan: Plan, folder: Path) -> StoryRun | None:
+    """Rules of the run; without any, nothing of theirs is imported."""
+    if not (folder / SUMO_FOLDER / STORY_FILE).is_file():
+        return None
+    from odscen.sumo.worker.story_run import StoryRun
+
+    return StoryRun.in_folder(folder, plan)
 
 
 def _begin_anew(watch: Watch | LockstepWatch | None) -> None:

@@ -64,6 +64,8 @@ def run_slice(plan: Plan, run: Path, stepper: Stepper) -> Done | None:
     if done is not None:
         stepper.recorder.restore(done.recorder)
         stepper.steps = done.steps
+        if stepper.story is not None:
+            stepper.story.restore(done.story)
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
     with Completion(run) as completion:
         if done is None or not done.last:
@@ -126,6 +128,7 @@ class _RunningSlice:
             recorder=stepper.recorder.state(),
             lanes=lanes,
             files={},
+            story={} if stepper.story is None else stepper.story.state(),
         )
         return Written(part, checkpoint, events, lengths, before.lanes if before else {})
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from odscen.sumo.worker.lockstep import LockstepWatch
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
+    from odscen.sumo.worker.story_run import StoryRun
     from odscen.sumo.worker.watch import Watch
 
 MESSAGE_PAUSE = 0.25
@@ -41,11 +42,18 @@ class Stepper:
         What has happened.
     steps
         Made so far.
+    story
+        The rules of the run, if it has any.
     """
 
     def __init__(
-        self, plan: Plan, send: Callable[[Message], None], watch: Watch | LockstepWatch | None
+        self,
+        plan: Plan,
+        send: Callable[[Message], None],
+        watch: Watch | LockstepWatch | None,
+        story: StoryRun | None = None,
     ) -> None:
+        self.story = story
         self.recorder = Recorder(plan)
         self.steps = 0
         self._plan = plan
@@ -69,8 +77,9 @@ class Stepper:
         more
             Whether road users are to come that this simulation does not know of.
         """
-        watch, record, clock = self._watch, self.recorder.record, time.monotonic
-        now = session.time
+        watch, clock, now = self._watch, time.monotonic, session.time
+        if self.story is not None:
+            self.story.begin(session)
         if self._start is None:
             self._start = now, self.recorder.departed
         begin, waited = clock(), 0.0
@@ -80,26 +89,36 @@ class Stepper:
                 if not watch.next_step(session, self.recorder):
                     break
                 waited += clock() - asked
-            if self._diversions is not None:
-                step = self._plan.step_length
-                self.recorder.add(self._diversions.before_step(session, now, step))
-            after = session.step()
-            record(session, now)
-            now = after
-            self.steps += 1
+            now = self._step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
                 self._report(session, now, self._busy + self._sent - begin - waited)
         self._busy += clock() - begin - waited
-        if not more and session.expected() == 0:
+        self._finish(session, now, more=more)
+        return now
+
+    def _step(self, session: Session, now: float) -> float:
+        """Make a step, with what measures and rules do before and after it; seconds then."""
+        recorder = self.recorder
+        if self._diversions is not None:
+            recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
+        after = session.step()
+        recorder.record(session, now)
+        if self.story is not None:
+            self.story.after_step(now, recorder)
+        self.steps += 1
+        return after
+
+    def _finish(self, session: Session, now: float, *, more: bool) -> None:
+        """Say how it ends, if it does, and show it to who watches."""
+        empty = not more and session.expected() == 0
+        if empty:
             self.recorder.road_is_empty(now)
-        over = now >= self._plan.until or (not more and session.expected() == 0)
-        if self._diversions is not None and over:
+        if self._diversions is not None and (empty or now >= self._plan.until):
             self.recorder.add(self._diversions.last_events(now))
-        if self._watch is not None:  # a user who watches sees how it ends
+        if self._watch is not None:
             self._watch.show_last(session, self.recorder)
             self._report(session, now, self._busy)
-        return now
 
     def _report(self, session: Session, now: float, busy: float) -> None:
         recorder, plan = self.recorder, self._plan

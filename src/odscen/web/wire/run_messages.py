@@ -220,6 +220,8 @@ class IncidentInfo(Answer):
     detail: _IfKnown[str] = None
     waited: _IfKnown[float] = None
     queue: _IfKnown[int] = None
+    rule: _IfKnown[str] = None
+    values: _IfKnown[dict[str, float]] = None
 
 
 class RunEvents(Answer):

@@ -1,0 +1,84 @@
+"""Two that are to be at their places at one instant."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from odscen.scenario.story.acting_actor import CannotAct
+from odscen.scenario.story.side_motion import line_length
+from odscen.scenario.story.speed_laws import steady
+
+if TYPE_CHECKING:
+    from odscen.scenario.document.actions_document import Arriving
+    from odscen.scenario.document.conditions_document import RulePlace
+    from odscen.scenario.story.acting_actor import ActingActor
+    from odscen.scenario.story.road_view import ActorView, RoadView
+
+FASTEST_VEHICLE, FASTEST_WALKER = 70.0, 10.0
+"""m/s; who would have to be faster cannot arrive in time."""
+_STEADY = 0.05
+"""m/s^2 of acceleration below which a speed counts as steady."""
+
+
+def arrive(part: Arriving, one: ActingActor) -> float:
+    """Begin: a pedestrian goes straight to the place, whatever lies between."""
+    if one.actor.person:
+        line = (one.spot(), one.view.place(part.at))
+        one.channel.take_speed(steady(one.instant, 0.0), one.owner)
+        one.channel.take_line(line, 0.0, None, one.owner, one.instant)
+    return math.inf
+
+
+def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
+    """Choose the speed that brings both there at one instant; for good once the other is steady.
+
+    Raises
+    ------
+    CannotAct
+        If one of them does not come by its place, or would have to be too fast.
+    """
+    if end < math.inf:
+        return end
+    view, channel = one.view, one.channel
+    other = view.actor(part.to)
+    if other is None:
+        msg = f"{part.to!r} is not on the road"
+        raise CannotAct(msg)
+    theirs = _rest(other, part.when_at, view)
+    if theirs is None:
+        msg = f"{part.to!r} does not come by the place where it is to be met"
+        raise CannotAct(msg)
+    done = one.instant - view.time
+    mine = _own_rest(part, one)
+    if other.speed < 0.1:
+        channel.take_speed(steady(one.instant, 0.0), one.owner)
+        return math.inf
+    left = theirs / other.speed - done
+    needed = mine / left if left > 0.0 else math.inf
+    fastest = FASTEST_WALKER if one.actor.person else FASTEST_VEHICLE
+    if needed > fastest:
+        msg = f"it would have to go at {needed:.1f} m/s to be there in time"
+        raise CannotAct(msg)
+    channel.take_speed(steady(one.instant, needed), one.owner)
+    return one.instant + left if abs(other.acceleration) < _STEADY else math.inf
+
+
+def _own_rest(part: Arriving, one: ActingActor) -> float:
+    """Metres from where the actor is at the instant to where it is to be."""
+    if one.actor.person:
+        line = one.channel.line or ()
+        return (
+            line_length(line) - one.channel.along - one.channel.metres(one.view.time, one.instant)
+        )
+    rest = _rest(one.actor, part.at, one.view)
+    if rest is None:
+        msg = "its route does not lead to the place"
+        raise CannotAct(msg)
+    return rest - one.channel.metres(one.view.time, one.instant)
+
+
+def _rest(actor: ActorView, place: RulePlace, view: RoadView) -> float | None:
+    if actor.person:
+        return math.dist((actor.x, actor.y), view.place(place))
+    return view.lane_distance(actor.id, place)

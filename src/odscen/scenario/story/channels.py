@@ -1,0 +1,243 @@
+"""What rules have taken over of an actor: its speed, where it is beside its line, or both.
+
+What is not taken over is SUMO's. In a step several laws may follow one another; the metres of the
+step are the sum of theirs, so that motion begins and ends at the instant and not with the step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.scenario.story.side_motion import SideLaw, line_length, point_on
+from odscen.scenario.story.speed_laws import SpeedLaw, steady
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.scenario.story.road_view import ActorView, Point
+
+_HALVINGS = 60
+
+
+class Pose(NamedTuple):
+    """Where an actor is put: the front of a vehicle, the centre of a person; OpenDRIVE frame."""
+
+    x: float
+    y: float
+    hdg: float
+
+
+@dataclass(frozen=True, slots=True)
+class WantedMove:
+    """What is wanted of an actor in a step.
+
+    Attributes
+    ----------
+    speed
+        Mean speed over the step, m/s; ``None`` if SUMO chooses it.
+    exact
+        Whether that speed is taken whatever SUMO's driver would do; otherwise the driver may go
+        slower: for who is ahead, for red and right of way.
+    pose
+        Where the actor is at the end of the step; ``None`` if it follows its lane or walk.
+    ignore_red, ignore_right_of_way
+        What the driver does not heed.
+    keeps_lane
+        Whether it changes lanes only where its route needs it.
+    rejoins
+        Whether a person is back on foot: SUMO leads it on to its goal.
+    vanishes
+        Whether it leaves the simulation.
+    """
+
+    speed: float | None = None
+    exact: bool = False
+    pose: Pose | None = None
+    ignore_red: bool = False
+    ignore_right_of_way: bool = False
+    keeps_lane: bool = False
+    rejoins: bool = False
+    vanishes: bool = False
+
+
+@dataclass(slots=True)
+class Channel:
+    """What is taken over of one actor.
+
+    Attributes
+    ----------
+    law, exact
+        How its speed goes, and whether exactly so; ``None`` is SUMO's.
+    borrowed
+        Whether the law is there only because the actor is moved along a line.
+    line, along, side
+        Where it is moved along: how far it has come, metres, and the offset.
+    held
+        Whether a person stays at the end of its line.
+    leaves
+        Whether the line is over with this step; SUMO leads a person on from there.
+    settles
+        Whether the law has ended in this step, so that its last speed is reached in the next.
+    speed_owner, line_owner
+        Who has taken over speed and place: rule and number of the action.
+    """
+
+    law: SpeedLaw | None = None
+    exact: bool = False
+    borrowed: bool = False
+    line: tuple[Point, ...] | None = None
+    along: float = 0.0
+    side: SideLaw | None = None
+    held: bool = False
+    leaves: bool = False
+    settles: bool = False
+    rejoins: bool = False
+    vanishes: bool = False
+    ignore_red: bool = False
+    ignore_right_of_way: bool = False
+    keeps_lane: bool = False
+    speed_owner: str | None = None
+    line_owner: str | None = None
+    _laws: list[tuple[float, SpeedLaw]] = field(default_factory=list)
+    _forced: bool = False
+
+    def begin_step(self, view: ActorView, time: float) -> None:
+        """Begin a step at ``time``: from here on laws follow one another."""
+        if self.leaves:
+            self.release_line()
+            if view.person:
+                self.law, self.exact, self.rejoins = None, False, True
+        self._forced = self.law is not None and (self.exact or self.settles)
+        self.settles = False
+        own = self.law if self.law is not None and self._forced else steady(time, view.speed)
+        self._laws = [(time, own)]
+
+    def speed(self, instant: float) -> float:
+        """Speed at an instant of this step."""
+        return self._laws[-1][1].speed(instant)
+
+    def metres(self, begin: float, end: float) -> float:
+        """Metres between two instants of this step, or from the last law on beyond it."""
+        total = 0.0
+        stops = [start for start, _ in self._laws[1:]] + [math.inf]
+        for (start, law), stop in zip(self._laws, stops, strict=True):
+            first, last = max(begin, start), min(end, stop)
+            if last > first:
+                total += law.metres(first, last)
+        return total
+
+    def take_speed(self, law: SpeedLaw, owner: str | None, *, exact: bool = True) -> None:
+        """Take over the speed from the beginning of a law on."""
+        if law.begin <= self._laws[-1][0]:
+            self._laws.pop()
+        self._laws.append((law.begin, law))
+        self.law, self.exact, self.speed_owner, self.borrowed = law, exact, owner, False
+        self._forced = self._forced or exact
+
+    def keep_speed(self) -> None:
+        """Let the driver keep the last speed of the law, as far as traffic allows."""
+        self.speed_owner = None
+        self.exact = self.line is not None
+        self.settles = True
+
+    def release_speed(self, instant: float) -> None:
+        """Give the speed back to SUMO; in what is left of the step it stays."""
+        law = steady(instant, self.speed(instant))
+        self.take_speed(law, None, exact=False)
+        self.law = None
+        if self.line is not None:
+            self.law, self.borrowed, self.exact = law, True, True
+
+    def take_line(
+        self,
+        line: tuple[Point, ...],
+        along: float,
+        side: SideLaw | None,
+        owner: str,
+        instant: float,
+    ) -> None:
+        """Lead the actor along a line, on which it has come ``along`` metres at ``instant``."""
+        self.line, self.side, self.line_owner = line, side, owner
+        self.held = self.leaves = self.rejoins = False
+        # What is covered in this step before the instant is added at its end.
+        self.along = along - self.metres(self._laws[0][0], instant)
+        if self.law is None:
+            self.take_speed(steady(instant, self.speed(instant)), None)
+            self.borrowed = True
+        self.exact = self._forced = True
+
+    def release_line(self) -> None:
+        """Leave the line."""
+        self.line = self.side = self.line_owner = None
+        self.held = self.leaves = False
+        if self.borrowed:
+            self.law, self.borrowed = None, False
+        self.exact = self.law is not None and self.speed_owner is not None
+
+    def reaches_end(self, time: float, until: float) -> float | None:
+        """Instant in this step at which the end of the line is reached, if it is."""
+        if self.line is None:
+            return None
+        rest = line_length(self.line) - self.along
+        if self.metres(time, until) < rest - 1e-9:
+            return None
+        early, late = time, until
+        for _ in range(_HALVINGS):
+            middle = (early + late) / 2.0
+            if self.metres(time, middle) < rest:
+                early = middle
+            else:
+                late = middle
+        return late
+
+    def end_step(self, time: float, step: float, *, person: bool) -> WantedMove:
+        """What is wanted in the step that began at ``time``."""
+        metres = self.metres(time, time + step)
+        pose = None
+        if self.line is not None:
+            if self.held:
+                self.along = line_length(self.line)
+            else:
+                self.along += metres
+            pose = self._pose(time + step, person=person)
+        speed = metres / step if self._forced else None
+        if speed is None and self.law is not None:
+            speed = self.law.v1
+        move = WantedMove(
+            speed=speed,
+            exact=self._forced,
+            pose=pose,
+            ignore_red=self.ignore_red,
+            ignore_right_of_way=self.ignore_right_of_way,
+            keeps_lane=self.keeps_lane,
+            rejoins=self.rejoins,
+            vanishes=self.vanishes,
+        )
+        self.rejoins = False
+        return move
+
+    def _pose(self, instant: float, *, person: bool) -> Pose:
+        line = self.line or ()
+        left = self.side.offset(instant) if self.side else 0.0
+        along = min(self.along, line_length(line)) if person else self.along
+        found = point_on(line, along, left=left)
+        speed = self.speed(instant)
+        turned = math.atan2(self.side.sideways(instant), speed) if self.side and speed else 0.0
+        return Pose(found.x, found.y, found.hdg + turned)
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered, for JSON."""
+        data = asdict(self)
+        return {key: value for key, value in data.items() if not key.startswith("_")}
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Channel:
+        """Inverse of :meth:`state`."""
+        data = dict(state)
+        data["law"] = None if data["law"] is None else SpeedLaw(**data["law"])
+        data["side"] = None if data["side"] is None else SideLaw(**data["side"])
+        if data["line"] is not None:
+            data["line"] = tuple((float(x), float(y)) for x, y in data["line"])
+        return cls(**data)

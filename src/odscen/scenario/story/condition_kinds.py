@@ -1,0 +1,326 @@
+"""The registry of conditions: what each kind means, and the number that it is about.
+
+To add one: its part in :mod:`odscen.scenario.document.conditions_document`, its entry and function
+here, and a test.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.scenario.story.body_distance import body_distance, point_distance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from odscen.scenario.document.conditions_document import (
+        AfterTime,
+        Bounded,
+        DistanceBounded,
+        OneActor,
+        OwnBounded,
+        PairBounded,
+        Reaching,
+        SignalShows,
+        Standing,
+        Touching,
+    )
+    from odscen.scenario.story.road_view import ActorView, Point, RoadView
+
+NEVER = -1.0
+"""Margin of what is not so, for conditions that are true or not and nothing between."""
+COLOURS = {"red": "ru", "yellow": "yY", "green": "gG"}
+"""Letters of SUMO's states by colour."""
+
+
+class Reading(NamedTuple):
+    """What a condition is about, at one instant.
+
+    Attributes
+    ----------
+    value
+        The number that is held against the bound.
+    margin
+        By how much the condition is met; negative where it is not.
+    rate
+        Change of the margin per second; ``None`` if only two readings can tell.
+    """
+
+    value: float
+    margin: float
+    rate: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionKind:
+    """An entry of the registry: for the table in the documents, and for the run.
+
+    ``read`` gets the part of the document, the rule's actor and what is seen; ``None`` is what it
+    gives where an actor is not on the road.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    sumo: str
+    openscenario: str
+    carla: str
+    read: Callable[[Any, str, RoadView], Reading | None] | None
+
+
+def _bounded(part: Bounded, value: float, rate: float | None = None) -> Reading:
+    if part.below is not None:
+        return Reading(value, part.below - value, None if rate is None else -rate)
+    return Reading(value, value - (part.above or 0.0), rate)
+
+
+def _truth(is_so: bool) -> Reading:
+    return Reading(float(is_so), 1.0 if is_so else NEVER, 0.0)
+
+
+def _own(part: Any, actor: str, view: RoadView) -> ActorView | None:
+    return view.actor(part.of or actor)
+
+
+def _pair(part: Any, actor: str, view: RoadView) -> tuple[ActorView, ActorView] | None:
+    one, other = _own(part, actor, view), view.actor(part.to)
+    return None if one is None or other is None else (one, other)
+
+
+class _Lengthwise(NamedTuple):
+    """Along the heading of the first of two, or of the one that drives if the first walks.
+
+    ``ahead`` metres of the other one's centre, ``aside`` to the left; ``closing`` m/s of the gap;
+    ``gap`` between the bodies; ``behind`` is the one that is behind.
+    """
+
+    ahead: float
+    aside: float
+    closing: float
+    gap: float
+    behind: ActorView
+
+
+def _lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
+    guide = other if one.person and not other.person else one
+    c, s = math.cos(guide.hdg), math.sin(guide.hdg)
+    dx, dy = other.x - one.x, other.y - one.y
+    ahead, aside = dx * c + dy * s, dy * c - dx * s
+    (ax, ay), (bx, by) = one.velocity, other.velocity
+    faster = (ax - bx) * c + (ay - by) * s
+    front, rear = (other, one) if ahead >= 0.0 else (one, other)
+    half = sum(_reach(each, guide.hdg) for each in (one, other))
+    closing = faster if front is other else -faster
+    return _Lengthwise(ahead, aside, closing, abs(ahead) - half, rear)
+
+
+def _reach(body: ActorView, hdg: float) -> float:
+    """Metres from the centre of a body to its farthest point in a direction."""
+    turned = body.hdg - hdg
+    across = body.width * abs(math.sin(turned))
+    return (body.length * abs(math.cos(turned)) + across) / 2.0
+
+
+def _time(part: AfterTime, _: str, view: RoadView) -> Reading:
+    return Reading(view.time, view.time - part.after, 1.0)
+
+
+def _ttc(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+    if (both := _pair(part, actor, view)) is None:
+        return None
+    found = _lengthwise(*both)
+    gap = max(found.gap, 0.0)
+    return _bounded(part, gap / found.closing if found.closing > 1e-6 else math.inf)
+
+
+def _headway(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+    if (both := _pair(part, actor, view)) is None:
+        return None
+    found = _lengthwise(*both)
+    speed = found.behind.speed
+    return _bounded(part, max(found.gap, 0.0) / speed if speed > 1e-6 else math.inf)
+
+
+def _distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:
+    if (one := _own(part, actor, view)) is None:
+        return None
+    if part.to is None:
+        value = _to_place(part, one, view)
+    else:
+        other = view.actor(part.to)
+        value = None if other is None else _to_actor(part, one, other, view)
+    return None if value is None else _bounded(part, value)
+
+
+def _to_actor(
+    part: DistanceBounded, one: ActorView, other: ActorView, view: RoadView
+) -> float | None:
+    found = _lengthwise(one, other)
+    if part.along == "longitudinal":
+        return max(found.gap, 0.0) if part.free else abs(found.ahead)
+    if part.along == "lateral":
+        half = _reach(one, one.hdg + math.pi / 2) + _reach(other, one.hdg + math.pi / 2)
+        return max(abs(found.aside) - half, 0.0) if part.free else abs(found.aside)
+    if part.along == "lane":
+        metres = view.lane_distance(one.id, other.id)
+        half = (one.length + other.length) / 2.0
+        return metres if metres is None or not part.free else max(metres - half, 0.0)
+    return body_distance(one, other) if part.free else math.dist(_centre(one), _centre(other))
+
+
+def _to_place(part: DistanceBounded, one: ActorView, view: RoadView) -> float | None:
+    place = view.place(part.place or "")
+    dx, dy = place[0] - one.x, place[1] - one.y
+    c, s = math.cos(one.hdg), math.sin(one.hdg)
+    if part.along == "longitudinal":
+        ahead = abs(dx * c + dy * s)
+        return max(ahead - one.length / 2.0, 0.0) if part.free else ahead
+    if part.along == "lateral":
+        aside = abs(dy * c - dx * s)
+        return max(aside - one.width / 2.0, 0.0) if part.free else aside
+    if part.along == "lane":
+        metres = view.lane_distance(one.id, part.place or "")
+        return metres if metres is None or not part.free else max(metres - one.length / 2.0, 0.0)
+    return point_distance(one.corners, place) if part.free else math.hypot(dx, dy)
+
+
+def _centre(one: ActorView) -> Point:
+    return one.x, one.y
+
+
+def _relative_speed(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+    if (both := _pair(part, actor, view)) is None:
+        return None
+    one, other = both
+    bx, by = other.velocity
+    return _bounded(part, one.speed - bx * math.cos(one.hdg) - by * math.sin(one.hdg))
+
+
+def _speed(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    return None if one is None else _bounded(part, one.speed)
+
+
+def _acceleration(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    return None if one is None else _bounded(part, one.acceleration, 0.0)
+
+
+def _stands(part: Standing, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    if one is None:
+        return None
+    if one.standing is None:
+        return Reading(0.0, NEVER, 0.0)
+    stood = view.time - one.standing
+    return Reading(stood, stood - part.seconds, 1.0)
+
+
+def _reaches(part: Reaching, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    if one is None:
+        return None
+    away = math.dist(_centre(one), view.place(part.place))
+    return Reading(away, part.within - away)
+
+
+def _travelled(part: OwnBounded, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    return None if one is None else _bounded(part, one.travelled, one.speed)
+
+
+def _signal(part: SignalShows, _: str, view: RoadView) -> Reading | None:
+    shown = view.signal(part.light, part.movement)
+    return None if shown is None else _truth(shown in COLOURS[part.shows])
+
+
+def _appeared(part: OneActor, actor: str, view: RoadView) -> Reading:
+    return _truth(_own(part, actor, view) is not None)
+
+
+def _touched(part: Touching, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    if one is None:
+        return None
+    others = [view.actor(part.to)] if part.to is not None else view.named()
+    near = [other for other in others if other is not None and other.id != one.id]
+    return _truth(any(body_distance(one, other) == 0.0 for other in near))
+
+
+def _off_road(part: OneActor, actor: str, view: RoadView) -> Reading | None:
+    one = _own(part, actor, view)
+    return None if one is None else _truth(one.off_road)
+
+
+_MIRRORED = "mirrored"
+"""What CARLA does: it shows what SUMO does."""
+_EXTRAPOLATED = "read each step, extrapolated to the instant"
+
+CONDITIONS = {
+    one.name: one
+    for one in (
+        ConditionKind(
+            "time", "simulated time is `after` or more", "s", "exact", "SimulationTimeCondition",
+            _MIRRORED, _time,
+        ),
+        ConditionKind(
+            "ttc", "time to collision of two actors: gap between the bodies along the heading, "
+            "over the speed at which it closes", "s", _EXTRAPOLATED, "TimeToCollisionCondition",
+            _MIRRORED, _ttc,
+        ),
+        ConditionKind(
+            "headway", "time headway: gap between the bodies along the heading, over the speed of "
+            "the one behind", "s", _EXTRAPOLATED, "TimeHeadwayCondition", _MIRRORED, _headway,
+        ),
+        ConditionKind(
+            "distance", "metres to an actor (`to`) or a place (`place`): `straight`, "
+            "`longitudinal`, `lateral` or along the `lane`; `free` is between the bodies",
+            "m", _EXTRAPOLATED, "RelativeDistanceCondition, DistanceCondition", _MIRRORED,
+            _distance,
+        ),
+        ConditionKind(
+            "relative_speed", "own speed less that of `to` along the own heading", "m/s",
+            _EXTRAPOLATED, "RelativeSpeedCondition", _MIRRORED, _relative_speed,
+        ),
+        ConditionKind("speed", "speed", "m/s", _EXTRAPOLATED, "SpeedCondition", _MIRRORED, _speed),
+        ConditionKind(
+            "acceleration", "acceleration along the heading, negative when braking", "m/s²",
+            "on whole steps", "AccelerationCondition", _MIRRORED, _acceleration,
+        ),
+        ConditionKind(
+            "stopped", "slower than 0.1 m/s for `seconds`", "s", "from the step of stopping on",
+            "StandStillCondition", _MIRRORED, _stands,
+        ),
+        ConditionKind(
+            "reaches", "the centre of the body is `within` metres of a place", "m", _EXTRAPOLATED,
+            "ReachPositionCondition", _MIRRORED, _reaches,
+        ),
+        ConditionKind(
+            "travelled", "metres since departure", "m", _EXTRAPOLATED,
+            "TraveledDistanceCondition", _MIRRORED, _travelled,
+        ),
+        ConditionKind(
+            "signal", "a movement of a traffic light shows a colour", "", "on whole steps",
+            "TrafficSignalCondition", _MIRRORED, _signal,
+        ),
+        ConditionKind(
+            "rule", "another rule has started, or ended", "", "exact",
+            "StoryboardElementStateCondition", _MIRRORED, None,
+        ),
+        ConditionKind(
+            "appeared", "an actor is on the road", "", "on whole steps", "none", _MIRRORED,
+            _appeared,
+        ),
+        ConditionKind(
+            "touched", "the bodies of two actors overlap", "", "on whole steps; by odscen",
+            "CollisionCondition", _MIRRORED, _touched,
+        ),
+        ConditionKind(
+            "off_road", "the centre of the body is on no lane", "", "on whole steps",
+            "OffroadCondition", _MIRRORED, _off_road,
+        ),
+    )
+}  # fmt: skip
+"""All kinds by name; a rule has no function, for what it is about is not on the road."""

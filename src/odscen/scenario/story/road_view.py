@@ -1,0 +1,105 @@
+"""What rules see of a run at one instant: the actors that they name, and little else.
+
+Positions are centres of bodies in the OpenDRIVE frame; metres, radians, seconds, m/s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ActorView:
+    """An actor on the road.
+
+    Attributes
+    ----------
+    x, y, hdg
+        Centre of the body and where it looks.
+    speed, acceleration
+        Along ``hdg``.
+    travelled
+        Metres since it departed.
+    standing
+        Instant since which it has been standing; ``None`` while it moves.
+    off_road
+        Whether its centre is on no lane.
+    """
+
+    id: str
+    x: float
+    y: float
+    hdg: float
+    speed: float
+    acceleration: float
+    length: float
+    width: float
+    travelled: float
+    person: bool
+    standing: float | None = None
+    off_road: bool = False
+
+    @property
+    def velocity(self) -> Point:
+        """Along x and y."""
+        return self.speed * math.cos(self.hdg), self.speed * math.sin(self.hdg)
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """Corners of the body, counter-clockwise."""
+        along, across = self.length / 2.0, self.width / 2.0
+        c, s = math.cos(self.hdg), math.sin(self.hdg)
+        return tuple(
+            (self.x + a * c - b * s, self.y + a * s + b * c)
+            for a, b in (
+                (along, across),
+                (-along, across),
+                (-along, -across),
+                (along, -across),
+            )
+        )
+
+
+class RoadView(Protocol):
+    """What conditions ask."""
+
+    @property
+    def time(self) -> float:
+        """Seconds."""
+
+    def actor(self, name: str) -> ActorView | None:
+        """Return an actor, ``None`` if it is not on the road."""
+
+    def named(self) -> Sequence[ActorView]:
+        """All actors on the road that rules name."""
+
+    def place(self, place: str | Point) -> Point:
+        """X and y of a place."""
+
+    def lane_distance(self, actor: str, to: str | Point) -> float | None:
+        """Metres along the lanes from the centre of an actor to another's, or to a place.
+
+        ``None`` if its route does not lead there.
+        """
+
+    def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
+        """Centre line of the lane ``by`` lanes to the left of an actor's, and of where it leads.
+
+        ``None`` if there is no such lane for it. The line ends where the lanes do.
+        """
+
+    def walking_speed(self, actor: str) -> float:
+        """Speed at which a person walks if no rule says otherwise, m/s."""
+
+    def signal(self, light: str, movement: str) -> str | None:
+        """Letter that a movement shows."""
+
+    def rule_changes(self, rule: str, has: str) -> tuple[float, ...]:
+        """Instants at which a rule has started, or ended."""

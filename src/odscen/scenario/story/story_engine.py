@@ -1,0 +1,317 @@
+"""Rules over a run: which fire when, what they do to whom, and what is said of it.
+
+Each step the engine is shown the road as it is at ``view.time`` and says what is wanted of the
+actors until the next look. Within the step it goes from instant to instant: a rule fires, an action
+ends, the next begins, another rule has waited for that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.scenario.story.acting_actor import ActingActor, CannotAct
+from odscen.scenario.story.action_kinds import ACTIONS
+from odscen.scenario.story.channels import Channel, WantedMove
+from odscen.scenario.story.condition_tree import ConditionTrees
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.scenario.document.actions_document import Action
+    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.story.flips import Flips
+    from odscen.scenario.story.road_view import RoadView
+
+STARTED, ENDED, FAILED, OVERRIDDEN = "started", "ended", "failed", "overridden"
+"""What can be said of a rule."""
+
+_MOST_TURNS = 1000
+"""Instants in one step; a rule that restarts at once, for ever, must not hold up the run."""
+
+
+class StoryEvent(NamedTuple):
+    """What a rule did at an instant; ``values`` are what its conditions were about."""
+
+    time: float
+    what: str
+    rule: str
+    actor: str
+    detail: str | None = None
+    values: dict[str, float] | None = None
+
+
+@dataclass
+class _Running:
+    """An action that runs: its place in the item of ``then``, and when it is over."""
+
+    number: int
+    end: float
+
+    def state(self) -> dict[str, Any]:
+        """Values that JSON can hold."""
+        return {"number": self.number, "end": None if self.end == math.inf else self.end}
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> _Running:
+        """Inverse of :meth:`state`."""
+        return cls(state["number"], math.inf if state["end"] is None else state["end"])
+
+
+@dataclass
+class _RuleState:
+    """A rule: how often it has fired, what it does, and when it may fire again.
+
+    ``started`` and ``ended`` have the first instant of each, if there was one.
+    """
+
+    fired: int = 0
+    ready: float = 0.0
+    item: int | None = None
+    running: list[_Running] = field(default_factory=list)
+    started: list[float] = field(default_factory=list)
+    ended: list[float] = field(default_factory=list)
+
+
+class StoryEngine:
+    """The rules of one run.
+
+    Parameters
+    ----------
+    step
+        Seconds between two looks.
+    """
+
+    def __init__(self, rules: Sequence[StoryRule], *, step: float) -> None:
+        self._rules = {rule.id: rule for rule in rules}
+        self._step = step
+        self._trees = ConditionTrees(step)
+        self._states = {rule.id: _RuleState() for rule in rules}
+        self._channels: dict[str, Channel] = {}
+        self._events: list[StoryEvent] = []
+        self._holds: dict[str, Flips] = {}
+
+    def rule_changes(self, rule: str, has: str) -> tuple[float, ...]:
+        """Instants at which a rule has first started, or ended."""
+        state = self._states.get(rule)
+        if state is None:
+            return ()
+        return tuple(state.started if has == STARTED else state.ended)
+
+    def step(self, view: RoadView) -> tuple[dict[str, WantedMove], list[StoryEvent]]:
+        """Look at the road; what is wanted of whom until the next look, and what happened."""
+        self._events = []
+        self._begin_step(view)
+        now = view.time
+        for _ in range(_MOST_TURNS):
+            turn = self._next_turn(view, now)
+            if turn is None:
+                break
+            now, rule = turn
+            self._turn(view, now, self._rules[rule])
+        self._trees.next_step()
+        moves = {}
+        for name, channel in sorted(self._channels.items()):
+            if (one := view.actor(name)) is not None:
+                moves[name] = channel.end_step(view.time, self._step, person=one.person)
+        return moves, self._events
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        return {
+            "trees": self._trees.state(),
+            "rules": {
+                name: {**asdict(state), "running": [one.state() for one in state.running]}
+                for name, state in self._states.items()
+            },
+            "channels": {name: one.state() for name, one in self._channels.items()},
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self._trees.restore(state["trees"])
+        for name, kept in state["rules"].items():
+            running = [_Running.from_state(one) for one in kept["running"]]
+            self._states[name] = _RuleState(**{**kept, "running": running})
+        self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
+
+    def _begin_step(self, view: RoadView) -> None:
+        for name in list(self._channels):
+            actor = view.actor(name)
+            if actor is None:
+                del self._channels[name]
+                self._gone(view, name)
+            else:
+                self._channels[name].begin_step(actor, view.time)
+        for name, rule in self._rules.items():
+            state = self._states[name]
+            for one in list(state.running):
+                self._update(view, rule, one, view.time)
+
+    def _gone(self, view: RoadView, actor: str) -> None:
+        """End what an actor does that has left the road."""
+        for name, rule in self._rules.items():
+            if rule.actor == actor and self._states[name].item is not None:
+                vanished = any(one.vanish for one in rule.then)
+                if not vanished:
+                    self._say(view.time, FAILED, rule, "it has left the road")
+                self._over(rule, view.time)
+
+    def _next_turn(self, view: RoadView, now: float) -> tuple[float, str] | None:
+        """First instant at which something happens, and the rule to which it does."""
+        found: list[tuple[float, int, str]] = []
+        end = view.time + self._step
+        for index, (name, rule) in enumerate(self._rules.items()):
+            state = self._states[name]
+            if state.item is not None:
+                due = min((one.end for one in state.running), default=now)
+                if due < end:
+                    found.append((max(due, now), index, name))
+            elif state.fired < rule.times:
+                holds = self._trees.look(rule.when, f"{name}.when", rule.actor, view)
+                if state.fired:
+                    instant = holds.first_rise(now, end, after=state.ready)
+                else:
+                    instant = holds.first(now, end)
+                if instant is not None:
+                    found.append((instant, index, name))
+        if not found:
+            return None
+        instant, _, name = min(found)
+        return instant, name
+
+    def _turn(self, view: RoadView, now: float, rule: StoryRule) -> None:
+        state = self._states[rule.id]
+        if state.item is None:
+            self._fire(view, now, rule)
+            return
+        for one in [one for one in state.running if one.end <= now]:
+            state.running.remove(one)
+            self._finish(view, now, rule, one)
+        if not state.running:
+            self._next_item(view, now, rule)
+
+    def _fire(self, view: RoadView, now: float, rule: StoryRule) -> None:
+        state = self._states[rule.id]
+        state.fired += 1
+        state.item = -1
+        state.started = state.started or [now]
+        values = self._trees.values(f"{rule.id}.when.", now - view.time)
+        self._say(now, STARTED, rule, values=values or None)
+        if view.actor(rule.actor) is None:
+            self._say(now, FAILED, rule, f"{rule.actor!r} is not on the road")
+            self._over(rule, now)
+        else:
+            self._next_item(view, now, rule)
+
+    def _next_item(self, view: RoadView, now: float, rule: StoryRule) -> None:
+        """Begin the next item of ``then``; the rule has ended after the last."""
+        state = self._states[rule.id]
+        state.item = 0 if state.item is None else state.item + 1
+        if state.item >= len(rule.then):
+            self._say(now, ENDED, rule)
+            self._over(rule, now)
+            return
+        for number, action in enumerate(rule.then[state.item].parts):
+            one = _Running(number, math.inf)
+            state.running.append(one)
+            self._begin(view, now, rule, action, one)
+            if state.item is None:  # that failed
+                return
+
+    def _begin(
+        self, view: RoadView, now: float, rule: StoryRule, action: Action, one: _Running
+    ) -> None:
+        kind, part = ACTIONS[action.kind], getattr(action, action.kind)
+        acting = self._acting(view, now, rule, one)
+        owners = acting.channel.speed_owner, acting.channel.line_owner
+        try:
+            if (kind.persons_only and not acting.actor.person) or (
+                kind.vehicles_only and acting.actor.person
+            ):
+                who = "a person" if acting.actor.person else "a vehicle"
+                msg = f"{kind.name!r} is not for {who}"
+                raise CannotAct(msg)
+            one.end = kind.begin(part, acting)
+            if one.end == math.inf and kind.update is not None:
+                one.end = kind.update(part, acting, one.end)
+        except CannotAct as error:
+            self._fail(rule, now, str(error))
+            return
+        after = acting.channel.speed_owner, acting.channel.line_owner
+        for owner, new in zip(owners, after, strict=True):
+            if owner is not None and new != owner:
+                self._override(owner, now, rule)
+
+    def _update(self, view: RoadView, rule: StoryRule, one: _Running, now: float) -> None:
+        state = self._states[rule.id]
+        if view.actor(rule.actor) is None or state.item is None:
+            return
+        action = rule.then[state.item].parts[one.number]
+        kind = ACTIONS[action.kind]
+        if kind.update is None:
+            return
+        try:
+            acting = self._acting(view, now, rule, one)
+            one.end = kind.update(getattr(action, action.kind), acting, one.end)
+        except CannotAct as error:
+            self._fail(rule, now, str(error))
+
+    def _finish(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> None:
+        action = rule.then[self._states[rule.id].item or 0].parts[one.number]
+        kind = ACTIONS[action.kind]
+        if kind.finish is not None and view.actor(rule.actor) is not None:
+            kind.finish(getattr(action, action.kind), self._acting(view, now, rule, one))
+
+    def _acting(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> ActingActor:
+        actor = view.actor(rule.actor)
+        if actor is None:
+            msg = f"{rule.actor!r} is not on the road"
+            raise CannotAct(msg)
+        channel = self._channels.get(actor.id)
+        if channel is None:
+            channel = self._channels[actor.id] = Channel()
+            channel.begin_step(actor, view.time)
+        owner = f"{rule.id}/{one.number}"
+        return ActingActor(view, actor, channel, now, self._step, owner)
+
+    def _override(self, owner: str, now: float, by: StoryRule) -> None:
+        """End an action of another rule, as ``by`` has taken over what it had."""
+        name, _, number = owner.rpartition("/")
+        state = self._states[name]
+        if name == by.id:
+            return
+        before = len(state.running)
+        state.running = [one for one in state.running if one.number != int(number)]
+        if len(state.running) < before:
+            rule = self._rules[name]
+            self._say(now, OVERRIDDEN, rule, f"rule {by.id!r} acts instead")
+            if not state.running:
+                self._over(rule, now)
+
+    def _fail(self, rule: StoryRule, now: float, why: str) -> None:
+        self._say(now, FAILED, rule, why)
+        channel = self._channels.get(rule.actor)
+        if channel is not None:
+            if (channel.line_owner or "").rpartition("/")[0] == rule.id and not channel.held:
+                channel.release_line()
+            if (channel.speed_owner or "").rpartition("/")[0] == rule.id:
+                channel.release_speed(now)
+        self._over(rule, now)
+
+    def _over(self, rule: StoryRule, now: float) -> None:
+        state = self._states[rule.id]
+        state.item, state.ready = None, now
+        state.running = []
+        state.ended = state.ended or [now]
+
+    def _say(
+        self,
+        now: float,
+        what: str,
+        rule: StoryRule,
+        detail: str | None = None,
+        values: dict[str, float] | None = None,
+    ) -> None:
+        self._events.append(StoryEvent(now, what, rule.id, rule.actor, detail, values))

@@ -1,0 +1,1 @@
+"""Rules of a scenario, as the worker of a run reads them."""

@@ -1,0 +1,128 @@
+"""Rules as the run reads them: with the places and signals that they name looked up."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.base.errors import ScenarioError
+from odscen.base.stored_files import documents, read_document
+from odscen.scenario.document.rules_document import StoryRule, places_of, rule_parts
+from odscen.scenario.placing.region import place_of
+from odscen.scenario.signals.light import find_light
+from odscen.scenario.signals.movement_names import find_movements
+from odscen.sumo.realize.light_views import scenario_lights
+
+if TYPE_CHECKING:
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+FORMAT = "odscen-story"
+VERSION = 1
+
+
+class StoryPlace(NamedTuple):
+    """A node that a rule names: OpenDRIVE x and y, and where it is on SUMO's network, if it is."""
+
+    x: float
+    y: float
+    edge: str | None = None
+    pos: float = 0.0
+    lane: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class StoryPlan:
+    """Rules, and what they name.
+
+    Attributes
+    ----------
+    places
+        By node.
+    signals
+        SUMO's light and the letter in its states, by light and movement of the document.
+    """
+
+    rules: tuple[StoryRule, ...]
+    places: dict[str, StoryPlace] = field(default_factory=dict)
+    signals: dict[tuple[str, str], tuple[str, int]] = field(default_factory=dict)
+
+    def to_json(self) -> str:
+        """One rule a line; the same plan gives the same text."""
+        rules = [
+            json.dumps(rule.model_dump(mode="json", exclude_defaults=True), ensure_ascii=False)
+            for rule in self.rules
+        ]
+        signals = [[*key, *value] for key, value in self.signals.items()]
+        places = {name: list(place) for name, place in self.places.items()}
+        head = {"format": FORMAT, "version": VERSION, "places": places, "signals": signals}
+        lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+        body = ",\n    ".join(rules)
+        return "{\n" + ",\n".join(lines) + f',\n  "rules": [\n    {body}\n  ]\n}}\n'
+
+    @classmethod
+    def from_json(cls, text: str) -> StoryPlan:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        InputError
+            If it is something else.
+        """
+        what = "the rules of a run"
+        data: dict[str, Any] = read_document(text, form=FORMAT, version=VERSION, what=what)
+        with documents(what):
+            return cls(
+                tuple(StoryRule.model_validate_json(json.dumps(rule)) for rule in data["rules"]),
+                {name: StoryPlace(*place) for name, place in data["places"].items()},
+                {(light, name): (tl, link) for light, name, tl, link in data["signals"]},
+            )
+
+
+def story_plan(scenario: Scenario, sumo_map: SumoMap) -> StoryPlan:
+    """Look up what the rules of a scenario name.
+
+    Raises
+    ------
+    ScenarioError
+        If a node or a movement is not on the map.
+    """
+    plan = StoryPlan(scenario.rules)
+    for index, rule in enumerate(scenario.rules):
+        for where, _, part in rule_parts(rule, f"rules[{index}]"):
+            for name, place in places_of(part):
+                if isinstance(place, str):
+                    plan.places[place] = _place(place, sumo_map, f"{where}.{name}")
+            light, movement = getattr(part, "light", None), getattr(part, "movement", None)
+            if light is not None and movement is not None:
+                plan.signals[light, movement] = _signal(light, movement, sumo_map, where)
+    return plan
+
+
+def _place(node: str, sumo_map: SumoMap, where: str) -> StoryPlace:
+    graph = sumo_map.graph
+    place = place_of(graph, node)
+    if place is None:
+        msg = f"the map has no node {node!r}"
+        raise ScenarioError(msg, element=where)
+    nodes = graph.walks if place.walk else graph.lanes
+    x, y = float(nodes.x[place.node]), float(nodes.y[place.node])
+    at = (sumo_map.walk_places if place.walk else sumo_map.lane_places).of(place.node)
+    if at is None:
+        return StoryPlace(x, y)
+    lane = sumo_map.net.lanes[at[0]]
+    return StoryPlace(x, y, lane.edge, at[1], lane.index)
+
+
+def _signal(light: str, movement: str, sumo_map: SumoMap, where: str) -> tuple[str, int]:
+    lights = scenario_lights(sumo_map)
+    found = find_light(lights, light)
+    if found is None:
+        msg = f"the map has no traffic light {light!r}"
+        raise ScenarioError(msg, element=where)
+    links = find_movements(movement, found.movements)
+    if not links:
+        msg = f"light {light!r} has no movement {movement!r}"
+        raise ScenarioError(msg, element=where)
+    return sumo_map.lights[lights.index(found)].id, min(links)

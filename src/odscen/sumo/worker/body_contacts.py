@@ -1,0 +1,133 @@
+"""Bodies that meet where SUMO does not look: of those that rules move."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from odscen.results.records.run_records import Event, EventKind
+from odscen.scenario.story.body_distance import overlap
+from odscen.sumo.worker.story_view import stranger
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from odscen.results.records.run_records import PlannedActor
+    from odscen.scenario.story.channels import WantedMove
+    from odscen.scenario.story.road_view import ActorView
+    from odscen.sumo.worker.moved_actors import MovedActors
+    from odscen.sumo.worker.story_view import StoryView
+
+BODIES = "bodies"
+"""Kind of collision, where odscen has found it."""
+_HALVINGS = 20
+
+
+class BodyContacts:
+    """Finds when bodies of moved road users begin to overlap others."""
+
+    def __init__(
+        self, planned: Mapping[str, PlannedActor], net_offset: tuple[float, float]
+    ) -> None:
+        self._planned = planned
+        self._offset = net_offset
+        self._touching: set[tuple[str, str]] = set()
+
+    def state(self) -> list[list[str]]:
+        """What has to be remembered, for JSON."""
+        return sorted(list(pair) for pair in self._touching)
+
+    def restore(self, state: Any) -> None:
+        """Inverse of :meth:`state`."""
+        self._touching = {(one, other) for one, other in state}
+
+    def look(
+        self,
+        road: MovedActors,
+        view: StoryView,
+        moves: Mapping[str, WantedMove],
+        time: float,
+        step: float,
+    ) -> list[Event]:
+        """Contacts that began in the step that led to ``time``; those that SUMO saw are left."""
+        moved = [name for name, move in moves.items() if move.exact or move.pose is not None]
+        touching: set[tuple[str, str]] = set()
+        events: list[Event] = []
+        for name in sorted(moved):
+            one = view.actor(name)
+            if one is None:
+                continue
+            for other in self._others(one, road, view):
+                pair = min(one.id, other.id), max(one.id, other.id)
+                if pair in touching or not _near(one, other):
+                    continue
+                if overlap(one.corners, other.corners):
+                    touching.add(pair)
+                    if pair not in self._touching:
+                        events.append(_contact(one, other, time, step))
+        self._touching = touching
+        if events:
+            known = road.collisions()
+            return [one for one in events if frozenset((one.actor, one.partner or "")) not in known]
+        return []
+
+    def _others(self, one: ActorView, road: MovedActors, view: StoryView) -> Iterator[ActorView]:
+        named = {other.id: other for other in view.named()}
+        yield from (other for name, other in named.items() if name != one.id)
+        seen = road.person(one.id) if one.person else road.vehicle(one.id)
+        if seen is None or not seen.lane:
+            return
+        for name, _ in road.bodies_near(seen.lane):
+            planned = self._planned.get(name)
+            if name not in named and planned is not None:
+                other = stranger(road, planned, self._offset)
+                if other is not None:
+                    yield other
+
+
+def _near(one: ActorView, other: ActorView) -> bool:
+    reach = (one.length + one.width + other.length + other.width) / 2.0
+    return abs(one.x - other.x) < reach and abs(one.y - other.y) < reach
+
+
+def _contact(one: ActorView, other: ActorView, time: float, step: float) -> Event:
+    """Event of a contact that began in the last step: bodies are taken back along their speed."""
+    early, late = 0.0, step
+    for _ in range(_HALVINGS):
+        back = (early + late) / 2.0
+        if overlap(_before(one, back).corners, _before(other, back).corners):
+            early = back
+        else:
+            late = back
+    first, second = _before(one, early), _before(other, early)
+    (ax, ay), (bx, by) = one.velocity, other.velocity
+    hitting = max((first, second), key=lambda body: (body.speed, body.id))
+    hit = second if hitting is first else first
+    x, y = _touching_point(hitting, hit)
+    return Event(
+        time - early,
+        EventKind.COLLISION,
+        hitting.id,
+        x=x,
+        y=y,
+        partner=hit.id,
+        detail=BODIES,
+        values={"impact_speed": math.hypot(ax - bx, ay - by)},
+    )
+
+
+def _before(one: ActorView, seconds: float) -> ActorView:
+    vx, vy = one.velocity
+    return replace(one, x=one.x - vx * seconds, y=one.y - vy * seconds)
+
+
+def _touching_point(one: ActorView, other: ActorView) -> tuple[float, float]:
+    """Middle of where two bodies overlap."""
+    from shapely import Polygon
+
+    shared = Polygon(one.corners).intersection(Polygon(other.corners))
+    middle = shared.centroid
+    if middle.is_empty:
+        return (one.x + other.x) / 2.0, (one.y + other.y) / 2.0
+    return float(middle.x), float(middle.y)

@@ -1,0 +1,253 @@
+"""Single road users read and moved for rules, in SUMO's frame; only a session hands this out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+_ALL_CHECKS, _SAFE, _NO_CHECKS = 31, 95, 96
+"""``setSpeedMode``: SUMO's own; safe, but faster than the limit; what is set and nothing else."""
+_OWN_LANES, _ROUTE_ONLY = 1621, 1537
+"""``setLaneChangeMode``: SUMO's own; only changes that the route needs."""
+_NEAR = 12.0
+"""Metres around a place in which SUMO looks for its lane."""
+_FREE, _ON_FOOT = 2, 6
+"""``keepRoute``: exactly there, off the route and the road as well; of persons seen by drivers."""
+_AHEAD = 600.0
+"""Metres that a line of lanes is followed."""
+_NOWHERE = 1e8
+_RIGHT_OF_WAY, _RED = 8, 16
+"""Bits of ``setSpeedMode``."""
+
+Shape = tuple[tuple[float, float], ...]
+
+
+class SeenVehicle(NamedTuple):
+    """A vehicle: centre of its front; metres since departure; metres left of its lane."""
+
+    x: float
+    y: float
+    angle_deg: float
+    speed: float
+    acceleration: float
+    travelled: float
+    lane: str
+    left: float
+
+
+class SeenPerson(NamedTuple):
+    """A person: centre of its front."""
+
+    x: float
+    y: float
+    angle_deg: float
+    speed: float
+    lane: str
+
+
+class SavedWalk(NamedTuple):
+    """Where a person was walking to before it was moved: edges, and metres along the last."""
+
+    edges: tuple[str, ...]
+    arrival: float
+
+
+class MovedActors:
+    """Reads and moves road users by name."""
+
+    def __init__(
+        self,
+        sumo: Any,
+        errors: tuple[type[Exception], ...],
+        lanes_of_edge: Mapping[str, Sequence[str]],
+        admits: Callable[[str, str], bool],
+    ) -> None:
+        self._sumo = sumo
+        self._errors = errors
+        self._lanes_of_edge = lanes_of_edge
+        self._admits = admits
+
+    def vehicle(self, name: str) -> SeenVehicle | None:
+        """A vehicle, ``None`` if it is not on the road."""
+        one = self._sumo.vehicle
+        try:
+            x, y = one.getPosition(name)
+            if abs(x) > _NOWHERE:
+                return None
+            return SeenVehicle(
+                x, y, one.getAngle(name), one.getSpeed(name), one.getAcceleration(name),
+                one.getDistance(name), one.getLaneID(name), one.getLateralLanePosition(name),
+            )  # fmt: skip
+        except self._errors:
+            return None
+
+    def person(self, name: str) -> SeenPerson | None:
+        """A person, ``None`` if it is not on the road."""
+        one = self._sumo.person
+        try:
+            x, y = one.getPosition(name)
+            if abs(x) > _NOWHERE:
+                return None
+            return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
+        except self._errors:
+            return None
+
+    def lane_width(self, lane: str) -> float:
+        """Metres."""
+        return float(self._sumo.lane.getWidth(lane))
+
+    def drive(
+        self,
+        vehicle: str,
+        speed: float | None,
+        *,
+        exact: bool = False,
+        ignore_red: bool = False,
+        ignore_right_of_way: bool = False,
+    ) -> None:
+        """Set the speed of the next step, and what is not heeded; ``None`` is SUMO's own speed."""
+        one = self._sumo.vehicle
+        mode = _ALL_CHECKS if speed is None else _NO_CHECKS if exact else _SAFE
+        mode &= ~(_RED * ignore_red | _RIGHT_OF_WAY * ignore_right_of_way)
+        one.setSpeedMode(vehicle, mode)
+        one.setSpeed(vehicle, -1.0 if speed is None else speed)
+
+    def fastest(self, vehicle: str) -> float:
+        """Highest speed that a vehicle's type allows, m/s."""
+        return float(self._sumo.vehicle.getMaxSpeed(vehicle))
+
+    def limit(self, vehicle: str, speed: float) -> None:
+        """Set the highest speed that a vehicle can go, m/s."""
+        self._sumo.vehicle.setMaxSpeed(vehicle, speed)
+
+    def keep_lane(self, vehicle: str, *, keeps: bool) -> None:
+        """Let a vehicle change lanes only where its route needs it, or as SUMO likes."""
+        self._sumo.vehicle.setLaneChangeMode(vehicle, _ROUTE_ONLY if keeps else _OWN_LANES)
+
+    def put_vehicle(self, vehicle: str, x: float, y: float, angle_deg: float) -> None:
+        """Place the front of a vehicle for the next step."""
+        self._sumo.vehicle.moveToXY(vehicle, "", -1, x, y, angle_deg, _FREE, _NEAR)
+
+    def put_person(self, person: str, x: float, y: float, angle_deg: float) -> None:
+        """Place a person for the next step, on a road as well; drivers brake for it."""
+        self._sumo.person.moveToXY(person, "", x, y, angle_deg, _ON_FOOT, 100.0)
+
+    def walk_speed(self, person: str, speed: float) -> None:
+        """Set the speed at which a person walks, m/s."""
+        self._sumo.person.setSpeed(person, speed)
+
+    def saved_walk(self, person: str) -> SavedWalk:
+        """Where a person is walking to."""
+        stage = self._sumo.person.getStage(person)
+        return SavedWalk(tuple(stage.edges), float(stage.arrivalPos))
+
+    def resume_walk(self, person: str, walk: SavedWalk) -> bool:
+        """Send a person on foot from where it is to where it was going; false if it cannot.
+
+        SUMO ends in a fault where a person waits on an edge without sidewalk, so that a walk is
+        found before it gives up the old one.
+        """
+        sumo, persons = self._sumo, self._sumo.person
+        try:
+            here = persons.getRoadID(person)
+            goal = walk.edges[-1]
+            if here in walk.edges:
+                edges = walk.edges[walk.edges.index(here) :]
+            else:
+                stages = sumo.simulation.findIntermodalRoute(
+                    here, goal, "", -1.0, 0, -1.0, persons.getLanePosition(person), walk.arrival
+                )
+                edges = tuple(edge for stage in stages for edge in stage.edges)
+            if not edges or not self._walkable(edges[0]):
+                return False
+            persons.removeStages(person)
+            persons.appendWalkingStage(person, list(edges), walk.arrival)
+        except self._errors:
+            return False
+        return True
+
+    def _walkable(self, edge: str) -> bool:
+        return any(self._admits(lane, "pedestrian") for lane in self._lanes_of_edge[edge])
+
+    def remove(self, name: str, *, person: bool) -> None:
+        """Take a road user out of the simulation."""
+        if person:
+            self._sumo.person.removeStages(name)
+        else:
+            self._sumo.vehicle.remove(name)
+
+    def driving_distance(self, vehicle: str, edge: str, pos: float, lane: int = 0) -> float | None:
+        """Metres from a vehicle's front along its route; ``None`` if it does not lead there."""
+        try:
+            found = float(self._sumo.vehicle.getDrivingDistance(vehicle, edge, pos, lane))
+        except self._errors:
+            return None
+        return found if abs(found) < _NOWHERE else None
+
+    def road_place(self, vehicle: str) -> tuple[str, float, int]:
+        """Edge of a vehicle, metres along it, and its lane."""
+        one = self._sumo.vehicle
+        return one.getRoadID(vehicle), one.getLanePosition(vehicle), one.getLaneIndex(vehicle)
+
+    def nearest_road(self, x: float, y: float) -> tuple[str, float, int]:
+        """Edge for cars that is nearest, metres along it, and lane."""
+        edge, pos, lane = self._sumo.simulation.convertRoad(x, y, False, "passenger")
+        return edge, pos, lane
+
+    def light_letter(self, light: str, link: int) -> str:
+        """What a link of a traffic light shows."""
+        return str(self._sumo.trafficlight.getRedYellowGreenState(light)[link])
+
+    def side_lines(self, vehicle: str, by: int) -> tuple[Shape, ...]:
+        """Centre lines of the lanes ``by`` lanes beside that of a vehicle, on either side of it."""
+        one = self._sumo.vehicle
+        own = one.getLaneID(vehicle)
+        if not own:
+            return ()
+        lanes = self._in_order(self._sumo.lane.getEdgeID(own))
+        kind, row = one.getVehicleClass(vehicle), lanes.index(own)
+        rows = {row + by, row - by}
+        return tuple(
+            self._line(vehicle, lanes[n], kind)
+            for n in sorted(rows)
+            if 0 <= n < len(lanes) and self._admits(lanes[n], kind)
+        )
+
+    def bodies_near(self, lane: str) -> list[tuple[str, bool]]:
+        """Vehicles and persons on the edge of a lane, with whether each is a person."""
+        edge = self._sumo.lane.getEdgeID(lane)
+        on = self._sumo.edge
+        vehicles = [(name, False) for name in on.getLastStepVehicleIDs(edge)]
+        return vehicles + [(name, True) for name in on.getLastStepPersonIDs(edge)]
+
+    def collisions(self) -> set[frozenset[str]]:
+        """Pairs that SUMO itself has seen collide in the last step."""
+        found = self._sumo.simulation.getCollisions()
+        return {frozenset((one.collider, one.victim)) for one in found}
+
+    def _in_order(self, edge: str) -> list[str]:
+        """Lanes of an edge from the outermost on; SUMO numbers them so."""
+        return sorted(self._lanes_of_edge[edge], key=lambda lane: (len(lane), lane))
+
+    def _line(self, vehicle: str, lane: str, kind: str) -> Shape:
+        """Centre line of a lane and of those that it leads to, along the route if it does."""
+        lanes, one = self._sumo.lane, self._sumo.vehicle
+        route = set(one.getRoute(vehicle)[max(one.getRouteIndex(vehicle), 0) :])
+        line, metres = list(lanes.getShape(lane)), lanes.getLength(lane)
+        while metres < _AHEAD:
+            links = [link for link in lanes.getLinks(lane) if self._admits(link[0], kind)]
+            if not links:
+                break
+            onward = [link for link in links if lanes.getEdgeID(link[0]) in route]
+            link = (onward or links)[0]
+            inside = link[4]
+            while inside:
+                line += lanes.getShape(inside)
+                metres += lanes.getLength(inside)
+                inside = next((one[4] for one in lanes.getLinks(inside)), "")
+            lane = link[0]
+            line += lanes.getShape(lane)
+            metres += lanes.getLength(lane)
+        return tuple(line)

@@ -1,0 +1,221 @@
+"""Rules in a running simulation: after each step they see the road, before the next they act."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.frames import angle_deg_from_hdg
+from odscen.results.records.run_records import Event, EventKind
+from odscen.scenario.document.rules_document import actors_of, rule_parts
+from odscen.scenario.story.channels import Pose, WantedMove
+from odscen.scenario.story.story_engine import StoryEngine
+from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
+from odscen.sumo.realize.rules.story_files import StoryPlan
+from odscen.sumo.worker.body_contacts import BodyContacts
+from odscen.sumo.worker.moved_actors import SavedWalk
+from odscen.sumo.worker.story_view import StoryView
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from odscen.results.records.run_records import Plan
+    from odscen.scenario.story.road_view import ActorView
+    from odscen.scenario.story.story_engine import StoryEvent
+    from odscen.sumo.worker.moved_actors import MovedActors
+    from odscen.sumo.worker.recorder import Recorder
+    from odscen.sumo.worker.session import Session
+
+_FREE = WantedMove()
+_ANY_SPEED = 200.0
+"""m/s."""
+
+
+class StoryRun:
+    """The rules of one run, and what SUMO was made to do for them."""
+
+    def __init__(self, story: StoryPlan, plan: Plan) -> None:
+        names = set(_names(story))
+        self._planned = {actor.id: actor for actor in plan.actors}
+        self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
+        self._engine = StoryEngine(story.rules, step=plan.step_length)
+        self._view = StoryView(
+            story,
+            self._actors,
+            net_offset=plan.net_offset,
+            rule_changes=self._engine.rule_changes,
+        )
+        self._contacts = BodyContacts(self._planned, plan.net_offset)
+        self._step = plan.step_length
+        self._offset = plan.net_offset
+        self._road: MovedActors
+        self._moves: dict[str, WantedMove] = {}
+        self._walks: dict[str, SavedWalk] = {}
+        self._fastest: dict[str, float] = {}
+        self._waits: dict[str, Pose] = {}
+        self._lost: list[Event] = []
+
+    @classmethod
+    def in_folder(cls, run: Path, plan: Plan) -> StoryRun:
+        """Rules of the run in a folder."""
+        file = run / SUMO_FOLDER / STORY_FILE
+        return cls(StoryPlan.from_json(file.read_text(encoding="utf-8")), plan)
+
+    def begin(self, session: Session) -> None:
+        """Begin with a simulation; after a saved state, do again what the state does not hold."""
+        self._road = session.moved_actors()
+        for name, move in self._moves.items():
+            self._act(self._road, name, move, None)
+
+    def after_step(self, time: float, recorder: Recorder) -> None:
+        """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
+        road = self._road
+        driven = {
+            name: move.speed or 0.0
+            for name, move in self._moves.items()
+            if move.pose is not None and self._actors[name].person
+        }
+        self._view.look(road, time, self._step, driven)
+        contacts = self._contacts.look(road, self._view, self._moves, time, self._step)
+        moves, events = self._engine.step(self._view)
+        recorder.events.extend([*contacts, *map(self._event, events)])
+        self._lost = []
+        before, self._moves = self._moves, {}
+        for name, move in moves.items():
+            if self._view.actor(name) is not None:
+                self._act(road, name, move, before.get(name))
+                if not move.vanishes:
+                    self._moves[name] = move
+        recorder.events.extend(self._lost)
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered from one slice of a run to the next, for JSON."""
+        return {
+            "engine": self._engine.state(),
+            "view": self._view.state(),
+            "contacts": self._contacts.state(),
+            "moves": {name: asdict(move) for name, move in self._moves.items()},
+            "fastest": self._fastest,
+            "waits": {name: list(pose) for name, pose in self._waits.items()},
+            "walks": {name: [list(one.edges), one.arrival] for name, one in self._walks.items()},
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self._engine.restore(state["engine"])
+        self._view.restore(state["view"])
+        self._contacts.restore(state["contacts"])
+        for name, kept in state["moves"].items():
+            pose = kept["pose"]
+            data = {**kept, "pose": None if pose is None else Pose(*_numbers(pose))}
+            self._moves[name] = WantedMove(**data)
+        self._fastest = dict(state["fastest"])
+        self._waits = {name: Pose(*_numbers(pose)) for name, pose in state["waits"].items()}
+        self._walks = {
+            name: SavedWalk(tuple(edges), arrival)
+            for name, (edges, arrival) in state["walks"].items()
+        }
+
+    def _act(
+        self, road: MovedActors, name: str, move: WantedMove, before: WantedMove | None
+    ) -> None:
+        if move.vanishes:
+            road.remove(name, person=self._actors[name].person)
+        elif self._actors[name].person:
+            self._move_person(road, name, move, before)
+        else:
+            self._move_vehicle(road, name, move, before or _FREE)
+
+    def _move_vehicle(
+        self, road: MovedActors, name: str, move: WantedMove, before: WantedMove
+    ) -> None:
+        ignored = move.ignore_red, move.ignore_right_of_way
+        changed = ignored != (before.ignore_red, before.ignore_right_of_way)
+        if changed or move.speed is not None or before.speed is not None:
+            self._let(road, name, move.speed)
+            road.drive(
+                name,
+                move.speed,
+                exact=move.exact,
+                ignore_red=move.ignore_red,
+                ignore_right_of_way=move.ignore_right_of_way,
+            )
+        if move.keeps_lane != before.keeps_lane:
+            road.keep_lane(name, keeps=move.keeps_lane)
+        if (pose := move.pose) is not None:
+            x, y = pose.x + self._offset[0], pose.y + self._offset[1]
+            road.put_vehicle(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+
+    def _let(self, road: MovedActors, name: str, speed: float | None) -> None:
+        """Let a vehicle go faster than its type, while a rule wants it."""
+        own = self._fastest.get(name)
+        if speed is None:
+            if own is not None:
+                road.limit(name, self._fastest.pop(name))
+        elif own is None and speed > (allowed := road.fastest(name)):
+            self._fastest[name] = allowed
+            road.limit(name, _ANY_SPEED)
+
+    def _move_person(
+        self, road: MovedActors, name: str, move: WantedMove, before: WantedMove | None
+    ) -> None:
+        if move.pose is not None:
+            if name not in self._walks:
+                self._walks[name] = road.saved_walk(name)
+            self._waits.pop(name, None)
+            self._put_person(road, name, move.pose)
+            return
+        if move.rejoins and name in self._walks:
+            if road.resume_walk(name, self._walks[name]):
+                del self._walks[name]
+            elif (one := self._view.actor(name)) is not None:
+                self._waits[name] = Pose(one.x, one.y, one.hdg)
+                self._lost.append(_no_walk(self._view.time, one))
+        if (pose := self._waits.get(name)) is not None:
+            self._put_person(road, name, pose)
+            return
+        speed = move.speed
+        if speed is None and before is not None and before.speed is not None:
+            speed = self._view.walking_speed(name)
+        if speed is not None:
+            road.walk_speed(name, speed)
+
+    def _put_person(self, road: MovedActors, name: str, pose: Pose) -> None:
+        half = self._actors[name].length / 2.0
+        x = pose.x + half * math.cos(pose.hdg) + self._offset[0]
+        y = pose.y + half * math.sin(pose.hdg) + self._offset[1]
+        road.put_person(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+
+    def _event(self, event: StoryEvent) -> Event:
+        one = self._view.actor(event.actor)
+        return Event(
+            event.time,
+            EventKind(f"rule_{event.what}"),
+            event.actor,
+            x=None if one is None else one.x,
+            y=None if one is None else one.y,
+            detail=event.detail,
+            rule=event.rule,
+            values=event.values,
+        )
+
+
+def _names(story: StoryPlan) -> Iterator[str]:
+    for rule in story.rules:
+        yield rule.actor
+        for _, _, part in rule_parts(rule, ""):
+            for _, name in actors_of(part):
+                yield name
+
+
+def _no_walk(time: float, one: ActorView) -> Event:
+    """Event of a person for whom SUMO has no walk on: it would end in a fault without sidewalk."""
+    detail = "there is no sidewalk to resume its walk on; it stays where it is"
+    return Event(time, EventKind.RULE_FAILED, one.id, x=one.x, y=one.y, detail=detail)
+
+
+def _numbers(pose: Any) -> tuple[float, float, float]:
+    x, y, hdg = pose
+    return float(x), float(y), float(hdg)

@@ -1,0 +1,235 @@
+"""The road as rules see it: those that they name, read once a step through the session."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
+from odscen.scenario.story.road_view import ActorView
+from odscen.scenario.story.side_motion import beside
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from odscen.results.records.run_records import PlannedActor
+    from odscen.scenario.story.road_view import Point
+    from odscen.sumo.realize.rules.story_files import StoryPlan
+    from odscen.sumo.worker.moved_actors import MovedActors, SeenPerson, SeenVehicle
+
+_STANDING = 0.1
+"""m/s below which a road user stands."""
+_USUAL_WALK = 1.39
+"""m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
+_BEHIND = -10.0
+"""Metres; less than that is behind."""
+
+
+class StoryView:
+    """What conditions and actions ask, see :class:`odscen.scenario.story.road_view.RoadView`.
+
+    Parameters
+    ----------
+    rule_changes
+        Of the engine.
+    """
+
+    def __init__(
+        self,
+        plan: StoryPlan,
+        actors: Mapping[str, PlannedActor],
+        *,
+        net_offset: tuple[float, float],
+        rule_changes: Callable[[str, str], tuple[float, ...]],
+    ) -> None:
+        self._plan = plan
+        self._actors = actors
+        self._offset = net_offset
+        self.rule_changes = rule_changes
+        self._now = 0.0
+        self._road: MovedActors
+        self._views: dict[str, ActorView] = {}
+        self._nearest: dict[Point, tuple[str, float, int]] = {}
+        self._travelled: dict[str, float] = {}
+        self._standing: dict[str, float] = {}
+        self._last: dict[str, tuple[float, float, float]] = {}
+
+    @property
+    def time(self) -> float:
+        """Seconds."""
+        return self._now
+
+    def look(
+        self, road: MovedActors, time: float, step: float, driven: Mapping[str, float]
+    ) -> None:
+        """Read all actors; ``driven`` are speeds of persons that were moved, m/s."""
+        self._road, self._now = road, time
+        views = {}
+        for name, actor in self._actors.items():
+            one = self._person(actor, step, driven) if actor.person else self._vehicle(actor)
+            if one is not None:
+                views[name] = one
+        self._views = views
+
+    def actor(self, name: str) -> ActorView | None:
+        """Return an actor, ``None`` if it is not on the road."""
+        return self._views.get(name)
+
+    def named(self) -> Sequence[ActorView]:
+        """All actors on the road that rules name."""
+        return tuple(self._views.values())
+
+    def place(self, place: str | Point) -> Point:
+        """X and y of a place."""
+        if isinstance(place, str):
+            known = self._plan.places[place]
+            return known.x, known.y
+        return place
+
+    def lane_distance(self, actor: str, to: str | Point) -> float | None:
+        """Metres along the lanes from the centre of an actor to another's, or to a place."""
+        own = self._views[actor]
+        if own.person:
+            return None
+        ahead = own.length / 2.0
+        other = self._views.get(to) if isinstance(to, str) else None
+        if other is not None:
+            if other.person:
+                where = self._near((other.x, other.y))
+            else:
+                where, ahead = self._road.road_place(other.id), ahead - other.length / 2.0
+        else:
+            where = self._where(to)
+        metres = self._road.driving_distance(actor, *where)
+        return None if metres is None or metres < _BEHIND else metres + ahead
+
+    def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
+        """Centre line of the lane ``by`` lanes to the left of an actor's."""
+        own = self._views[actor]
+        for shape in self._road.side_lines(actor, by):
+            line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
+            left = -beside(line, (own.x, own.y)).left
+            if by == 0 or (left > 0.0) == (by > 0):
+                return line
+        return None
+
+    def walking_speed(self, actor: str) -> float:
+        """Speed at which a person walks if no rule says otherwise, m/s."""
+        planned = self._actors[actor]
+        return planned.speed or _USUAL_WALK
+
+    def signal(self, light: str, movement: str) -> str | None:
+        """Letter that a movement shows."""
+        found = self._plan.signals.get((light, movement))
+        return None if found is None else self._road.light_letter(*found)
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered, for JSON."""
+        return {
+            "travelled": self._travelled,
+            "standing": self._standing,
+            "last": {name: list(one) for name, one in self._last.items()},
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self._travelled = dict(state["travelled"])
+        self._standing = dict(state["standing"])
+        self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
+
+    def _where(self, place: str | Point) -> tuple[str, float, int]:
+        if not isinstance(place, str):
+            return self._near(place)
+        known = self._plan.places[place]
+        if known.edge is None:
+            return self._near((known.x, known.y))
+        return known.edge, known.pos, known.lane
+
+    def _near(self, place: Point) -> tuple[str, float, int]:
+        if place not in self._nearest:
+            x, y = place[0] + self._offset[0], place[1] + self._offset[1]
+            self._nearest[place] = self._road.nearest_road(x, y)
+        return self._nearest[place]
+
+    def _vehicle(self, planned: PlannedActor) -> ActorView | None:
+        seen = self._road.vehicle(planned.id)
+        if seen is None:
+            return None
+        half = self._road.lane_width(seen.lane) / 2.0 if seen.lane else 0.0
+        return self._view(
+            planned,
+            seen,
+            speed=seen.speed,
+            acceleration=seen.acceleration,
+            travelled=seen.travelled,
+            off_road=not seen.lane or abs(seen.left) > half,
+        )
+
+    def _person(
+        self, planned: PlannedActor, step: float, driven: Mapping[str, float]
+    ) -> ActorView | None:
+        seen = self._road.person(planned.id)
+        if seen is None:
+            return None
+        x, y, before = self._last.get(planned.id, (seen.x, seen.y, seen.speed))
+        moved = math.hypot(seen.x - x, seen.y - y)
+        # SUMO says 0 of persons that are moved.
+        speed = driven.get(planned.id, seen.speed)
+        self._travelled[planned.id] = self._travelled.get(planned.id, 0.0) + moved
+        self._last[planned.id] = seen.x, seen.y, speed
+        return self._view(
+            planned,
+            seen,
+            speed=speed,
+            acceleration=(speed - before) / step,
+            travelled=self._travelled[planned.id],
+            off_road=not seen.lane,
+        )
+
+    def _view(
+        self,
+        planned: PlannedActor,
+        seen: SeenVehicle | SeenPerson,
+        *,
+        speed: float,
+        acceleration: float,
+        travelled: float,
+        off_road: bool,
+    ) -> ActorView:
+        if speed >= _STANDING:
+            self._standing.pop(planned.id, None)
+        else:
+            self._standing.setdefault(planned.id, self._now)
+        x, y = body_centre(
+            seen.x, seen.y, seen.angle_deg, length=planned.length, net_offset=self._offset
+        )
+        return ActorView(
+            id=planned.id,
+            x=x,
+            y=y,
+            hdg=math.remainder(math.radians(90.0 - seen.angle_deg), math.tau),
+            speed=speed,
+            acceleration=acceleration,
+            length=planned.length,
+            width=planned.width,
+            travelled=travelled,
+            person=planned.person,
+            standing=self._standing.get(planned.id),
+            off_road=off_road,
+        )
+
+
+def stranger(
+    road: MovedActors, planned: PlannedActor, net_offset: tuple[float, float]
+) -> ActorView | None:
+    """Body of a road user that no rule names."""
+    seen = road.person(planned.id) if planned.person else road.vehicle(planned.id)
+    if seen is None:
+        return None
+    pose = sumo_to_xodr(
+        SumoPose(seen.x, seen.y, 0.0, seen.angle_deg), length=planned.length, net_offset=net_offset
+    )
+    return ActorView(
+        planned.id, float(pose.x), float(pose.y), float(pose.hdg), seen.speed, 0.0,
+        planned.length, planned.width, 0.0, planned.person,
+    )  # fmt: skip

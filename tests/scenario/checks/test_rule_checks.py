@@ -1,0 +1,98 @@
+"""What is wrong with rules is named with its place, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.signals.light import Light
+from tests.scenario.checks.test_scenario_checks import actor, problems
+
+VAN = actor("1.0.-1.10", id="van")
+EGO = actor("1.0.-1.20", id="ego")
+CHILD = actor("ped.1.0.-2.0", id="child", category="pedestrian")
+
+
+def rule(**fields: Any) -> StoryRule:
+    data = {
+        "id": "r", "actor": "van", "when": {"time": {"after": 1.0}},
+        "then": [{"lane": {"by": 1}}],
+    }  # fmt: skip
+    return StoryRule.model_validate(data | fields)
+
+
+def found(*rules: StoryRule) -> list[tuple[str, str, str]]:
+    return [
+        (one.severity, one.code, one.where)
+        for one in problems(VAN, EGO, CHILD, rules=rules)
+        if one.where.startswith("rules")
+    ]
+
+
+def test_good_rules_have_no_problems() -> None:
+    cross = rule(
+        id="cross", actor="child", then=[{"walk": {"to": "1.0.-1.5", "through": ["1.0.-1.4"]}}]
+    )
+    assert found(rule(when={"ttc": {"to": "ego", "below": 3}}), cross) == []
+
+
+@pytest.mark.parametrize(
+    ("one", "code", "where"),
+    [
+        (rule(actor="lorry"), "unknown_actor", "rules[0].actor"),
+        (
+            rule(when={"all": [{"ttc": {"to": "lorry", "below": 3}}]}),
+            "unknown_actor",
+            "rules[0].when.all[0].ttc.to",
+        ),
+        (
+            rule(when={"not": {"reaches": {"place": "9.9.9.9"}}}),
+            "unknown_place",
+            "rules[0].when.not.reaches.place",
+        ),
+        (rule(when={"rule": {"id": "x"}}), "unknown_rule", "rules[0].when.rule.id"),
+        (
+            rule(then=[{"go": {}}, {"walk": {"to": "1.0.-1.5"}}]),
+            "action_not_possible",
+            "rules[0].then[1].walk",
+        ),
+        (rule(actor="child"), "action_not_possible", "rules[0].then[0].lane"),
+        (
+            rule(
+                then=[{"together": [{"keep_gap": {"to": "x", "metres": 9}}, {"lane": {"by": 1}}]}]
+            ),
+            "unknown_actor",
+            "rules[0].then[0].together[0].keep_gap.to",
+        ),
+    ],
+)
+def test_each_mistake_in_a_rule_is_named_with_its_place(
+    one: StoryRule, code: str, where: str
+) -> None:
+    assert found(one) == [("error", code, where)]
+
+
+def test_two_rules_that_may_want_one_actor_at_once_are_warned_of() -> None:
+    second = rule(id="s", when={"time": {"after": 2.0}})
+    assert found(rule(), second) == [("warning", "rules_at_once", "rules[1]")]
+    waits = rule(id="s", when={"rule": {"id": "r"}})
+    assert found(rule(), waits) == []
+    assert found(rule(), rule(id="s", then=[{"brake": {"by": 4}}])) == []
+
+
+def test_an_id_that_another_rule_has_is_refused() -> None:
+    assert ("error", "duplicate_id", "rules[1].id") in found(rule(), rule())
+
+
+def test_a_light_that_is_not_there_is_named() -> None:
+    from odscen.scenario.checks.scenario_checks import check
+    from tests.scenario.checks.test_scenario_checks import GRAPH, scenario
+
+    asks = rule(when={"signal": {"light": "7", "movement": "r1>r2", "shows": "green"}})
+    one = scenario(VAN, rules=[asks])
+    codes = [problem.code for problem in check(one, GRAPH, None, [Light(("9",), (10.0,))])]
+    assert codes == ["unknown_light"]
+    codes = [problem.code for problem in check(one, GRAPH, None, [Light(("7",), (10.0,))])]
+    assert codes == ["unknown_movement"]
