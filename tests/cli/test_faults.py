@@ -220,3 +220,18 @@ def test_doctor_tells_each_step_and_repairs(workspace, alone, tmp_path):
     assert repaired.code == 0, repaired.err
     assert "run run: rebuilt: report.html: expected sha256" in repaired.err
     assert odscen("compare", run, alone, "--workspace", workspace).code == 0
+
+
+def test_a_signal_after_the_end_of_a_command_shows_nothing_of_python():
+    script = (
+        "import atexit, os, signal, sys\n"
+        "atexit.register(os.kill, os.getpid(), signal.SIGTERM)\n"
+        "sys.argv = ['odscen', 'assets', 'list']\n"
+        "from odscen.cli import main\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert done.returncode in (0, -signal.SIGTERM)
+    assert done.stderr == ""

@@ -41,7 +41,7 @@ def test_files_of_a_map_that_are_gone_are_refused_with_what_to_do(
 ) -> None:
     (workspace.root / "maps" / CROSSING / "preview.svg").unlink()
     answer = client.get(f"/api/maps/{CROSSING}/preview.svg")
-    assert answer.status_code == 422
+    assert answer.status_code == 409
     message = answer.json()["error"]["message"]
     assert "preview.svg" in message
     assert "no such file" in message

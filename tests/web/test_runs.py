@@ -250,7 +250,7 @@ def test_incidents_of_a_finished_run_are_those_that_were_told_live(
     document["events"].append(crash)
     file.write_text(json.dumps(document))
     refused = client.get(f"/api/runs/{run}/events")
-    assert refused.status_code == 422
+    assert refused.status_code == 409
     assert "events.json: expected sha256" in refused.json()["error"]["message"]
     seal_again(file.parent, "events.json")
     assert crash in client.get(f"/api/runs/{run}/events").json()["events"]

@@ -33,6 +33,9 @@ from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.transit_commands import app as transit
 
+_INTERRUPTED = 130
+"""Exit code of a command that was interrupted, as shells know it."""
+
 app = typer.Typer(
     name="odscen",
     help="Traffic scenarios on OpenDRIVE maps, run headlessly in SUMO.",
@@ -83,6 +86,15 @@ def _options(
     pass
 
 
+def _end_at_once_if_asked() -> None:
+    """Leave signals to the system: what the command has to clean up is done.
+
+    Python would show where in its own end it was interrupted.
+    """
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def main() -> None:
     """Entry point: runs the command and turns errors into messages and exit codes.
 
@@ -90,8 +102,14 @@ def main() -> None:
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
     try:
-        with disk_errors("odscen"):
-            app()
+        try:
+            with disk_errors("odscen"):
+                app()
+        finally:
+            _end_at_once_if_asked()
+    except KeyboardInterrupt:  # it came when the command had just ended
+        _end_at_once_if_asked()
+        sys.exit(_INTERRUPTED)
     except OdscenError as error:
         report_error(error)
         sys.exit(error.exit_code)

@@ -12,6 +12,7 @@ from starlette.responses import Response
 
 from odscen.base.errors import (
     ConflictError,
+    DamagedError,
     InputError,
     NotFoundError,
     OdscenError,
@@ -126,7 +127,7 @@ def _name(error: OSError) -> str:
 def _status(error: OdscenError) -> int:
     if isinstance(error, NotFoundError):
         return 404
-    if isinstance(error, ConflictError):
+    if isinstance(error, ConflictError | DamagedError):  # what is there is taken, or damaged
         return 409
     if isinstance(error, InputError):
         return 422

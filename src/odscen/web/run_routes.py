@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import orjson
@@ -11,14 +12,14 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.stored_files import tables
 from odscen.results.measures.curves import SpeedShares, run_curves
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.replay import replay_columns
 from odscen.results.records.run_records import EventKind, Plan, event_row, events_from_json
 from odscen.results.records.traces import ActorCounts, SpeedCurve
 from odscen.sumo.folder import layout
-from odscen.sumo.folder.damaged import damage_named
 from odscen.sumo.folder.recorded import read_trajectories
 from odscen.web.live_view import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
@@ -44,6 +45,7 @@ from odscen.web.wire.run_messages import (
 from odscen.web.wire.summary_messages import RunSummary
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     import polars as pl
@@ -131,10 +133,10 @@ def content(run: str, shared: Shared) -> RunContent:
 def events(run: str, shared: Shared) -> RunEvents:
     """What went wrong on the road in a finished run: the first thousands of incidents."""
     path = _kept(shared, run, layout.EVENTS_FILE)
-    with damage_named(path.parent):
+    with _named(path.parent):
         found = [
             event_row(event)
-            for event in events_from_json(path.read_text(encoding="utf-8"))
+            for event in events_from_json(_text(path))
             if event.kind not in (EventKind.DEPARTED, EventKind.ARRIVED)
         ]
         rows = [IncidentInfo(**row) for row in found[:MOST_EVENTS]]
@@ -146,8 +148,8 @@ def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
     table, plan, _ = _recorded(shared, run)
     path, end = _kept(shared, run, layout.ACTORS_FILE), summary(run, shared).sim_seconds or 0.0
-    with damage_named(path.parent):
-        actors = actors_from_json(path.read_text(encoding="utf-8"))
+    with _named(path.parent):
+        actors = actors_from_json(_text(path))
         found = run_curves(plan, actors, table, end=end)
     return RunCurves(
         counts=RunCurve(**_lists(found.counts)),
@@ -170,7 +172,7 @@ def trajectories(
     table, plan, read = _recorded(shared, run)
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
-    with damage_named(shared.runs.kept.folder(run)):
+    with _named(shared.runs.kept.folder(run)):
         columns = replay_columns(table, plan, every=max(1, every // read))
     names = tuple(ReplayActor.model_fields)
     columns["actors"] = [{name: getattr(one, name) for name in names} for one in plan.actors]
@@ -181,6 +183,17 @@ def _kept(shared: Shared, run: str, name: str) -> Path:
     return shared.runs.kept.finished_file(run, name)
 
 
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+@contextmanager
+def _named(run: Path) -> Iterator[None]:
+    """Say of which run a file is that cannot be read, or does not fit the others."""
+    with in_file(str(run)), tables(str(run)):
+        yield
+
+
 def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     """Trajectories, the plan, and every how manyth record was read.
 
@@ -189,8 +202,8 @@ def _recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
     import polars as pl
 
     path = _kept(shared, run, layout.PLAN_FILE)
-    with damage_named(path.parent):
-        plan = Plan.from_json(path.read_text(encoding="utf-8"))
+    with _named(path.parent):
+        plan = Plan.from_json(_text(path))
     what = "complete trajectories of run"
     try:
         recorded = read_trajectories(shared.runs.kept.whole(run), most=REPLAY_ROWS)

@@ -6,6 +6,7 @@ number stands for one. ``weights`` and ``shares`` are relative everywhere: they 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from odscen.scenario.document.document_parts import Part
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 _Key = TypeVar("_Key")
 
@@ -49,7 +50,7 @@ class Uniform(Part):
 
     def draw(self, rng: np.random.Generator) -> float:
         """Draw a number."""
-        return float(rng.uniform(self.low, self.high))
+        return min(max(float(rng.uniform(self.low, self.high)), self.low), self.high)
 
 
 class Normal(Part):
@@ -88,7 +89,7 @@ class Choice(Part):
             if len(self.weights) != len(self.values):
                 msg = f"{len(self.values)} values but {len(self.weights)} weights"
                 raise ValueError(msg)
-            _check_total(self.weights)
+            check_weights(self.weights, what="weight")
         return self
 
     def draw(self, rng: np.random.Generator) -> float:
@@ -139,7 +140,9 @@ def drawn_range(distribution: Constant | Uniform | Normal | Choice) -> tuple[flo
 def draw_place(weights: Sequence[float], rng: np.random.Generator) -> int:
     """Draw an index by weight; at least one weight must be above 0."""
     total = np.cumsum(weights)
-    return int(np.searchsorted(total, rng.uniform(0.0, total[-1]), side="right"))
+    # What is drawn lies below the total, but may be rounded to it: then the last that counts.
+    last = np.searchsorted(total, total[-1])
+    return int(min(np.searchsorted(total, rng.uniform(0.0, total[-1]), side="right"), last))
 
 
 def draw_key(shares: Mapping[_Key, float], rng: np.random.Generator) -> _Key:
@@ -153,7 +156,12 @@ def _check_order(low: float, high: float) -> None:
         raise ValueError(msg)
 
 
-def _check_total(weights: tuple[float, ...]) -> None:
-    if sum(weights) <= 0:
-        msg = "at least one weight must be above 0"
+def check_weights(weights: Iterable[float], *, what: str) -> None:
+    """Raise ``ValueError`` if nothing can be drawn by these weights."""
+    total = sum(weights)
+    if total <= 0:
+        msg = f"at least one {what} must be above 0"
+        raise ValueError(msg)
+    if total == math.inf:
+        msg = f"the sum of the {what}s is no number; they are relative, smaller ones say the same"
         raise ValueError(msg)

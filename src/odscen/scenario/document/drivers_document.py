@@ -7,7 +7,11 @@ from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from odscen.scenario.document.distributions import WrittenDistribution, drawn_range
+from odscen.scenario.document.distributions import (
+    WrittenDistribution,
+    check_weights,
+    drawn_range,
+)
 from odscen.scenario.document.document_parts import Identifier, Label, Part
 from odscen.scenario.document.driver_parameters import DRIVER_PARAMETERS
 
@@ -89,6 +93,8 @@ class Drivers(Part):
             if style not in self.styles:
                 msg = f"shares name {style!r}, which is neither a driving style nor a driver set"
                 raise ValueError(msg)
+        if self.shares:
+            check_weights(self.shares.values(), what="share")
         return self
 
     @property

@@ -13,7 +13,13 @@ from pydantic import Field, ValidationError, field_validator
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.distributions import Constant, Distribution, Normal, Uniform
+from odscen.scenario.document.distributions import (
+    Constant,
+    Distribution,
+    Normal,
+    Uniform,
+    check_weights,
+)
 from odscen.scenario.document.document_parts import Label, Part
 from odscen.scenario.document.drivers_document import DrivingStyle
 from odscen.scenario.document.validation import validated, validation_problems
@@ -217,7 +223,5 @@ def loads_config(text: str, *, file: str | None = None) -> SamplingConfig:
 
 
 def _with_share(shares: dict[Any, float]) -> dict[Any, float]:
-    if sum(shares.values()) <= 0:
-        msg = "at least one share must be above 0"
-        raise ValueError(msg)
+    check_weights(shares.values(), what="share")
     return shares
