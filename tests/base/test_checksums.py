@@ -78,3 +78,14 @@ def test_what_an_earlier_version_wrote_has_no_seal_and_is_read(tmp_path):
     file = tmp_path / "state.json"
     file.write_text('{"version": 1, "a": 2}', encoding="utf-8")
     assert unsealed(file) == {"version": 1, "a": 2}
+
+
+def test_a_list_that_is_something_else_is_named_and_not_quoted(folder):
+    sums = folder / "SHA256SUMS"
+    sums.write_text("# " + '[{"a":' * 5000)
+    with pytest.raises(DamagedError) as refused:
+        read_sums(folder)
+    assert "SHA256SUMS: expected its own checksum in its last line, found sha256 " in str(
+        refused.value
+    )
+    assert len(str(refused.value)) < 500

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from odscen.base.shown import printable, shown, shown_id, visible
+from odscen.base.shown import printable, shown, shown_id, some_of, visible
 
 
 @pytest.mark.parametrize("plain", ["1", "-1", "road_7", "a.b/c:d", "x" * 60])
@@ -41,3 +41,8 @@ def test_messages_keep_their_lines_and_escape_what_cannot_be_seen() -> None:
     assert visible("a: \u202eb\n  - ä \x1b[31m\u200b\udcff 'c'\\") == (
         "a: \\u202eb\n  - ä \\x1b[31m\\u200b\\udcff 'c'\\"
     )
+
+
+def test_of_many_words_some_are_listed_and_the_others_counted():
+    assert some_of(["a", "b"]) == "a and b"
+    assert some_of([str(n) for n in range(20_001)], most=2) == "0 and 1 and 19,999 more"

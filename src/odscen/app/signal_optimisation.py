@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from odscen.workspace.store import Workspace
 
 
+_MOST_SATURATION = 100_000.0
+"""Vehicles an hour and lane: far more than any lane carries, and still a number to reckon with."""
+
+
 @dataclass(frozen=True, slots=True)
 class TimedSignals:
     """Lights timed by Webster's method.
@@ -167,8 +171,11 @@ def _refuse_settings(
     if not 0.0 < bounds[0] <= bounds[1]:
         msg = f"a shortest cycle of {bounds[0]:g} s and a longest of {bounds[1]:g} s: none is both"
         raise InputError(msg)
-    if not saturation > 0.0:
-        msg = f"a saturation flow of {saturation:g} vehicles an hour: it has to be positive"
+    if not 1.0 <= saturation <= _MOST_SATURATION:
+        msg = (
+            f"a saturation flow of {saturation:g} vehicles an hour: it has to be 1 to "
+            f"{_MOST_SATURATION:g}"
+        )
         raise InputError(msg)
 
 

@@ -89,8 +89,7 @@ def _temporary(parent: Path, prefix: str) -> Iterator[Path]:
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         with suppress(FileNotFoundError):  # cleared away before we had the lock
-            descriptor = os.open(folder, os.O_RDONLY)
-            fcntl.flock(descriptor, fcntl.LOCK_SH)
+            descriptor = _held(folder)
             if same_file(descriptor, folder):
                 break
             os.close(descriptor)
@@ -100,6 +99,30 @@ def _temporary(parent: Path, prefix: str) -> Iterator[Path]:
         with suppress(OSError):
             shutil.rmtree(folder)
         os.close(descriptor)
+        _delete_with_one_handle(folder)
+
+
+def _delete_with_one_handle(folder: Path) -> None:
+    """Delete what is left of a folder where files are open already, as many as may be."""
+    with suppress(OSError):
+        for path in [*sorted(folder.rglob("*"), reverse=True), folder]:
+            if path.is_dir() and not path.is_symlink():
+                path.rmdir()
+            else:
+                path.unlink(missing_ok=True)
+
+
+def _held(folder: Path) -> int:
+    """Take the lock of a folder that has just been made; it does not stay without one."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except FileNotFoundError:
+        raise
+    except OSError:
+        folder.rmdir()
+        raise
+    fcntl.flock(descriptor, fcntl.LOCK_SH)
+    return descriptor
 
 
 def _put(folder: Path, final: Path) -> None:

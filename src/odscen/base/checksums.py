@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SUMS_FILE = "SHA256SUMS"
 
 MISSING = "no such file"
+_DIGEST = re.compile(r"[0-9a-f]{64}")
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _SEAL = '"sha256": "'
 
@@ -86,7 +87,9 @@ def read_sums(folder: Path) -> dict[str, str] | None:
         raise _damaged_list(folder, "a list that can be read", str(error)) from error
     lines, mark, own = content.rpartition(b"# ")
     if not mark or own != f"{digest(lines)}\n".encode():
-        raise _damaged_list(folder, own.decode("ascii", "replace").strip(), digest(lines))
+        said = own.decode("ascii", "replace").strip()
+        expected = said if _DIGEST.fullmatch(said) else "its own checksum in its last line"
+        raise _damaged_list(folder, expected, digest(lines))
     found = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
     return {line[2]: line[1] for line in found if line}
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _PLAIN = re.compile(r"[\w+*#@./:-]+(?:,[\w+*#@./:-]+)*", re.ASCII)
 _LONGEST = 60
@@ -16,6 +20,13 @@ def shown(value: str | None) -> str:
     if value is None:
         return "nothing"
     return repr(value if len(value) <= _LONGEST else value[: _LONGEST - 3] + "...")
+
+
+def some_of(words: Sequence[str], *, most: int = 8) -> str:
+    """Some words as messages list them, with how many more there are."""
+    if len(words) <= most:
+        return " and ".join(words)
+    return f"{' and '.join(words[:most])} and {len(words) - most:,} more"
 
 
 def printable(text: str) -> str:

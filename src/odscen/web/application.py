@@ -29,6 +29,7 @@ from odscen.web import (
     signal_routes,
 )
 from odscen.web.error_answers import RESPONSES, add_error_handlers, error_response
+from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
 from odscen.web.security import LOOPBACK, MAX_UPLOAD, Guard
 from odscen.web.services import Services, Shared
@@ -71,6 +72,8 @@ def create_app(
     max_upload: int = MAX_UPLOAD,
     static: Path = STATIC,
     carla: Address = Address(),  # noqa: B008 - immutable
+    large: int = LARGE,
+    in_child: bool = False,
 ) -> FastAPI:
     """Make the server's application.
 
@@ -88,8 +91,12 @@ def create_app(
         Folder of the built front end.
     carla
         Where the CARLA server is that runs can be shown on, if there is one.
+    large
+        Bytes of a document from which on children work on it.
+    in_child
+        Whether this is a child of the server, which has asked already who may come in.
     """
-    shared = Services.of(workspace, carla)
+    shared = Services.of(workspace, carla, large=None if in_child else large)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -137,7 +144,8 @@ def create_app(
     else:
         app.get("/", include_in_schema=False)(lambda: HTMLResponse(_PLAIN))
     app.add_middleware(GZipMiddleware, compresslevel=5, exclude_content_types=_PACKED)
-    app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
+    if not in_child:
+        app.add_middleware(Guard, hosts=hosts, token=token, max_upload=max_upload)
     return app
 
 

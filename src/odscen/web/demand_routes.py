@@ -10,11 +10,12 @@ from odscen.app import demands
 from odscen.base.errors import InputError
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import DayMade, EntryPlace, ScenarioState, Version, WholeDay
 from odscen.web.scenario_routes import state_of
 from odscen.web.services import Shared
 
-router = APIRouter(prefix="/api/scenarios/{name}/demand")
+router = APIRouter(prefix="/api/scenarios/{name}/demand", route_class=LargeDocumentRoute)
 
 _WORDS = {
     "od": "trips",

@@ -17,17 +17,17 @@ from odscen.app.removal import remove
 from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import (
     ConflictError,
-    InputError,
     NotFoundError,
     ScenarioError,
 )
+from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.scenario.document.json_form import dumps
 from odscen.web import history
 from odscen.web.history import History
 from odscen.web.messages import ScenarioRow
-from odscen.workspace.store import check_name
+from odscen.workspace.store import check_name, is_name
 from odscen.workspace.wastebasket import HISTORY, Wastebasket
 
 if TYPE_CHECKING:
@@ -35,8 +35,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.web.large.large_documents import LargeDocuments
     from odscen.workspace.store import Workspace
     from odscen.workspace.wastebasket import RemovedItem
+
+
+_PATIENCE = 30.0
+"""Wall seconds that a new scenario waits for another one, of another process, to be written."""
+_FileState = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +55,18 @@ class Draft:
 
 
 class Drafts:
-    """All scenarios of a workspace; one change at a time."""
+    """All scenarios of a workspace; one change at a time.
 
-    def __init__(self, workspace: Workspace) -> None:
+    Parameters
+    ----------
+    large
+        Children that read large ones for the list; ``None`` to read all here.
+    """
+
+    def __init__(self, workspace: Workspace, large: LargeDocuments | None = None) -> None:
         self._workspace = workspace
+        self._large = large
+        self._rows: dict[str, tuple[_FileState, ScenarioRow]] = {}
         self._folder = workspace.scenarios
         self._lock = threading.RLock()
         self._open: dict[str, Draft] = {}
@@ -60,8 +74,25 @@ class Drafts:
     def rows(self) -> list[ScenarioRow]:
         """All scenarios, those changed last first."""
         files = self._folder.glob(f"*{SUFFIX}") if self._folder.is_dir() else ()
-        rows = [self._row(path) for path in files if _is_name(path.name.removesuffix(SUFFIX))]
+        names = [path.name.removesuffix(SUFFIX) for path in files]
+        rows = []
+        for name in filter(is_name, names):
+            with suppress(FileNotFoundError, NotFoundError):  # just removed
+                rows.append(self.row(name))
         return sorted(rows, key=lambda row: (-row.modified, row.name))
+
+    def row(self, name: str) -> ScenarioRow:
+        """What the list says of a scenario; known until its file changes."""
+        state = _file_state(self._path(name))
+        known = self._rows.get(name)
+        if known is not None and known[0] == state:
+            return known[1]
+        if self._large is not None and self._large.is_large(name):
+            row = ScenarioRow(**self._large.row_of(name))
+        else:
+            row = self._row(name)
+        self._rows[name] = state, row
+        return row
 
     def get(self, name: str) -> Draft:
         """One scenario; a file that another program has changed is read again.
@@ -93,10 +124,11 @@ class Drafts:
         ConflictError
             If the name is taken.
         """
-        with self._lock, disk_errors("scenarios"):
+        text = dumps(scenario)
+        alone = locked(self._folder / HISTORY, what="the list of scenarios", patience=_PATIENCE)
+        with self._lock, disk_errors("scenarios"), alone:
             name = self._free_name(stem) if name is None else check_name(name, what="scenario")
             self._refuse_taken(name)
-            text = dumps(scenario)
             begun = history.first(text, self._history(name), label=label)
             write_text(self._path(name), text)
             self._open[name] = Draft(name, scenario, begun)
@@ -192,9 +224,8 @@ class Drafts:
             raise ConflictError(msg, current=current)
         return draft
 
-    def _row(self, path: Path) -> ScenarioRow:
-        name = path.name.removesuffix(SUFFIX)
-        modified = path.stat().st_mtime
+    def _row(self, name: str) -> ScenarioRow:
+        modified = self._path(name).stat().st_mtime
         try:
             draft = self.get(name)
         except ScenarioError as error:
@@ -228,9 +259,7 @@ class Drafts:
         return self._folder / HISTORY / check_name(name, what="scenario")
 
 
-def _is_name(name: str) -> bool:
-    try:
-        check_name(name)
-    except InputError:
-        return False
-    return True
+def _file_state(path: Path) -> _FileState:
+    """What changes with a file."""
+    stat = path.stat()
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns

@@ -26,6 +26,7 @@ from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.runner.network_fit import place_fit
 from odscen.web.edit_messages import EditRequest, apply_edit
+from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import (
     CopyName,
     Goals,
@@ -40,14 +41,13 @@ from odscen.web.messages import (
 )
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.media_types import Responses
-from odscen.workspace.guarded_build import read_scenario_in_child
 from odscen.workspace.store import check_name, name_from_file
 
 if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region
     from odscen.web.drafts import Draft
 
-router = APIRouter(prefix="/api/scenarios")
+router = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
 
 _FILE: Responses = {
     200: {
@@ -85,8 +85,7 @@ def upload(
 ) -> ScenarioState:
     """Add a scenario from a file."""
     given = (file.filename or "scenario").removesuffix(SUFFIX)
-    with shared.reading():
-        scenario = read_scenario_in_child(file.file.read(), file=file.filename)
+    scenario = shared.read_upload(file.file.read(), file=file.filename)
     from pathlib import Path as FilePath
 
     stem = name_from_file(FilePath(given))

@@ -15,11 +15,14 @@ from starlette.requests import HTTPConnection
 
 from odscen.app.maps import LoadedMap, map_of
 from odscen.base.errors import ConflictError
+from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region
 from odscen.web.active_runs import Runs
 from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
+from odscen.web.large.large_documents import LARGE, LargeDocuments
+from odscen.workspace.guarded_build import read_scenario_in_child
 from odscen.workspace.store import Workspace
 
 if TYPE_CHECKING:
@@ -38,6 +41,8 @@ class Services:
     ----------
     search
         Held while a path is searched: a region remembers its last search.
+    large
+        Children for large documents; ``None`` in a child.
     """
 
     workspace: Workspace
@@ -45,29 +50,43 @@ class Services:
     jobs: Jobs
     runs: Runs
     carla: CarlaServer
+    large: LargeDocuments | None
     search: threading.Lock = field(default_factory=threading.Lock)
     _readers: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(max(2, os.cpu_count() or 1))
     )
 
     @classmethod
-    def of(cls, workspace: Workspace, carla: Address) -> Services:
-        """Make them for a workspace and the address of a CARLA server, there or not."""
-        return cls(workspace, Drafts(workspace), Jobs(), Runs(workspace, carla), CarlaServer(carla))
+    def of(cls, workspace: Workspace, carla: Address, *, large: int | None = LARGE) -> Services:
+        """Make them for a workspace and the address of a CARLA server, there or not.
+
+        ``large`` is that of a document, bytes; ``None`` in a child.
+        """
+        children = None if large is None else LargeDocuments(workspace, large=large)
+        drafts, runs = Drafts(workspace, children), Runs(workspace, carla)
+        return cls(workspace, drafts, Jobs(), runs, CarlaServer(carla), children)
 
     def map_of(self, scenario: Scenario) -> LoadedMap:
         """Map that a scenario was made on, loaded."""
         return map_of(self.workspace, scenario)
 
-    @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Take a place among those whose upload is read: one for each core, and two at least.
+    def read_upload(self, content: bytes, *, file: str | None) -> Scenario:
+        """Read a scenario from outside, in a child: one for each core, and two at least.
 
         Raises
         ------
+        ScenarioError
+            If it is none.
         ConflictError
             If none becomes free soon. Whoever waits holds a thread that others need.
         """
+        if self.large is None:  # this is a child
+            return read_any(content, file=file)
+        with self._reading():
+            return read_scenario_in_child(content, file=file)
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
         if not self._readers.acquire(timeout=_WAIT):
             msg = "the server is reading other uploads; try again in a minute"
             raise ConflictError(msg)

@@ -21,6 +21,7 @@ from odscen.results.report.stage_diagrams import JunctionPictures, detector_labe
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_calls, read_light_states
+from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Services, Shared
 from odscen.web.wire.signal_messages import (
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from odscen.results.records.light_programs import LightProgram, ShownPlan
     from odscen.scenario.document.scenario_document import Scenario
 
-router = APIRouter(prefix="/api")
+router = APIRouter(prefix="/api", route_class=LargeDocumentRoute)
 
 _WIDTH = 384.0
 """Pixels of a time bar."""

@@ -28,6 +28,10 @@ DOCUMENT_MEMORY_PER_BYTE = 12
 """Bytes of memory for a document, and for each byte of it."""
 DOCUMENT_SECONDS = 10.0
 DOCUMENT_SECONDS_PER_MEGABYTE = 1.0
+LARGE_MEMORY_PER_BYTE = 36
+LARGE_SECONDS_PER_MEGABYTE = 4.0
+"""The same for a scenario that is checked, shown and written, too; 30 MB with 200,000 actors and as
+many problems need XX GB and XX s."""
 _FILE_SHARE = 4
 """A file that is written may have this part of the memory."""
 _PATIENCE = 6.0
@@ -155,6 +159,14 @@ def for_document(size: int) -> Allowance:
     return Allowance(
         min(MOST_MEMORY, DOCUMENT_MEMORY + DOCUMENT_MEMORY_PER_BYTE * size),
         DOCUMENT_SECONDS + DOCUMENT_SECONDS_PER_MEGABYTE * size / 1e6,
+    )
+
+
+def for_large_document(size: int) -> Allowance:
+    """What working on a scenario of so many bytes may use: to read, edit, check and write it."""
+    return Allowance(
+        DOCUMENT_MEMORY + LARGE_MEMORY_PER_BYTE * size,
+        DOCUMENT_SECONDS + LARGE_SECONDS_PER_MEGABYTE * size / 1e6,
     )
 
 

@@ -53,13 +53,14 @@ def work_in_child(
     folders: tuple[Path, ...],
     allowance: Allowance,
     progress: Callable[[str, float], None] | None = None,
-) -> None:
-    """Do a job of :mod:`odscen.workspace.child_jobs` in a child process.
+) -> dict[str, Any]:
+    """Do a job in a child process.
 
     Parameters
     ----------
     name
-        Of the job.
+        Of a job of :mod:`odscen.workspace.child_jobs`, or of a function elsewhere, as
+        ``module:function``.
     what
         What is done, for messages, such as "building the map".
     arguments
@@ -70,6 +71,11 @@ def work_in_child(
     progress
         Called with what is done and the share done, again and again while nothing changes too.
         What it raises ends the work, and passes through.
+
+    Returns
+    -------
+    dict
+        What the job returns.
 
     Raises
     ------
@@ -102,6 +108,8 @@ def work_in_child(
     else:
         child.end()
     _raise_for(answer, what, allowance)
+    done: dict[str, Any] = answer["done"]
+    return done
 
 
 def keep_ready() -> None:

@@ -60,6 +60,11 @@ def check_name(name: str, *, what: str = "map") -> str:
     return name
 
 
+def is_name(name: str) -> bool:
+    """Whether :func:`check_name` takes it."""
+    return _NAME.fullmatch(name) is not None
+
+
 def name_from_file(path: Path) -> str:
     """Map name for a file: its stem, with everything unusual replaced by ``_``."""
     return plain_name(path.stem) or "map"

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from odscen.base.shown import some_of
 from odscen.scenario.checks.input_checks import input_problems
 from odscen.scenario.checks.window_checks import foot_problems, window_problems
 from odscen.scenario.demand.count_stations import contradictions, transitions
@@ -165,7 +166,7 @@ def _slice_problems(counts: Counts, where: str) -> Iterator[Problem]:
         rows[place, start].append(index)
     for (place, start), given in rows.items():
         if len(given) > 1:
-            listed = " and ".join(f"{counts.rows[index][3]:g}" for index in given)
+            listed = some_of([f"{counts.rows[index][3]:g}" for index in given])
             message = (
                 f"{place.replace(PLACE_SEPARATOR, ' > ')} from {start:g} s on was counted "
                 f"{len(given)} times: {listed}; keep one"

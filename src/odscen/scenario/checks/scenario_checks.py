@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING
 
+from odscen.base.shown import some_of
 from odscen.lanegraph.query import is_connected
 from odscen.scenario.checks.actor_checks import (
     AssetLookup,
@@ -111,7 +112,7 @@ def shared_nodes(scenario: Scenario) -> Iterator[Problem]:
             users[one.spawn].append((f"{kind}[{index}].spawn", one.id))
     for node, sharing in users.items():
         if len(sharing) > 1:
-            names = " and ".join(repr(name) for _, name in sharing)
+            names = some_of([repr(name) for _, name in sharing])
             message = f"{names} start on the same node {node!r}; move all but one"
             yield error("node_taken", sharing[-1][0], message, nodes=[node])
 

@@ -1,0 +1,1 @@
+"""Large scenarios: children of the server that answer requests about them."""
