@@ -46,12 +46,15 @@ def test_removing_a_map_says_what_was_made_on_it_by_name_or_by_content(
     (own.scenarios / "broken.scenario.json").write_text('{"map": [')
     (own.scenarios / "odd.scenario.json").write_text('{"map": {"name": [], "sha256": {}}}')
     (own.scenarios / "other.scenario.json").write_text('{"map": {"name": "other"}}')
+    (own.scenarios / "late.scenario.json").write_text(
+        json.dumps({"description": "x" * 100_000, "map": {"name": name}})
+    )
     live = long_run(own, "one-1", about={"map": "a former name", "map_sha256": sha256})
     long_run(own, "one-2", about={"map": name})
     long_run(own, "other-1", about={"map": "other"})
     with locked(live, what="run"):
         found = removal_facts(own, "map", name)
-        assert found == RemovalFacts("map", name, scenarios=1, runs=2, live=1)
+        assert found == RemovalFacts("map", name, scenarios=2, runs=2, live=1)
         assert removal_facts(own, "scenario", "one").live == 1
         with pytest.raises(ConflictError, match="running in another process"):
             remove(own, "run", "one-1")

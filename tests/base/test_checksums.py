@@ -89,3 +89,13 @@ def test_a_list_that_is_something_else_is_named_and_not_quoted(folder):
         refused.value
     )
     assert len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize(
+    "content", [b'{"version": 2,\0\0\0\0}', b'{"version": 2}', b"[" * 100_000, b"[]", b""]
+)
+def test_a_sealed_object_that_has_lost_its_seal_is_damaged(tmp_path, content):
+    file = tmp_path / "status.json"
+    file.write_bytes(content)
+    with pytest.raises(DamagedError, match="expected its own checksum in its last line, found"):
+        unsealed(file)

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from odscen.workspace.wastebasket import RemovedItem, RemovedKind
 
 
+_EARLY = 1 << 16
+"""Characters of a scenario in which its map is looked for before all of it is read."""
+_DECODER = json.JSONDecoder()
+_FIRST, _COLON, _COMMA = (re.compile(rf"\s*{sign}\s*") for sign in "{:,")
+
+
 class KnownRun(NamedTuple):
     """What is known of a run; ``live`` while processes work on it."""
 
@@ -149,8 +155,32 @@ def _scenario_files(workspace: Workspace) -> dict[str, Path]:
 
 def _map_of(scenario: Path) -> set[str]:
     """Name and hash of the map that a scenario's file names."""
-    found = _json(scenario).get("map")
+    found = _early(scenario, "map") or _json(scenario).get("map")
     return _texts(found.get("name"), found.get("sha256")) if isinstance(found, dict) else set()
+
+
+def _after(sign: re.Pattern[str], text: str, place: int) -> int:
+    """Where a sign that is at a place ends; ``ValueError`` if it is not there."""
+    found = sign.match(text, place)
+    if found is None:
+        raise ValueError(sign.pattern)
+    return found.end()
+
+
+def _early(path: Path, key: str) -> object:
+    """A field of an object that comes early in a large file; ``None`` if it does not."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            text = file.read(_EARLY)
+        place = _after(_FIRST, text, 0)
+        while True:
+            name, place = _DECODER.raw_decode(text, place)
+            value, place = _DECODER.raw_decode(text, _after(_COLON, text, place))
+            if name == key:
+                return value
+            place = _after(_COMMA, text, place)
+    except (OSError, ValueError, RecursionError):
+        return None
 
 
 def _texts(*values: object) -> set[str]:

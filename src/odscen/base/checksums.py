@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SUMS_FILE = "SHA256SUMS"
 
 MISSING = "no such file"
+_OWN = "its own checksum in its last line"
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _SEAL = '"sha256": "'
@@ -84,12 +85,10 @@ def read_sums(folder: Path) -> dict[str, str] | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        raise _damaged_list(folder, "a list that can be read", str(error)) from error
+        raise _damaged(folder / SUMS_FILE, "a list that can be read", str(error)) from error
     lines, mark, own = content.rpartition(b"# ")
     if not mark or own != f"{digest(lines)}\n".encode():
-        said = own.decode("ascii", "replace").strip()
-        expected = said if _DIGEST.fullmatch(said) else "its own checksum in its last line"
-        raise _damaged_list(folder, expected, digest(lines))
+        raise _damaged(folder / SUMS_FILE, _expected(own.strip()), digest(lines))
     found = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
     return {line[2]: line[1] for line in found if line}
 
@@ -167,22 +166,29 @@ def unsealed(path: Path) -> dict[str, Any]:
     ------
     DamagedError
         If it is not as it was written.
-    ValueError, OSError
-        If it cannot be read as an object of JSON.
+    OSError
+        If it cannot be read.
     """
     content = path.read_bytes()
     head, mark, own = content.rpartition(_SEAL.encode())
     found = digest(head + mark)
     if mark and own != f'{found}"\n}}\n'.encode():
-        wrong = DamagedFile(path.name, own.decode("ascii", "replace")[:64], found)
-        raise DamagedError(str(path.parent), [wrong])
-    data = json.loads(content)
+        raise _damaged(path, _expected(own[:64]), found)
+    try:
+        data = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise _damaged(path, _OWN, "something that is no JSON") from error
     if not isinstance(data, dict) or (not mark and data.get("version") != 1):
-        msg = f"{path.name} has lost its checksum"
-        raise ValueError(msg)
+        raise _damaged(path, _OWN, "none")
     data.pop("sha256", None)
     return data
 
 
-def _damaged_list(folder: Path, expected: str, found: str) -> DamagedError:
-    return DamagedError(str(folder), [DamagedFile(SUMS_FILE, expected, found)])
+def _expected(own: bytes) -> str:
+    """The checksum that a file says of itself, if it is one."""
+    said = own.decode("ascii", "replace")
+    return said if _DIGEST.fullmatch(said) else _OWN
+
+
+def _damaged(path: Path, expected: str, found: str) -> DamagedError:
+    return DamagedError(str(path.parent), [DamagedFile(path.name, expected, found)])
