@@ -80,7 +80,16 @@ def measure(
                 yield _while(address, f"{uploads} slow uploads", lambda: time.sleep(seconds))
             scenario = path.name.removesuffix(SUFFIX)
             yield _while(address, f"{runs} runs at once", lambda: _runs(address, scenario, runs))
-            yield _while(address, f"a scenario of {actors:,} actors", lambda: _take(address, crowd))
+            label = f"a scenario of {actors:,} actors: "
+            for what, work in _steps(address, crowd):
+                yield _while(address, label + what, work)
+            with ExitStack() as stack:
+                for number in range(connections):
+                    stack.enter_context(_connection(address, finished=number % 2 == 0))
+                stack.enter_context(_slow_uploads(address, uploads))
+                yield _while(
+                    address, "all of it at once", lambda: _at_once(address, crowd, scenario, runs)
+                )
 
 
 def _while(address: str, load: str, work: Callable[[], None]) -> Row:
@@ -206,16 +215,45 @@ def _crowd(path: Path, count: int) -> bytes:
     return dumps(scenario.model_copy(update={"name": "crowd", "actors": actors})).encode()
 
 
-def _take(address: str, document: bytes) -> None:
-    """Upload a scenario, list it, and have it shown and changed."""
+def _steps(
+    address: str, document: bytes, *, name: str = "crowd"
+) -> Iterator[tuple[str, Callable[[], None]]]:
+    """What people do with a scenario, one after the other; each is made when its turn comes."""
     kind = "multipart/form-data; boundary=b"
     form = b'--b\r\nContent-Disposition: form-data; name="%s"%s\r\n\r\n%s\r\n'
-    body = form % (b"file", b'; filename="crowd.json"', document) + form % (b"name", b"", b"crowd")
-    taken = _call(address, "POST", "/api/scenarios/upload", body + b"--b--", kind)
-    if taken != 201:
-        msg = f"the scenario was not taken: {taken}"
-        raise RuntimeError(msg)
-    for path in ("/api/scenarios", "/api/scenarios/crowd"):
-        _call(address, "GET", path)
-    edit = {"version": 1, "edits": [{"kind": "set_seed", "seed": 5}]}
-    _call(address, "POST", "/api/scenarios/crowd/edits", json.dumps(edit).encode())
+    body = form % (b"file", b'; filename="crowd.json"', document)
+    body += form % (b"name", b"", name.encode()) + b"--b--"
+    own = f"/api/scenarios/{name}"
+
+    def done(status: int, method: str, path: str, *content: object) -> Callable[[], None]:
+        def work() -> None:
+            found = _call(address, method, path, *content)  # type: ignore[arg-type]
+            if found != status:
+                msg = f"{method} {path} was answered with {found}"
+                raise RuntimeError(msg)
+
+        return work
+
+    edit = {"version": 1, "edits": [{"kind": "set_seed", "seed": 6}]}
+    yield "uploaded, checked", done(201, "POST", "/api/scenarios/upload", body, kind)
+    yield "listed", done(200, "GET", "/api/scenarios")
+    yield "opened, checked", done(200, "GET", own)
+    yield "edited, checked", done(200, "POST", f"{own}/edits", json.dumps(edit).encode())
+    yield "undone", done(200, "POST", f"{own}/undo", b'{"version": 2}')
+    yield "downloaded", done(200, "GET", f"{own}/download")
+    yield "its map asked after", done(200, "GET", f"/api/maps/{MAP}/removal")
+
+
+def _at_once(address: str, document: bytes, scenario: str, runs: int) -> None:
+    """Runs, and all that is done with a large scenario, while others do the same."""
+
+    def use() -> None:
+        for _, work in _steps(address, document, name="more"):
+            work()
+
+    using = threading.Thread(target=use)
+    using.start()
+    try:
+        _runs(address, scenario, runs)
+    finally:
+        using.join()

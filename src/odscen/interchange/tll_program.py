@@ -18,6 +18,7 @@ from odscen.interchange.tll_stages import (
     first_stage_at,
     green_phase,
     joined_steps,
+    refuse_repeated,
     shown_need,
 )
 from odscen.scenario.document.signals_document import JunctionTiming
@@ -278,7 +279,8 @@ class _Taking:
                 "fixed",
             )
             changed = False
-            for plan, cycle in zip(program.plans(), self._cycles, strict=True):
+            for taken, plan, cycle in zip(self._plans, program.plans(), self._cycles, strict=True):
+                refuse_repeated(taken.program.place, cycle, known=len(plan.stages))
                 following = (*plan.stages[1:], plan.stages[0])
                 for one, other, shown in zip(plan.stages, following, cycle, strict=True):
                     beginning = sorted(beginning_groups(one, other))

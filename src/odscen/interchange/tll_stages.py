@@ -191,3 +191,18 @@ def _leads_to(program: FileProgram, order: Sequence[int], at: int, stage: int) -
         if _begins(states[now - 1], states[now]):
             return order[now] == stage
     return False
+
+
+def refuse_repeated(place: str, cycle: Sequence[FileStage], *, known: int) -> None:
+    """Refuse a cycle that has a stage twice: of its stages a plan has each once, ``known`` then.
+
+    Raises
+    ------
+    InputError
+        Names the stage and the program.
+    """
+    if len(cycle) != known:
+        ids = [stage.id for stage in cycle]
+        twice = next((one for one in ids if ids.count(one) > 1), "")
+        msg = f"{place}: stage {twice!r} comes twice in a cycle; a plan has each stage once"
+        raise InputError(msg)
