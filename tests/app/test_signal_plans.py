@@ -195,6 +195,19 @@ def test_what_is_no_program_of_this_light_is_refused_with_its_place(
     assert "own.tll.xml" in str(raised.value)
 
 
+def test_a_tllogic_that_shows_a_stage_twice_in_a_cycle_is_refused(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    first, yellow, red, second, end = NETS
+    once = [(20.0, first[:20] + "rrrr"), (3.0, yellow), (5.0, red)]
+    once += [(20.0, second), (3.0, end), (5.0, red)]
+    with pytest.raises(InputError, match="comes twice in a cycle") as raised:
+        import_signals(
+            workspace, placed(workspace, scenario(None)), written(tmp_path, [*once, *once])
+        )
+    assert "J10001" in str(raised.value)
+
+
 def test_a_tllogic_with_conflicting_greens_is_refused_with_both_movements(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -22,11 +22,11 @@ def shown(value: str | None) -> str:
     return repr(value if len(value) <= _LONGEST else value[: _LONGEST - 3] + "...")
 
 
-def some_of(words: Sequence[str], *, most: int = 8) -> str:
+def some_of(words: Sequence[str], *, most: int = 8, between: str = " and ") -> str:
     """Some words as messages list them, with how many more there are."""
     if len(words) <= most:
-        return " and ".join(words)
-    return f"{' and '.join(words[:most])} and {len(words) - most:,} more"
+        return between.join(words)
+    return f"{between.join(words[:most])} and {len(words) - most:,} more"
 
 
 def printable(text: str) -> str:

@@ -112,7 +112,7 @@ class LiveView:
         live, plan = self._run.live, self._run.plan
         if plan is not None and not self._greeted:
             self._greeted = True
-            await self._socket.send_text(_hello(plan))
+            await self._socket.send_text(await asyncio.to_thread(_hello, plan))
         state = LiveState(state=self._run.state, speed=live.pace.speed)
         if state != self._said:
             self._said = state
@@ -158,7 +158,7 @@ def _hello(plan: Plan) -> str:
     """Introduce every road user that will ever be in a frame.
 
     A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
-    tens of thousands of actors, and the server does nothing else meanwhile.
+    tens of thousands of actors.
     """
     names = [name for name in LiveActor.model_fields if name != "index"]
     hello = {

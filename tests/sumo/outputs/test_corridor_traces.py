@@ -109,6 +109,9 @@ def test_junctions_between_named_segments_are_found_and_gaps_are_refused() -> No
         corridor_along(graph, [roads[0], roads[-1]])
     with pytest.raises(NotFoundError):
         corridor_along(graph, ["r27", "r9999"])
+    with pytest.raises(InputError) as long:
+        corridor_along(graph, [roads[0], roads[-1]] * 1000)
+    assert len(str(long.value)) < 500
 
 
 def test_a_run_without_trajectories_has_no_diagram(tmp_path: Path) -> None:

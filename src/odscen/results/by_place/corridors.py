@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.base.shown import some_of
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.query import segment_rows
 from odscen.lanegraph.shortest_paths import Router
@@ -192,7 +193,8 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
     path = _shortest(graph, names[0], names[-1], mask)
     if path is None or list(_passed(graph, path)) != names:
         msg = (
-            f"one cannot drive along {', '.join(names)} in this order; --from and --to find a route"
+            f"one cannot drive along {some_of(names, most=20, between=', ')} in this order; "
+            "--from and --to find a route"
         )
         raise InputError(msg)
     return _measured(graph, names, path)
