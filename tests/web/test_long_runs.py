@@ -21,7 +21,11 @@ WISH = {"until": HOURS * 3600, "step_length": 1.0, "every": 10}
 
 @pytest.fixture
 def busy(client: TestClient) -> str:
-    """A scenario with somebody on the road for hours."""
+    return made_busy(client)
+
+
+def made_busy(client: TestClient) -> str:
+    """Make a scenario with somebody on the road for hours; its name."""
     client.post("/api/scenarios", json={"map": CROSSING, "name": "busy"})
     segments = ["j10001", "r1", "r2", "r3", "r4"]
     edits = [

@@ -6,9 +6,9 @@ import itertools
 import re
 import shutil
 import threading
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -29,6 +29,8 @@ from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import Command, Failed, Pace
 from odscen.sumo.worker.snapshots import origin
 from odscen.web.kept_runs import KeptRuns
+from odscen.web.large.large_runs import LargeRun
+from odscen.web.live_view import Active
 from odscen.web.wire.run_messages import RunForecast, RunInfo, RunProgress, RunState
 
 if TYPE_CHECKING:
@@ -46,54 +48,6 @@ MOST = 8
 """Runs that can go on at a time."""
 PATIENCE = 5.0
 """Wall seconds that runs have for their end when the server ends."""
-
-
-@dataclass(slots=True, eq=False)
-class Active:
-    """A run that this server has started.
-
-    Attributes
-    ----------
-    plan
-        What is to happen; ``None`` while it is prepared.
-    carla
-        Whether a CARLA server shows it too.
-    interrupted
-        Whether its user has interrupted it, to go on later.
-    """
-
-    id: str
-    scenario: Scenario
-    live: Live
-    plan: Plan | None = None
-    finishing: bool = False
-    carla: bool = False
-    interrupted: bool = False
-    error: str | None = None
-    ended: RunState | None = None
-    future: Future[None] = field(default_factory=Future)
-
-    @property
-    def state(self) -> RunState:
-        """What it does now."""
-        if self.ended is not None:
-            return self.ended
-        if self.finishing or self.live.ended:
-            return "finishing"
-        if self.live.progress is None and self.live.picture.number == 0:
-            return "preparing"
-        return "paused" if self.live.pace.paused else "running"
-
-    @property
-    def long(self) -> bool:
-        """Whether it goes in slices, and can be interrupted."""
-        return self.plan is not None and self.plan.slice_length is not None
-
-    def end(self, state: RunState, error: str | None = None) -> None:
-        """Say how it has ended."""
-        self.error = error
-        self.ended = state
-        self.live.wake()
 
 
 class Runs:
@@ -137,6 +91,30 @@ class Runs:
         )
         return active.id
 
+    def start_large(self, name: str, wish: NewRun) -> str:
+        """Start a run of a large scenario, all of it in a process of its own; parameters as above.
+
+        Raises
+        ------
+        ScenarioError, ConflictError
+            As :meth:`start`.
+        """
+        with self._lock:
+            self._refuse_more()
+        live = Live(Pace(paused=wish.paused, speed=wish.speed))
+        file = self._workspace.scenarios / f"{name}{SUFFIX}"
+        large = LargeRun(self._workspace, file, name=name, settings=_settings(wish), live=live)
+        try:
+            with self._lock:
+                self._refuse_more()
+                active = Active(self._free_id(name), large.scenario, live, forget=large.forget)
+                self._active[active.id] = active
+        except ConflictError:
+            large.end()
+            raise
+        active.future = self._pool.submit(self._run, active, lambda: self._follow(active, large))
+        return active.id
+
     def resume(self, run: str, wish: GoOn) -> None:
         """Go on with an interrupted run.
 
@@ -155,7 +133,10 @@ class Runs:
         plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
         with self._lock:
             self._refuse_more()
-            active = Active(run, scenario, Live(Pace(speed=wish.speed)), plan=plan)
+            active = Active(run, scenario, Live(Pace(speed=wish.speed)))
+            active.prepared(plan)
+            if (before := self._active.get(run)) is not None:
+                before.forget()
             self._active[run] = active
         active.future = self._pool.submit(self._run, active, lambda: self._resume_run(active))
 
@@ -269,6 +250,8 @@ class Runs:
                 msg = f"run {run!r} is under way; stop it first"
                 raise ConflictError(msg)
             self._active.pop(run, None)
+        if active is not None:
+            active.forget()
         if active is not None and not (self._workspace.runs / run).exists():
             return None
         self.kept.folder(run)
@@ -297,6 +280,10 @@ class Runs:
                 one.future.exception(timeout=PATIENCE)
             except TimeoutError:
                 one.live.kill()
+        with self._lock:
+            known = list(self._active.values())
+        for one in known:
+            one.forget()
 
     def _run(self, active: Active, simulate: Callable[[], tuple[RunState, str | None]]) -> None:
         try:
@@ -313,8 +300,7 @@ class Runs:
         self, active: Active, run: CheckedRun, wish: NewRun
     ) -> tuple[RunState, str | None]:
         prepared = prepare_run(run)
-        active.plan = prepared.plan
-        active.live.wake()
+        active.prepared(prepared.plan)
         if wish.carla:
             return self._mirror(active, prepared.plan, run.settings, wish)
 
@@ -322,6 +308,20 @@ class Runs:
             active.finishing = True
 
         return _end_of(carry_out(run, prepared, ended=ended, live=active.live), active)
+
+    def _follow(self, active: Active, large: LargeRun) -> tuple[RunState, str | None]:
+        def prepared(slice_length: float | None) -> None:
+            active.introduction, active.slice_length = large.introduction, slice_length
+            active.live.wake()
+
+        def ended() -> None:
+            active.finishing = True
+
+        failed = large.follow(active.id, prepared=prepared, ended=ended)
+        if failed is not None:
+            return "failed", failed
+        info = self.kept.info(active.id)
+        return info.state, None if active.interrupted else info.error
 
     def _resume_run(self, active: Active) -> tuple[RunState, str | None]:
         folder = self._workspace.runs / active.id

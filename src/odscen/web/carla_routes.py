@@ -11,7 +11,7 @@ from starlette.responses import Response, StreamingResponse
 
 from odscen.base.errors import NotFoundError
 from odscen.sumo.folder import layout
-from odscen.web.active_runs import Active
+from odscen.web.live_view import Active
 from odscen.web.messages import CarlaInfo
 from odscen.web.run_routes import page_of_run
 from odscen.web.services import Shared

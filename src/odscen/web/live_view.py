@@ -1,4 +1,4 @@
-"""The live view of a run over a WebSocket.
+"""A run that goes on, and the live view of it over a WebSocket.
 
 What is sent follows the client: after each frame the server waits for any text, and meanwhile
 newer frames take the place of older ones. A client that never answers is sent one frame, and costs
@@ -8,33 +8,96 @@ nothing more.
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
-import orjson
 from starlette.websockets import WebSocketDisconnect
 
-from odscen.sumo.worker.snapshots import origin
 from odscen.web.wire.live_messages import (
-    LiveActor,
     LiveDetectors,
     LiveEnd,
     LiveIncidents,
     LiveLights,
     LiveState,
+    introduction,
 )
 from odscen.web.wire.run_messages import IncidentInfo
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from starlette.websockets import WebSocket
 
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.runner.live_run import LivePicture
-    from odscen.web.active_runs import Active
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.runner.live_run import Live, LivePicture
     from odscen.web.messages import Answer
+    from odscen.web.wire.run_messages import RunState
 
 GRACE = 5.0
 """Wall seconds after the end of a run in which a client may still ask for the last frame."""
+
+
+@dataclass(slots=True, eq=False)
+class Active:
+    """A run that this server has started.
+
+    Attributes
+    ----------
+    introduction
+        Makes the text that introduces all road users to a watcher; ``None`` while it is prepared.
+    slice_length
+        Seconds, of a long run.
+    forget
+        Called when no one can watch it any more.
+    carla
+        Whether a CARLA server shows it too.
+    interrupted
+        Whether its user has interrupted it, to go on later.
+    """
+
+    id: str
+    scenario: Scenario
+    live: Live
+    introduction: Callable[[], str] | None = None
+    slice_length: float | None = None
+    forget: Callable[[], None] = lambda: None
+    finishing: bool = False
+    carla: bool = False
+    interrupted: bool = False
+    error: str | None = None
+    ended: RunState | None = None
+    future: Future[None] = field(default_factory=Future)
+
+    @property
+    def state(self) -> RunState:
+        """What it does now."""
+        if self.ended is not None:
+            return self.ended
+        if self.finishing or self.live.ended:
+            return "finishing"
+        if self.live.progress is None and self.live.picture.number == 0:
+            return "preparing"
+        return "paused" if self.live.pace.paused else "running"
+
+    @property
+    def long(self) -> bool:
+        """Whether it goes in slices, and can be interrupted."""
+        return self.slice_length is not None
+
+    def prepared(self, plan: Plan) -> None:
+        """Say what is to happen."""
+        self.introduction, self.slice_length = partial(introduction, plan), plan.slice_length
+        self.live.wake()
+
+    def end(self, state: RunState, error: str | None = None) -> None:
+        """Say how it has ended."""
+        self.error = error
+        self.ended = state
+        self.live.wake()
 
 
 class LiveView:
@@ -109,10 +172,10 @@ class LiveView:
 
     async def _report_changes(self) -> None:
         """Report what has changed since the last report to this client."""
-        live, plan = self._run.live, self._run.plan
-        if plan is not None and not self._greeted:
+        live, introduction = self._run.live, self._run.introduction
+        if introduction is not None and not self._greeted:
             self._greeted = True
-            await self._socket.send_text(await asyncio.to_thread(_hello, plan))
+            await self._socket.send_text(await asyncio.to_thread(introduction))
         state = LiveState(state=self._run.state, speed=live.pace.speed)
         if state != self._said:
             self._said = state
@@ -152,24 +215,3 @@ class LiveView:
                 return
             self._ready = True
             self._changed.set()
-
-
-def _hello(plan: Plan) -> str:
-    """Introduce every road user that will ever be in a frame.
-
-    A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
-    tens of thousands of actors.
-    """
-    names = [name for name in LiveActor.model_fields if name != "index"]
-    hello = {
-        "type": "hello",
-        "scenario": plan.scenario,
-        "until": plan.until,
-        "step_length": plan.step_length,
-        "origin": origin(plan),
-        "actors": [
-            {"index": index, **{name: getattr(actor, name) for name in names}}
-            for index, actor in enumerate(plan.actors)
-        ],
-    }
-    return orjson.dumps(hello).decode()

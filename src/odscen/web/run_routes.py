@@ -21,6 +21,7 @@ from odscen.results.records.run_records import EventKind, Plan, event_row, event
 from odscen.results.records.traces import ActorCounts, SpeedCurve
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_trajectories
+from odscen.web.large.large_documents import LargeForecastRoute
 from odscen.web.live_view import LiveView
 from odscen.web.packed import UNCHANGED, answer, pack
 from odscen.web.services import Shared
@@ -54,6 +55,7 @@ REPLAY_ROWS = 4_000_000
 """Rows that are read at most; of a longer run every second, third, ... record is left out."""
 
 router = APIRouter(prefix="/api/runs")
+forecasts = APIRouter(route_class=LargeForecastRoute)
 
 MOST_EVENTS = 5_000
 """Incidents that are reported of a finished run; no one reads more."""
@@ -71,14 +73,19 @@ def list_runs(shared: Shared, scenario: str | None = None) -> list[RunInfo]:
 @router.post("", status_code=202)
 def start(wish: NewRun, shared: Shared) -> RunStarted:
     """Run a scenario as it is now."""
+    if shared.large is not None and shared.large.is_large(wish.scenario) and not wish.carla:
+        return RunStarted(run=shared.runs.start_large(wish.scenario, wish))
     draft = shared.drafts.get(wish.scenario)
     return RunStarted(run=shared.runs.start(draft.name, draft.scenario, wish))
 
 
-@router.post("/forecast")
+@forecasts.post("/forecast")
 def forecast(wish: NewRun, shared: Shared) -> RunForecast:
     """What a run would need; takes as long as getting it ready."""
     return shared.runs.forecast(shared.drafts.get(wish.scenario).scenario, wish)
+
+
+router.include_router(forecasts)
 
 
 @router.post("/{run}/resume", status_code=202)

@@ -7,11 +7,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from odscen.web import history
+from odscen.web import active_runs, history
 from odscen.web.application import create_app
 from odscen.web.security import LOOPBACK
 from odscen.workspace.store import Workspace
-from tests.web.conftest import CROSSING
+from tests.web.conftest import CROSSING, finished, wait_for
+from tests.web.test_long_runs import WISH, interrupted_after, made_busy, outcome
+from tests.web.test_runs import start, watch
 
 HOSTS = LOOPBACK | {"testserver"}
 
@@ -121,3 +123,75 @@ def test_a_large_scenario_that_needs_more_than_its_limit_is_refused_and_nothing_
     assert message.endswith("that is the limit for a file of its size")
     assert list(scratch.iterdir()) == []
     assert far.get(f"/api/maps/{CROSSING}").status_code == 200
+
+
+def test_a_run_of_a_large_scenario_is_checked_watched_and_reported_by_another_process(
+    far: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("check_run", "prepare_run", "carry_out"):
+        monkeypatch.setattr(active_runs, name, None)
+    run = start(far, sampled, until=20)
+    seen = watch(far, run)
+    (hello,) = seen.of("hello")
+    info = finished(far, run)
+    assert (info["state"], info["scenario"], info["map"]) == ("completed", sampled, CROSSING)
+    shown = far.get(f"/api/scenarios/{sampled}").json()["document"]
+    ids = [sorted(one["id"] for one in said["actors"]) for said in (hello, shown)]
+    assert ids[0] == ids[1]
+    assert seen.of("end")[-1]["state"] == "completed"
+    assert far.get(f"/api/runs/{run}/report.html").status_code == 200
+
+
+def test_the_same_run_of_a_large_and_a_small_scenario_gives_the_same_bytes(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    near = start(client, sampled, until=20)
+    assert finished(client, near)["state"] == "completed"
+    with TestClient(create_app(workspace, hosts=HOSTS, large=1)) as far:
+        other = start(far, sampled, until=20)
+        assert finished(far, other)["state"] == "completed"
+    for name in ("events.json", "actors.json", "trajectories.parquet"):
+        files = [(workspace.runs / run / name).read_bytes() for run in (near, other)]
+        assert files[0] == files[1]
+
+
+def test_a_run_of_a_large_scenario_is_paused_and_stopped(far: TestClient, sampled: str) -> None:
+    run = start(far, sampled, paused=True)
+    wait_for(lambda: far.get(f"/api/runs/{run}").json()["state"] == "paused")
+    far.post(f"/api/runs/{run}/control", json={"action": "stop"})
+    assert finished(far, run)["state"] == "stopped"
+
+
+def test_a_large_scenario_with_errors_is_not_run(far: TestClient) -> None:
+    far.post("/api/scenarios", json={"map": CROSSING, "name": "empty"})
+    for path in ("/api/runs", "/api/runs/forecast"):
+        answer = far.post(path, json={"scenario": "empty"})
+        assert (answer.status_code, answer.json()["error"]["kind"]) == (422, "ScenarioError")
+        assert "region of interest is empty" in answer.json()["error"]["message"]
+    assert far.get("/api/runs").json() == []
+
+
+def test_the_forecast_of_a_large_scenario_is_that_of_a_small_one(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    wish = {"scenario": sampled, "until": 60}
+    near = client.post("/api/runs/forecast", json=wish).json()
+    with TestClient(create_app(workspace, hosts=HOSTS, large=1)) as far:
+        other = far.post("/api/runs/forecast", json=wish).json()
+    assert {**near, "free": 0} == {**other, "free": 0}
+
+
+def test_a_long_run_of_a_large_scenario_is_interrupted_and_resumed_to_its_end(
+    far: TestClient, workspace: Workspace
+) -> None:
+    busy = made_busy(far)
+    run = start(far, busy, speed=1000, **WISH)
+    wait_for(lambda: far.get(f"/api/runs/{run}").json()["slices"])
+    interrupted_after(far, run, 1)
+    info = far.get(f"/api/runs/{run}").json()
+    assert (info["error"], info["slices"]["length"]) == (None, 3600)
+    assert far.post(f"/api/runs/{run}/resume", json={}).status_code == 202
+    assert finished(far, run)["state"] == "completed"
+    whole = start(far, busy, **WISH)
+    assert finished(far, whole)["state"] == "completed"
+    assert outcome(workspace, run) == outcome(workspace, whole)

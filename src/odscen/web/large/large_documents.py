@@ -134,12 +134,29 @@ class LargeDocumentRoute(APIRoute):
 
         async def handle(request: Request) -> Response:
             large: LargeDocuments | None = request.app.state.services.large
-            name = request.path_params.get("name")
+            name = await self.about(request)
             if large is not None and large.concerns(request, name):
                 return await large.answer(request, name)
             return await here(request)
 
         return handle
+
+    async def about(self, request: Request) -> str | None:
+        """Name of the scenario that a request is about; ``None`` for a new one."""
+        name: str | None = request.path_params.get("name")
+        return name
+
+
+class LargeForecastRoute(LargeDocumentRoute):
+    """The same for a route whose body names the scenario."""
+
+    async def about(self, request: Request) -> str | None:
+        """Name in the body, if there is one."""
+        try:
+            name = (await request.json())["scenario"]
+        except (ValueError, KeyError, TypeError, RecursionError, ClientDisconnect):
+            return None
+        return name if isinstance(name, str) else None
 
 
 async def _write_down(request: Request, folder: Path) -> None:

@@ -6,13 +6,18 @@ components of the schema by :mod:`odscen.web.application`.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import orjson
 from pydantic import Field
 
 from odscen.base.categories import Category
+from odscen.sumo.worker.snapshots import origin
 from odscen.web.messages import Answer
 from odscen.web.wire.run_messages import IncidentInfo, RunState
+
+if TYPE_CHECKING:
+    from odscen.results.records.run_records import Plan
 
 
 class LiveActor(Answer):
@@ -32,7 +37,7 @@ class LiveActor(Answer):
 class LiveHello(Answer):
     """What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
 
-    Made by :mod:`odscen.web.live_view` without this class, for it may be large.
+    Made by :func:`introduction` without this class, for it may be large.
     """
 
     type: Literal["hello"] = "hello"
@@ -85,3 +90,24 @@ LiveMessage = Annotated[
     Field(discriminator="type"),
 ]
 """Any text that the server sends."""
+
+
+def introduction(plan: Plan) -> str:
+    """Introduce every road user that will ever be in a frame.
+
+    A :class:`~odscen.web.wire.live_messages.LiveHello`, but written at once: a day in a town has
+    tens of thousands of actors.
+    """
+    names = [name for name in LiveActor.model_fields if name != "index"]
+    hello = {
+        "type": "hello",
+        "scenario": plan.scenario,
+        "until": plan.until,
+        "step_length": plan.step_length,
+        "origin": origin(plan),
+        "actors": [
+            {"index": index, **{name: getattr(actor, name) for name in names}}
+            for index, actor in enumerate(plan.actors)
+        ],
+    }
+    return orjson.dumps(hello).decode()

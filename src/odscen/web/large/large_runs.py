@@ -1,0 +1,171 @@
+"""Runs of large scenarios: all that the server does of a run is done in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from odscen.base.error_data import error_from_data
+from odscen.base.errors import ToolError
+from odscen.scenario.document.json_form import loads
+from odscen.sumo.runner.worker_process import messages
+from odscen.sumo.worker.protocol import Done, Failed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.run_settings import RunSettings
+    from odscen.sumo.runner.live_run import Live
+    from odscen.workspace.store import Workspace
+
+_WORKER = "odscen.web.large.run_worker"
+
+
+class LargeRun:
+    """A run whose scenario has been checked, by the process that is to carry it out.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    scenario
+        The scenario's file.
+    name
+        Of the run, in messages.
+    settings
+        How it is run.
+    live
+        What it is steered and watched by.
+
+    Raises
+    ------
+    ScenarioError
+        With every error of the scenario.
+    NotFoundError
+        If the workspace does not have its map.
+    """
+
+    def __init__(
+        self, workspace: Workspace, scenario: Path, *, name: str, settings: RunSettings, live: Live
+    ) -> None:
+        self._live = live
+        self._folder = tempfile.TemporaryDirectory(prefix="odscen-run-", ignore_cleanup_errors=True)
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        self._process = _AskedToEnd(
+            [sys.executable, "-m", _WORKER],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            start_new_session=True,
+        )
+        self._tell(
+            {
+                "workspace": str(workspace.root),
+                "scenario": str(scenario),
+                "name": name,
+                "settings": settings.to_dict(),
+                "introduction": str(self._introduction),
+                "paused": live.start.paused,
+                "speed": live.start.speed,
+            }
+        )
+        self.scenario: Scenario = loads(self._said()["scenario"])
+
+    def introduction(self) -> str:
+        """Text that introduces all road users to who watches the run, once it is prepared."""
+        return self._introduction.read_text(encoding="utf-8")
+
+    def end(self) -> None:
+        """End it before it has begun."""
+        self._close()
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what introduces its road users."""
+        self._folder.cleanup()
+
+    def follow(
+        self, name: str, *, prepared: Callable[[float | None], None], ended: Callable[[], None]
+    ) -> str | None:
+        """Carry it out, to its end.
+
+        Parameters
+        ----------
+        name
+            Of the run's folder.
+        prepared
+            Called with the length of a slice, s, when it is prepared; ``None`` for one piece.
+        ended
+            Called when the simulation has ended, before the report is written.
+
+        Returns
+        -------
+        Why it failed without a folder; ``None`` if it did not.
+        """
+        failed: str | None = None
+        try:
+            self._write(f"{name}\n".encode())
+            prepared(self._said()["slice_length"])
+            self._live.attach(self._process)
+            for message, payload in messages(self._process):
+                self._live.take(message, payload)
+                if isinstance(message, Done):
+                    ended()
+                elif isinstance(message, Failed):
+                    failed = message.reason
+        finally:
+            self._live.detach()
+            self._close()
+        return failed
+
+    def _close(self) -> None:
+        with self._process:
+            self._process.kill()
+        self._log.close()
+
+    @property
+    def _introduction(self) -> Path:
+        return Path(self._folder.name) / "introduction.json"
+
+    def _tell(self, message: dict[str, Any]) -> None:
+        self._write(json.dumps(message).encode() + b"\n")
+
+    def _write(self, line: bytes) -> None:
+        stdin: IO[bytes] | None = self._process.stdin
+        assert stdin is not None
+        try:
+            stdin.write(line)
+            stdin.flush()
+        except BrokenPipeError:
+            return  # why it has ended is asked next
+
+    def _said(self) -> dict[str, Any]:
+        """The next line of the process; its error is raised here."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        said: dict[str, Any] = json.loads(line) if line else {}
+        if not said or "error" in said:
+            words = self._words()
+            self.end()
+            if said:
+                raise error_from_data(said["error"])
+            msg = "the process of the run has ended without a result"
+            raise ToolError(msg, output=words)
+        return said
+
+    def _words(self) -> str:
+        self._log.seek(0)
+        return self._log.read().decode("utf-8", "replace")[-2000:]
+
+
+class _AskedToEnd(subprocess.Popen[bytes]):
+    """A process that is only ever asked to end: it has a simulation to end."""
+
+    def kill(self) -> None:
+        """Ask it to end."""
+        self.terminate()
