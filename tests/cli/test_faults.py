@@ -235,3 +235,23 @@ def test_a_signal_after_the_end_of_a_command_shows_nothing_of_python():
     )
     assert done.returncode in (0, -signal.SIGTERM)
     assert done.stderr == ""
+
+
+def test_a_signal_where_python_cannot_raise_ends_a_command_all_the_same():
+    script = (
+        "import signal, time, weakref\n"
+        "from odscen import cli\n"
+        "class Thing: pass\n"
+        "def app():\n"
+        "    thing = Thing()\n"
+        "    known = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGTERM))\n"
+        "    del thing\n"
+        "    time.sleep(30)\n"
+        "    print('not interrupted')\n"
+        "cli.app = app\n"
+        "cli.main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

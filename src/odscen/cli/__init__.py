@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
+from _thread import interrupt_main
 from typing import Annotated
 
 import typer
@@ -33,6 +35,8 @@ from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.transit_commands import app as transit
 
+_AGAIN = 0.05
+"""Wall seconds after which an interruption that Python has only shown comes again."""
 _INTERRUPTED = 130
 """Exit code of a command that was interrupted, as shells know it."""
 
@@ -86,6 +90,16 @@ def _options(
     pass
 
 
+def _interrupt_again(what: sys.UnraisableHookArgs) -> None:
+    """Interrupt again what was interrupted where Python only shows exceptions and goes on."""
+    if what.exc_type is KeyboardInterrupt:
+        again = threading.Timer(_AGAIN, interrupt_main)  # not here: it would be shown again
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(what)
+
+
 def _end_at_once_if_asked() -> None:
     """Leave signals to the system: what the command has to clean up is done.
 
@@ -101,6 +115,7 @@ def main() -> None:
     Errors are odscen's own, and those of the system that nobody has given a place.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does
+    sys.unraisablehook = _interrupt_again
     try:
         try:
             with disk_errors("odscen"):
