@@ -31,7 +31,7 @@ DOCUMENT_SECONDS_PER_MEGABYTE = 1.0
 LARGE_MEMORY_PER_BYTE = 36
 LARGE_SECONDS_PER_MEGABYTE = 4.0
 """The same for a scenario that is checked, shown and written, too; 30 MB with 200,000 actors and as
-many problems need 0.9 GB, and SECONDS s of 130 s."""
+many problems need 1.1 of 1.5 GB and 18 of 130 s."""
 _FILE_SHARE = 4
 """A file that is written may have this part of the memory."""
 _PATIENCE = 6.0
