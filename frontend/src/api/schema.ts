@@ -5483,7 +5483,7 @@ export interface components {
          * LiveHello
          * @description What the run is, once; ``origin`` is what is subtracted from all x and y in frames.
          *
-         *     Made by :mod:`odscen.web.live_view` without this class, for it may be large.
+         *     Made by :func:`introduction` without this class, for it may be large.
          */
         LiveHello: {
             /**

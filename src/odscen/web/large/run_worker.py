@@ -28,10 +28,7 @@ from odscen.sumo.runner.live_run import Live
 from odscen.sumo.worker.protocol import (
     Command,
     Failed,
-    FrameMessage,
     Pace,
-    ShotMessage,
-    State,
     decode,
     encode,
 )
@@ -55,9 +52,7 @@ class _Relay(Live):
         """Pass on what the worker says."""
         super().take(message, payload)
         if not isinstance(message, Failed):  # that is for whoever follows it to say
-            self._channel.write(encode(message).encode())
-            if isinstance(message, FrameMessage | State | ShotMessage):
-                self._channel.write(payload)
+            self._channel.write(encode(message).encode() + payload)
             self._channel.flush()
 
     def listen(self, stdin: FileIO) -> None:
