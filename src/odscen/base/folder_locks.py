@@ -7,6 +7,7 @@ held, or after a process that was killed.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -50,7 +51,12 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
     ConflictError
         If another process holds it; says which, and since when.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:  # a file of that name
+        raise NotADirectoryError(
+            errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename
+        ) from error
     descriptor = _taken(folder, what, patience)
     try:
         yield descriptor

@@ -191,6 +191,8 @@ def _rows(pairs: Iterable[tuple[_Row, int]]) -> Rows[_Row]:
 def _square(text: str) -> list[tuple[MatrixTrip, int]]:
     """Rows of a square origin-destination table with their lines; empty if it is none."""
     columns, lines = _table(text, exact=True)
+    if not columns:
+        return []
     corner, *ends = columns
     if corner.lower() not in ("", "from", "from/to", "o/d") or {"to", "trips"} & set(ends):
         return []
