@@ -114,7 +114,7 @@ def test_a_large_scenario_that_needs_more_than_its_limit_is_refused_and_nothing_
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(scratch))
-    little = Allowance(memory=1 << 30, seconds=0.001)
+    little = Allowance(memory=1 << 30, seconds=0.0)
     monkeypatch.setattr(large_documents, "for_large_document", lambda _size: little)
     answer = far.get(f"/api/scenarios/{sampled}")
     assert (answer.status_code, answer.json()["error"]["kind"]) == (422, "LimitError")
