@@ -50,6 +50,8 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
     ------
     ConflictError
         If another process holds it; says which, and since when.
+    NotADirectoryError
+        If a file lies where its parent belongs.
     """
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
