@@ -89,6 +89,9 @@ def test_rows_written_down_early_are_those_of_the_outcomes() -> None:
             x=st.none() | st.integers(-(10**6), 10**6).map(lambda n: n / 1000),
             error=st.none() | st.floats(0, 1).map(lambda e: round(e, 6)),
             partner=st.none() | st.text(),
+            rule=st.none() | st.text(),
+            values=st.none()
+            | st.dictionaries(st.text(), st.integers(-(10**9), 10**9).map(lambda n: n / 10**6)),
             **dict.fromkeys(("y", "lane", "travel_time", "detail", "waited", "queue"), st.none()),
         )
     ).map(tuple)

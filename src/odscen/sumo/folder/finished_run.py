@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
@@ -182,7 +183,8 @@ class Run:
             One row per event: ``time`` (s), ``kind`` (departed, arrived, collision, jam_begin,
             ...), ``actor``, ``x`` and ``y`` (m; body centre of departures, front of everything
             else), ``lane`` (of SUMO), ``partner``, ``error`` (m), ``travel_time`` (s), ``detail``,
-            ``waited`` (s), ``queue``. Null where it does not apply.
+            ``waited`` (s), ``queue``, ``rule``, ``values`` (of a rule's conditions, as JSON). Null
+            where it does not apply.
 
         Raises
         ------
@@ -190,7 +192,11 @@ class Run:
             If the run failed before it had any.
         """
         rows = events_from_json(self._text(layout.EVENTS_FILE))
-        return _table([row._asdict() for row in rows], get_type_hints(Event))
+        said = [
+            row._asdict() | {"values": None if row.values is None else json.dumps(row.values)}
+            for row in rows
+        ]
+        return _table(said, {**get_type_hints(Event), "values": str})
 
     def trajectories(self) -> pl.DataFrame:
         """Where everyone was, at every recorded time.
