@@ -87,6 +87,7 @@ FIGURES = (
         better=Better.LOWER,
         tolerance="2 % or 1 s",
         basis=Basis.STOPS,
+        display=Display("s", digits=1),
         section=ReportSection.TRANSIT,
         compute=_late,
     ),

@@ -80,7 +80,8 @@ def _places(figures: TrafficFigures | None) -> Iterator[str]:
     slow = segments.filter(segments["level"].is_in(["E", "F"])).sort("time_loss", descending=True)
     for row in slow.head(1).iter_rows(named=True):
         yield (
-            f"segment {row['segment']} has level of service {row['level']}: "
+            f"segment {row['segment']}, the one with most time lost, has level of service "
+            f"{row['level']}: "
             f"{number(row['speed'] * 3.6, 0)} km/h for {row['vehicles']:,} vehicles"
         )
 
