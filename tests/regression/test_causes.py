@@ -59,3 +59,11 @@ def test_figures_speak_for_causes_when_several_inputs_have_changed():
     assert first() == ["map", "signals", "demand"]
     assert first(planned, waiting) == ["demand", "signals", "map"]
     assert first(waiting) == ["signals", "map", "demand"]
+
+
+def test_measures_rules_and_lines_are_called_by_their_names():
+    names = ("measures", "rules", "transit")
+    before = {f"scenario.{name}": "1" for name in names}
+    after = {f"scenario.{name}": "2" for name in names}
+    found = [cause.name for cause in causes_between(before, after)]
+    assert found == ["measures", "rules", "public transport"]
