@@ -11,6 +11,7 @@ from lxml import etree
 from odscen.regression.gates import Update, run_suite
 from odscen.regression.junit import junit_xml
 from odscen.regression.suite import read_suite
+from odscen.regression.suite_words import NOWHERE
 from tests.regression.conftest import ROOT
 
 SLOW = bool(os.environ.get("ODSCEN_SLOW"))
@@ -156,9 +157,13 @@ def test_a_change_of_traffic_is_caught_by_every_scenario_with_its_cause_and_plac
     edit_scenarios(suite, edit)
     found = first_lines(store, suite)
     assert set(found) == set(NAMES)
+    place = r"(segment|junction|actor) \S+: \w+ is "
+    somewhere = 0
     for outcome, words in found.values():
         assert outcome == "failure"
-        assert re.match(rf"{cause}: .*(segment|junction|actor) \S+: \w+ is ", words), words
+        assert re.match(rf"{cause}: .*({place}|{NOWHERE}$)", words), words
+        somewhere += bool(re.search(place, words))
+    assert somewhere > len(NAMES) / 2
 
 
 def test_reruns_without_a_change_pass(store, suite):

@@ -21,6 +21,10 @@ _IN_HEADLINE = 2
 """Figures of the run in the headline; a place comes after them."""
 
 
+NOWHERE = "no place has changed by more than is allowed"
+"""Said where inputs or figures of the run fail and no segment, junction or actor does."""
+
+
 def headline(case: CaseResult) -> str:
     """Say in one line what is wrong: the likeliest cause, its worst figures, and the worst place.
 
@@ -59,8 +63,9 @@ def _worst(case: CaseResult) -> list[str]:
     failing.sort(key=lambda change: not _is_key(change))  # the worst first among both
     found += [change.words for change in failing[:_IN_HEADLINE]]
     place = verdict.where
-    at = [] if place is None else [f"most at {place.words}" if found else place.words]
-    return [*found, *at]
+    if place is not None:
+        return [*found, f"most at {place.words}" if found else place.words]
+    return [*found, NOWHERE] if case.causes else found
 
 
 def _is_key(change: Change) -> bool:
