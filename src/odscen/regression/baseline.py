@@ -196,17 +196,26 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
     figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:
         if "figure" in row:
-            figures[FigureKey("run", "", row["figure"])] = _values(row["values"], seeds)
+            figures[FigureKey("run", "", _name(row["figure"]))] = _values(row["values"], seeds)
             continue
         kind = next((kind for kind in _KINDS if kind in row), None)
         if kind is None:
             msg = f"row {row!r:.60} is of no figure, {', '.join(_KINDS)}"
             raise ValueError(msg)
+        place = _name(row[kind])
         for name, values in row.items():
             if name != kind:
-                figures[FigureKey(kind, row[kind], name)] = _values(values, seeds)
+                figures[FigureKey(kind, place, name)] = _values(values, seeds)
     by_scatter = data.get("tolerance") == _SCATTER
-    return Baseline(seeds, dict(data["fingerprint"]), figures, by_scatter)
+    made_of = {name: _name(digest) for name, digest in dict(data["fingerprint"]).items()}
+    return Baseline(seeds, made_of, figures, by_scatter)
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str):
+        msg = f"{value!r:.60} is not a text"
+        raise ValueError(msg)
+    return value
 
 
 def _values(values: Sequence[float | None], seeds: Sequence[int]) -> tuple[float | None, ...]:
