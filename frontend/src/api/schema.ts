@@ -3284,6 +3284,31 @@ export interface components {
             to: string;
         };
         /**
+         * Parameter
+         * @description A named number with its unit and the bounds between which it makes sense.
+         *
+         *     Any number of the document may be written as a formula of parameters, ``"$gap"`` or
+         *     ``"2 * $gap + 1"``, and so may the ``value`` of a later parameter.
+         */
+        Parameter: {
+            /** Value */
+            value: number;
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Min */
+            min: number | null;
+            /** Max */
+            max: number | null;
+            /**
+             * Description
+             * @default
+             */
+            description: string;
+        };
+        /**
          * Path
          * @description Shortest path inside the region, with [x, y] of its nodes; empty if there is none.
          */
@@ -4117,6 +4142,14 @@ export interface components {
              * @default []
              */
             rules: components["schemas"]["StoryRule"][];
+            /** Parameters */
+            parameters: {
+                [key: string]: components["schemas"]["Parameter"];
+            };
+            /** Formulas */
+            formulas: {
+                [key: string]: string;
+            };
         };
         /**
          * ScenarioRow
@@ -6509,6 +6542,37 @@ export interface components {
             to: string;
         };
         /**
+         * Parameter
+         * @description A named number with its unit and the bounds between which it makes sense.
+         *
+         *     Any number of the document may be written as a formula of parameters, ``"$gap"`` or
+         *     ``"2 * $gap + 1"``, and so may the ``value`` of a later parameter.
+         */
+        "Parameter-File": {
+            /** Value */
+            value: number;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /**
+             * Min
+             * @default null
+             */
+            min?: number | null;
+            /**
+             * Max
+             * @default null
+             */
+            max?: number | null;
+            /**
+             * Description
+             * @default
+             */
+            description?: string;
+        };
+        /**
          * Profile
          * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
          */
@@ -7304,6 +7368,14 @@ export interface components {
              * @default []
              */
             rules?: components["schemas"]["StoryRule-File"][];
+            /** Parameters */
+            parameters?: {
+                [key: string]: components["schemas"]["Parameter-File"];
+            };
+            /** Formulas */
+            formulas?: {
+                [key: string]: string;
+            };
         };
     };
     responses: never;

@@ -33,6 +33,7 @@ from odscen.cli.run_commands import resume, run
 from odscen.cli.scenario_commands import check, export, generate
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
+from odscen.cli.sweep_command import sweep
 from odscen.cli.transit_commands import app as transit
 
 _AGAIN = 0.05
@@ -64,6 +65,7 @@ app.command()(export)
 app.command()(run)
 app.command()(resume)
 app.command()(report)
+app.command()(sweep)
 app.command("test")(gate)
 app.command()(compare)
 app.command("diff")(diff_scenarios)

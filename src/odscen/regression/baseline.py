@@ -85,7 +85,7 @@ def fingerprint(
     wished = {"duration": settings.until, "step_length": settings.step_length}
     given = {name: value for name, value in wished.items() if value is not None}
     document["simulation"] = document.get("simulation", {}) | given
-    for other in ("format", "version", "name", "description", "map", "seed"):
+    for other in _NOT_ACTING:
         document.pop(other, None)
     found = {"map": map_sha256[:_SHORT]}
     if network is not None:
@@ -94,6 +94,12 @@ def fingerprint(
     if settings.redraw != "open":
         found["redraw"] = settings.redraw
     return found | {"odscen": __version__, "sumo": version("libsumo")}
+
+
+_NOT_ACTING = (
+    "format", "version", "name", "description", "map", "seed", "parameters", "formulas",
+)  # fmt: skip
+"""Parts of a scenario that say nothing of traffic, or nothing that others do not say."""
 
 
 def map_digest(entry: MapEntry) -> str:

@@ -98,6 +98,26 @@ def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict
     return found
 
 
+def own_column(name: str, function: str, *, beside: Path) -> Callable[[Run], float | None]:
+    """Make a function of a finished run of ``FILE.py:NAME``; errors of :func:`own_values`.
+
+    Raises
+    ------
+    InputError
+        If it does not name a function of a file.
+    """
+    try:
+        FigureEntry(function=function)
+    except ValueError as error:
+        msg = f"{name}={function}: give the function as FILE.py:NAME"
+        raise InputError(msg) from error
+    figure = Figure(
+        name=name, unit="", label=name, definition="", source=function, better=Better.NEITHER,
+        tolerance="2 %",
+    )  # fmt: skip
+    return lambda run: own_values({name: figure}, run, beside=beside)[name]
+
+
 @cache
 def _function(file: Path, name: str) -> Callable[[Run], object]:
     """Load a function from a file; the file is run once."""

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 from pydantic_core import from_json
 
 from odscen.base.errors import ScenarioError
+from odscen.scenario.document.formulas import computed, put_back
 from odscen.scenario.document.scenario_document import FORMAT, VERSION, Scenario
 from odscen.scenario.document.validation import validation_problems
 
-OPTIONAL = ("drivers", "demand", "transit", "signals", "measures", "rules")
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+OPTIONAL = (
+    "drivers", "demand", "transit", "signals", "measures", "rules", "parameters", "formulas",
+)  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
 """Fields of the simulation that are written always."""
@@ -34,7 +40,7 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
         With one line per problem, each with its place, for example ``actors[3].speed: ...``.
     """
     try:
-        return Scenario.model_validate_json(text, strict=True)
+        return Scenario.model_validate_json(_with_numbers(text, file), strict=True)
     except ValidationError as error:
         if foreign := _foreign(text):
             raise ScenarioError(foreign, file=file) from error
@@ -44,12 +50,32 @@ def loads(text: str | bytes, *, file: str | None = None) -> Scenario:
         raise ScenarioError(msg, problems=problems, file=file) from error
 
 
+def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
+    """Give parameters other values; what is computed from them follows.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such parameter, a value is outside its bounds, or what follows from it is
+        not possible.
+    """
+    data = from_json(dumps(scenario))
+    for name, value in values.items():
+        if name not in scenario.parameters:
+            known = ", ".join(scenario.parameters) or "none"
+            msg = f"no parameter {name!r}; there are {known}"
+            raise ScenarioError(msg)
+        data["parameters"][name]["value"] = value
+    return loads(json.dumps(data))
+
+
 def dumps(scenario: Scenario) -> str:
     """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
 
     Fields of actors, flows, rules, drivers and demand that have their default value are left out,
-    and so are signals that are all the map's, and measures if there are none. The same scenario
-    gives the same text, and :func:`loads` gives the same scenario back.
+    and so are signals that are all the map's, and measures if there are none. Numbers that are
+    computed from parameters are written as their formulas. The same scenario gives the same text,
+    and :func:`loads` gives the same scenario back.
     """
     data = scenario.model_dump(mode="json", exclude={"actors", "flows", *OPTIONAL})
     for key in type(scenario).model_fields:
@@ -58,10 +84,12 @@ def dumps(scenario: Scenario) -> str:
         elif key == "simulation":
             said = scenario.simulation.model_dump(mode="json", exclude_defaults=True)
             data[key] = {name: data[key][name] for name in ALWAYS} | said
+    if scenario.formulas:
+        put_back(data, scenario.model_dump(mode="json"), scenario.formulas)
     fields = [
         f"  {json.dumps(key)}: {_layout(key, data[key])}"
         for key in type(scenario).model_fields
-        if key not in OPTIONAL or data[key]
+        if key != "formulas" and (key not in OPTIONAL or data[key])
     ]
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
@@ -69,6 +97,10 @@ def dumps(scenario: Scenario) -> str:
 def without_defaults(scenario: Scenario, field: str) -> Any:
     """JSON of a field, a part or a list of parts, without what has its default value."""
     value = getattr(scenario, field)
+    if isinstance(value, dict):
+        return scenario.model_dump(mode="json", include={field}, exclude_defaults=True).get(
+            field, {}
+        )
     if isinstance(value, tuple):
         return [part.model_dump(mode="json", exclude_defaults=True) for part in value]
     return value.model_dump(mode="json", exclude_defaults=True)
@@ -76,11 +108,49 @@ def without_defaults(scenario: Scenario, field: str) -> Any:
 
 def schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of the document, as published in docs/scenario.schema.json."""
-    described = Scenario.model_json_schema()
+    described = _formulas_too(Scenario.model_json_schema())
+    described["properties"].pop("formulas")  # which stand where the numbers do
+    described["$defs"]["Formula"] = {
+        "description": "Arithmetic with parameters, in place of a number.",
+        "type": "string",
+        "pattern": r"\$[A-Za-z_]",
+    }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
 
 
+def _formulas_too(node: Any) -> Any:
+    """Let a formula be given wherever a number may."""
+    if isinstance(node, list):
+        return [_formulas_too(one) for one in node]
+    if not isinstance(node, dict):
+        return node
+    if node.get("type") in ("number", "integer"):
+        outer = {key: node[key] for key in ("title", "default", "description") if key in node}
+        inner = {key: value for key, value in node.items() if key not in outer}
+        return {"anyOf": [inner, {"$ref": "#/$defs/Formula"}], **outer}
+    return {key: _formulas_too(one) for key, one in node.items()}
+
+
+def _with_numbers(text: str | bytes, file: str | None) -> str | bytes:
+    """Compute the formulas of a document, if it has any."""
+    if ("$" not in text) if isinstance(text, str) else (b"$" not in text):
+        return text
+    try:
+        data = from_json(text)
+    except ValueError:
+        return text  # which validation says
+    if not isinstance(data, dict) or not isinstance(data.get("parameters"), dict):
+        return text
+    return json.dumps(computed(data, file=file))
+
+
 def _layout(key: str, value: object) -> str:
+    if key == "parameters" and isinstance(value, dict):
+        fields = (
+            f"    {json.dumps(name)}: {json.dumps(one, ensure_ascii=False)}"
+            for name, one in value.items()
+        )
+        return "{\n" + ",\n".join(fields) + "\n  }"
     if key in ("demand", "transit") and isinstance(value, dict):
         fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"

@@ -16,6 +16,7 @@ from odscen.base.categories import Category
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
+from odscen.scenario.document.parameters_document import Parameter, ParameterName
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.transit_document import Transit
@@ -295,6 +296,11 @@ class Scenario(Part):
         Duration and step length, s.
     rules
         What actors do, and when.
+    parameters
+        Named numbers that others are computed from.
+    formulas
+        Which numbers those are: formulas by place, as :mod:`~odscen.scenario.document.formulas`
+        names it. Files have a formula in the place of its number.
     """
 
     model_config = ConfigDict(json_schema_extra=_first_paragraph)
@@ -316,6 +322,8 @@ class Scenario(Part):
     measures: tuple[Measure, ...] = ()
     simulation: Simulation = Simulation()
     rules: tuple[StoryRule, ...] = ()
+    parameters: dict[ParameterName, Parameter] = Field(default_factory=dict, max_length=200)
+    formulas: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _fine_steps(self) -> Self:

@@ -1,0 +1,215 @@
+"""``odscen sweep``: a scenario with many values of its parameters."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from odscen.base.errors import InputError, in_file
+from odscen.base.given_files import read_given_text
+from odscen.cli.console import (
+    JsonOption,
+    WorkspaceOption,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
+from odscen.cli.scenario_commands import ScenarioArgument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from odscen.app.sweep_runs import Sweep
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sweeps.sweep_plan import Method, SweepPlan
+    from odscen.sumo.folder.finished_run import Run
+
+_SHOWN = 20
+"""Cases that are listed on a terminal."""
+
+
+def sweep(
+    scenario: ScenarioArgument,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Values of a parameter: gap=1..4:7 (a range in 7 steps), gap=1..4 (a range, for "
+            "samples), gap=1,2,4; repeatable. (default: each parameter between its bounds)",
+            metavar="NAME=VALUES",
+        ),
+    ] = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="A file with all of that: JSON or TOML.", metavar="FILE")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(min=1, help="How many cases, instead of a grid.")
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="How samples are drawn. (default: sobol)", metavar="[sobol|latin|random]"
+        ),
+    ] = None,
+    sample_seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder of the sweep. (default: NAME-sweep here)"),
+    ] = None,
+    safe: Annotated[
+        list[str] | None,
+        typer.Option(
+            help='What a safe case keeps besides "no collision", for example "min_ttc >= 1.5"; '
+            "repeatable.",
+            metavar="LIMIT",
+        ),
+    ] = None,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A figure of runs as a column, or one of your own: queue=figures.py:queue.",
+            metavar="FIGURE",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of every run, instead of the scenario's.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="How many run at a time.")] = 1,
+    reports: Annotated[bool, typer.Option("--reports", help="Write a report of each run.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say which cases there are, and run none.")
+    ] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a scenario with many values of its parameters; find where it is safe.
+
+    Each case gives a row: parameters, collision and its speed, time to collision,
+    post-encroachment time. The same command after an interruption runs what is missing. Exit code
+    0, whether cases are safe or not; 2: bad input; 3: a run failed.
+    """
+    from odscen.app import scenarios, sweep_runs
+    from odscen.workspace.store import Workspace
+
+    document = scenarios.read_scenario(scenario)
+    planned = _plan(document, vary, plan, samples, method, sample_seed)
+    if dry_run:
+        _show_plan(planned, as_json=as_json)
+        return
+    own, named = _figures(figure or [])
+    settings = sweep_runs.SweepSettings(tuple(safe or ()), named, own, seed, reports)
+    folder = out or Path(f"{scenarios.scenario_name(scenario)}-sweep")
+    with progress("sweeping") as step:
+        found = sweep_runs.sweep(
+            Workspace.open(workspace),
+            document,
+            planned,
+            folder,
+            settings=settings,
+            processes=jobs,
+            tell=log,
+            done=lambda ended, count: step(f"{ended} of {count} cases", ended / count),
+        )
+    _show(found, as_json=as_json)
+    raise typer.Exit(3 if "failed" in found.table["status"].to_list() else 0)
+
+
+def _plan(
+    scenario: Scenario,
+    vary: Sequence[str] | None,
+    file: Path | None,
+    samples: int | None,
+    method: str | None,
+    seed: int,
+) -> SweepPlan:
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text, plan_from_data
+
+    if file is not None:
+        if vary or samples or method or seed:
+            msg = "give --plan or --vary, --samples, --method and --sample-seed, not both"
+            raise InputError(msg)
+        with in_file(str(file)):
+            return plan_from_data(_read(file))
+    how = method or ("grid" if samples is None else "sobol")
+    if how not in ("grid", "latin", "sobol", "random"):
+        msg = f"method {how!r} is not one of sobol, latin, random"
+        raise InputError(msg)
+    axes = tuple(map(axis_from_text, vary or ())) or _bounds(scenario)
+    return SweepPlan(axes, cast("Method", how), samples, seed)
+
+
+def _bounds(scenario: Scenario) -> tuple[Any, ...]:
+    """Each parameter between its bounds."""
+    from odscen.scenario.sweeps.sweep_plan import Range
+
+    return tuple(
+        Range(name, one.min, one.max)
+        for name, one in scenario.parameters.items()
+        if one.min is not None
+        and one.max is not None
+        and f"parameters/{name}/value" not in scenario.formulas
+    )
+
+
+def _read(file: Path) -> dict[str, Any]:
+    text = read_given_text(file)
+    try:
+        data = tomllib.loads(text) if file.suffix == ".toml" else json.loads(text)
+    except (ValueError, RecursionError) as error:
+        msg = f"not a plan of a sweep: {error}"
+        raise InputError(msg) from error
+    if not isinstance(data, dict):
+        msg = "not a plan of a sweep: it must be an object with vary"
+        raise InputError(msg)
+    return data
+
+
+def _figures(
+    given: Sequence[str],
+) -> tuple[dict[str, Callable[[Run], float | None]], tuple[str, ...]]:
+    from odscen.regression.own_figures import own_column
+
+    own = {}
+    for text in given:
+        name, sign, function = text.partition("=")
+        if sign:
+            own[name] = own_column(name, function, beside=Path())
+    return own, tuple(text for text in given if "=" not in text)
+
+
+def _show_plan(plan: SweepPlan, *, as_json: bool) -> None:
+    cases = plan.cases()
+    if as_json:
+        print_json({"plan": plan.to_dict(), "cases": list(cases)})
+        return
+    rows = [[f"{value:g}" for value in case.values()] for case in cases[:_SHOWN]]
+    print_table(f"{len(cases)} cases", plan.names, rows)
+    if len(cases) > _SHOWN:
+        log(f"and {len(cases) - _SHOWN} more")
+
+
+def _show(found: Sweep, *, as_json: bool) -> None:
+    table = found.table
+    if as_json:
+        rows = [
+            {key: None if value != value else value for key, value in row.items()}
+            for row in table.to_dicts()
+        ]
+        print_json({"folder": str(found.folder), "boundary": found.boundary, "cases": rows})
+        return
+    safe = table["safe"].to_list()
+    print_table(
+        "",
+        (),
+        [
+            ("cases", len(safe)),
+            ("safe", safe.count(True)),
+            ("not safe", safe.count(False)),
+            ("not run", safe.count(None)),
+        ],
+    )
+    log(f"Page: {found.folder / 'sweep.html'}")

@@ -1,0 +1,1 @@
+"""Sweeps: one scenario, and many values of its parameters."""
