@@ -59,6 +59,8 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
     pedestrians: "striping",
   },
   rules: [],
+  parameters: {},
+  formulas: {},
 });
 export const problem = (where: string, nodes: string[] = []): Problem => ({
   severity: "error",
