@@ -18,6 +18,7 @@ from odscen.base.given_files import read_given
 from odscen.base.stored_files import documents, read_document
 from odscen.base.text_files import write_text
 from odscen.base.version import __version__
+from odscen.regression.detection import Sizing
 from odscen.regression.measure import FigureKey
 from odscen.regression.scatter import (
     CHANGE,
@@ -62,12 +63,14 @@ class Baseline:
 
     ``by_scatter`` says that the scatter over the seeds decides what is allowed, where that is more
     than the figure's own tolerance; baselines of few seeds, and those of before 0.2, do not.
+    ``sizing`` is what the seeds were chosen for; ``None`` where the suite names them.
     """
 
     seeds: tuple[int, ...]
     fingerprint: Fingerprint
     figures: dict[FigureKey, tuple[float | None, ...]]
     by_scatter: bool = False
+    sizing: Sizing | None = None
 
 
 def fingerprint(
@@ -112,7 +115,9 @@ def _digest(value: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_SHORT]
 
 
-def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
+def baseline_of(
+    runs: Mapping[int, Measured], made_of: Fingerprint, *, sizing: Sizing | None = None
+) -> Baseline:
     """Make the baseline of the runs of a scenario, given by seed."""
     seeds = tuple(sorted(runs))
     keys = dict.fromkeys(key for seed in seeds for key in runs[seed])
@@ -121,6 +126,7 @@ def baseline_of(runs: Mapping[int, Measured], made_of: Fingerprint) -> Baseline:
         made_of,
         {key: tuple(runs[seed].get(key) for seed in seeds) for key in keys},
         by_scatter=len(seeds) >= FEWEST_SEEDS,
+        sizing=sizing,
     )
 
 
@@ -131,7 +137,12 @@ def seeds_that_hardly_vary(baseline: Baseline) -> tuple[str, ...]:
 
 
 def seeds_for_small_changes(baseline: Baseline) -> tuple[str, ...]:
-    """Say with how many seeds a small change of the mean delay would be caught."""
+    """Say with how many seeds a small change of the mean delay would be caught.
+
+    Where they were chosen for a change, say what they catch.
+    """
+    if baseline.sizing is not None:
+        return (baseline.sizing.words,)
     known = [value for value in baseline.figures.get(_DELAY, ()) if value is not None]
     run = sum(key.kind == "run" for key in baseline.figures)
     needed = seeds_needed(known, level=Level.shared(run=run, places=1).run)
@@ -156,6 +167,8 @@ def write_baseline(baseline: Baseline, file: Path, *, scenario: str) -> None:
     }
     if baseline.by_scatter:
         head["tolerance"] = _SCATTER
+    if baseline.sizing is not None:
+        head["detect"] = baseline.sizing.model_dump(mode="json")
     write_text(file, json_with_rows(head, "rows", _rows(baseline)))
 
 
@@ -214,7 +227,12 @@ def _from_data(data: Mapping[str, Any]) -> Baseline:
                 figures[FigureKey(kind, place, name)] = _values(values, seeds)
     by_scatter = data.get("tolerance") == _SCATTER
     made_of = {name: _name(digest) for name, digest in dict(data["fingerprint"]).items()}
-    return Baseline(seeds, made_of, figures, by_scatter)
+    chosen = data.get("detect")
+    sizing = None if chosen is None else Sizing.model_validate(chosen)
+    if sizing is not None and sizing.seeds != len(seeds):
+        msg = f"detect has {sizing.seeds} seeds, and {len(seeds)} are there"
+        raise ValueError(msg)
+    return Baseline(seeds, made_of, figures, by_scatter, sizing)
 
 
 def _name(value: object) -> str:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.causes import Cause
+    from odscen.regression.detection import Sizing
     from odscen.regression.measure import Measured
     from odscen.regression.suite import Case, Suite
     from odscen.regression.verdict import BaselineVerdict
@@ -88,6 +89,8 @@ class CaseResult:
         The reasons for a status, in words, the worst first.
     error_code
         Exit code of its errors: 2 for bad input, 3 for a run or tool that failed.
+    sizing
+        What its seeds were chosen for; ``None`` where the suite names them.
     notes
         What else should be known.
     updated
@@ -107,6 +110,7 @@ class CaseResult:
     missing: tuple[str, ...] = ()
     new: tuple[str, ...] = ()
     error_code: int = 3
+    sizing: Sizing | None = None
     notes: tuple[str, ...] = ()
     updated: bool = False
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.app.runs import run_all
-from odscen.base.errors import in_file
+from odscen.base.errors import InputError
 from odscen.regression.baseline import (
     baseline_of,
     map_digest,
@@ -18,22 +15,19 @@ from odscen.regression.baseline import (
     seeds_that_hardly_vary,
     write_baseline,
 )
-from odscen.regression.case_results import CaseResult, SeedResult, SuiteResult
+from odscen.regression.case_results import CaseResult, SuiteResult
 from odscen.regression.causes import VERSIONS, Cause, causes_between, likeliest_first
 from odscen.regression.kept_maps import change_words, changes_since, keep_map
-from odscen.regression.measure import measure
-from odscen.regression.own_figures import own_values
+from odscen.regression.seed_sizing import choose_seeds
 from odscen.regression.suite import missing_case
 from odscen.regression.suite_loading import LoadedCase, load_cases
 from odscen.regression.suite_parts import take_parts
+from odscen.regression.suite_runs import RunPlace, SeedRunner
 from odscen.regression.verdict import hold_against
-from odscen.results.measures.expectations import USABLE, evaluate
-from odscen.results.records.outcomes import RunStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping
 
-    from odscen.base.errors import InputError
     from odscen.changes.map_change import MapChange
     from odscen.regression.baseline import Baseline
     from odscen.regression.measure import Measured
@@ -41,9 +35,6 @@ if TYPE_CHECKING:
     from odscen.regression.suite_loading import UnusableCase
     from odscen.regression.suite_parts import RunCase
     from odscen.regression.verdict import Change
-    from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.runner.run_jobs import RunJob
-    from odscen.sumo.worker.protocol import Progress
     from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace
 
@@ -89,115 +80,35 @@ def run_suite(
     Raises
     ------
     InputError
-        If the suite names a map that is not there and that no scenario is on, or a part has a
-        scenario that the suite does not have.
+        If the suite names a map that is not there and that no scenario is on, a part has a
+        scenario that the suite does not have, or baselines are to be written with seeds that were
+        given in place of those that the suite has odscen choose.
     WorkspaceError
         If the workspace or ``out`` cannot be written.
     """
     cases = load_cases(workspace, suite, with_baseline=not update.wanted)
     loaded = [case for case in cases if isinstance(case, LoadedCase)]
     if parts is not None:
-        take_parts(cases, loaded, parts)
+        take_parts(cases, loaded, parts, sizing=update.wanted)
     else:
+        if update.wanted:
+            _refuse_given_seeds(suite)
         with tempfile.TemporaryDirectory(prefix="odscen-test-") as temporary:
-            root = out or Path(temporary)
-            keep = out is not None
-            _run_all(loaded, suite, root, keep=keep, processes=processes, tell=progress)
+            runner = SeedRunner(suite, processes, progress)
+            place = RunPlace(out or Path(temporary), keep=out is not None)
+            if update.wanted:
+                aside = RunPlace(Path(temporary) / "changed", keep=False)
+                choose_seeds(loaded, runner, place, aside)
+            runner.run(loaded, place)
     judged = [_result(case, update) for case in cases]
     return SuiteResult(suite, (*judged, *map(_missing, suite.missing)))
 
 
-def _run_all(
-    loaded: Sequence[LoadedCase],
-    suite: Suite,
-    root: Path,
-    *,
-    keep: bool,
-    processes: int,
-    tell: Callable[[str, float], None] | None,
-) -> None:
-    """Run each case with each seed in a folder of ``root``, and keep the results with the case."""
-    jobs: dict[str, tuple[LoadedCase, int]] = {}
-    runs = []
-    for case in loaded:
-        for seed in case.case.seeds:
-            name = f"{case.case.name}/seed-{seed}"
-            jobs[name] = case, seed
-            settings = replace(case.run.settings, seed=seed)
-            runs.append(replace(case.run, name=name, folder=root / name, settings=settings))
-    follow = _Follow(len(runs), tell)
-
-    def done(job: RunJob, result: Run) -> None:
-        case, seed = jobs[job.name]
-        case.runs[seed] = _seed_result(case, seed, result, suite, kept=keep)
-        if not keep:
-            shutil.rmtree(result.folder)
-        follow.done(job)
-
-    def refused(job: RunJob, error: InputError) -> None:
-        case, seed = jobs[job.name]
-        case.refused[seed] = f"seed {seed}: {error}"
-        follow.done(job)
-
-    run_all(
-        runs, processes=processes, reports=keep, progress=follow.step, done=done, refused=refused
-    )
-
-
-class _Follow:
-    """Adds up the progress of runs that go on at the same time."""
-
-    def __init__(self, total: int, tell: Callable[[str, float], None] | None) -> None:
-        self._shares: dict[str, float] = {}
-        self._total = total
-        self._tell = tell
-        self._lock = threading.Lock()
-
-    def step(self, job: RunJob, message: Progress) -> None:
-        share = message.time / message.until if message.until else 0.0
-        self._set(job.name, min(share, 1.0))
-
-    def done(self, job: RunJob) -> None:
-        self._set(job.name, 1.0)
-
-    def _set(self, name: str, share: float) -> None:
-        with self._lock:
-            self._shares[name] = share
-            total = sum(self._shares.values()) / self._total
-        if self._tell is not None:
-            self._tell(name, total)
-
-
-def _seed_result(
-    loaded: LoadedCase, seed: int, result: Run, suite: Suite, *, kept: bool
-) -> SeedResult:
-    summary = result.summary
-    folder, seconds = result.folder if kept else None, summary["wall_seconds"]
-    if result.status is RunStatus.FAILED:
-        error = f"seed {seed}: the run failed: {summary['error']}"
-        return SeedResult(seed, seconds, error, (), measure(result.folder, summary), folder)
-    with in_file(str(suite.file)):
-        own = own_values(suite.figures, result, beside=suite.file.parent)
-    summary = {**summary, "figures": {**summary["figures"], **own}}
-    failed = [row for row in evaluate(loaded.case.expectations, summary) if not row.passed]
-    unusable = None
-    if USABLE.text in [row.expectation for row in failed]:
-        unusable = f"seed {seed}: {result.usability.get('headline', 'not judged')}"
-    missed = [
-        f"seed {seed}: expected {verdict.expectation}, but it is "
-        f"{'nothing' if verdict.value is None else f'{verdict.value:g}'}"
-        for verdict in failed
-        if verdict.expectation != USABLE.text
-    ]
-    return SeedResult(
-        seed,
-        seconds,
-        None,
-        (*filter(None, [unusable]), *missed),
-        measure(result.folder, summary),
-        folder,
-        unusable=unusable,
-    )
+def _refuse_given_seeds(suite: Suite) -> None:
+    chosen = [case.name for case in suite.cases if case.other_seeds and case.detect is not None]
+    if chosen:
+        msg = f"seeds of {chosen[0]} are chosen by its detect when baselines are written; give none"
+        raise InputError(msg, file=str(suite.file), element="detect")
 
 
 def _missing(baseline: Path) -> CaseResult:
@@ -238,6 +149,7 @@ def _judge(loaded: LoadedCase, update: Update) -> CaseResult:
         entry=loaded.run.entry,
         made_of=loaded.made_of,
         baseline=loaded.baseline,
+        sizing=loaded.sizing,
         errors=(*broken, *loaded.refused.values()),
         error_code=3 if broken else 2,
         failures=missed,
@@ -263,7 +175,7 @@ def _updated(result: CaseResult, figures: Mapping[int, Measured], *, force: bool
         kept = "is left as it was" if file.is_file() else "is not written"
         note = f"the baseline {kept}, as expectations are not met; --force writes it"
         return replace(result, notes=(*result.notes, note))
-    baseline = baseline_of(figures, result.made_of)
+    baseline = baseline_of(figures, result.made_of, sizing=result.sizing)
     write_baseline(baseline, file, scenario=result.name)
     if result.entry is not None:
         keep_map(file.parent, result.entry, result.made_of["map"])
@@ -275,7 +187,9 @@ def _held(
 ) -> CaseResult:
     """Hold a scenario against its baseline."""
     case = result.case
-    verdict = hold_against(baseline, figures, case.tolerances, better_fails=case.better_fails)
+    verdict = hold_against(
+        baseline, figures, case.tolerances, better_fails=case.better_fails, detect=case.detect
+    )
     worst = sorted(verdict.failing, key=lambda change: -change.score)
     causes = likeliest_first(causes_between(baseline.fingerprint, loaded.made_of), worst)
     names = {cause.name for cause in causes}
@@ -292,7 +206,10 @@ def _held(
         verdict=verdict,
         failures=tuple(failures),
         missing=_seeds(own, figures, "the baseline has seed {}, which was not run"),
-        new=_seeds(figures, own, "the baseline has no seed {}") if own else (),
+        new=(
+            *(_seeds(figures, own, "the baseline has no seed {}") if own else ()),
+            *_not_sized(case, baseline),
+        ),
         notes=(
             *result.notes,
             *_notes(loaded, verdict.figures, names),
@@ -327,6 +244,17 @@ def _seeds(there: Iterable[int], known: Iterable[int], words: str) -> tuple[str,
     """Seeds of one side that the other does not have, in words."""
     listed = ", ".join(map(str, sorted(set(there) - set(known))))
     return (f"{words.format(listed)}; write it with --update-baseline",) if listed else ()
+
+
+def _not_sized(case: Case, baseline: Baseline) -> tuple[str, ...]:
+    """A suite that wants smaller changes to be caught than its baselines were made for."""
+    detect = case.detect
+    if detect is None or (baseline.sizing is not None and baseline.sizing.is_for(detect)):
+        return ()
+    wanted = (
+        f"{detect.words} with probability {detect.power:g} and {detect.seeds_max} seeds at most"
+    )
+    return (f"the baseline was not made to catch {wanted}; write it with --update-baseline",)
 
 
 def _notes(

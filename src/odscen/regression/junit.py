@@ -67,6 +67,10 @@ def _case_properties(case: CaseResult) -> Iterator[tuple[str, str]]:
         yield "map", case.map_name
     if case.case.baseline is not None:
         yield "baseline", str(case.case.baseline)
+    if case.runs:
+        yield "seeds", str(len(case.runs))
+    if case.sizing is not None:
+        yield "detect", case.sizing.words
     before = {} if case.baseline is None else case.baseline.fingerprint
     for name, digest in case.made_of.items():
         yield f"fingerprint.{name}", digest

@@ -7,13 +7,13 @@ Other seeds of the same distributions give other means. The difference of two of
 
 where ``s`` is the standard deviation over the seeds of either side, pooled (Student's t). That of
 the baseline alone would not do: waiting times are skewed, and a rare long one that only the new
-seeds have would be an alarm. Where both sides have the same seeds, they are also compared in pairs,
-same traffic under two conditions, and the lesser of the two limits holds:
+seeds have would be an alarm. Where both sides have the same seeds, they are compared in pairs, same
+traffic under two conditions:
 
 ``allowed = t(1 - q, n - 1) * s_d / sqrt(n)``
 
-with ``s_d`` of the n differences. Each of both tests takes half of q, so that together they fail
-wrongly with probability q at most (Bonferroni).
+with ``s_d`` of the n differences. Which of the two holds is known beforehand, so that q is not
+shared between them.
 """
 
 from __future__ import annotations
@@ -51,6 +51,10 @@ _LEAST_SEEDS = 3
 _MOST_SEEDS = 100_000
 
 
+WATCHED = FALSE_ALARMS / 4
+"""Of it, what goes to the figure of which a suite names the change that is to be caught."""
+
+
 class Level(NamedTuple):
     """Probability of a false alarm in one figure of the run, and in one figure of a place."""
 
@@ -58,10 +62,19 @@ class Level(NamedTuple):
     place: float
 
     @classmethod
-    def shared(cls, *, run: int, places: int) -> Level:
-        """Share out :data:`FALSE_ALARMS` among so many figures."""
+    def shared(cls, *, run: int, places: int, watched: bool = False) -> Level:
+        """Share out :data:`FALSE_ALARMS` among so many figures.
+
+        ``watched`` takes :data:`WATCHED` off the share of the run: one of its figures has that for
+        itself, and is not counted in ``run`` (weighted Bonferroni).
+        """
         half = FALSE_ALARMS / 2
-        return cls(half / max(1, run), half / max(1, places))
+        return cls((half - WATCHED * watched) / max(1, run), half / max(1, places))
+
+
+def tail_of(level: float, *, both_sides: bool) -> float:
+    """Share the probability of a false alarm between the directions in which a figure fails."""
+    return level / 2 if both_sides else level
 
 
 def allowed_by_chance(
@@ -90,16 +103,14 @@ def allowed_by_chance(
     one, other = _known(old), _known(new)
     if min(len(one), len(other)) < FEWEST_SEEDS:
         return None
-    tail = level / 2 / (2 if both_sides else 1)
-    freedom = len(one) + len(other) - 2
-    squares = sum((len(side) - 1) * statistics.variance(side.values()) for side in (one, other))
-    allowed = _quantile(tail, freedom) * math.sqrt(squares / freedom)
-    allowed *= math.sqrt(1 / len(one) + 1 / len(other))
+    tail = tail_of(level, both_sides=both_sides)
     if one.keys() == other.keys():
         pairs = [other[seed] - one[seed] for seed in one]
-        paired = _quantile(tail, len(pairs) - 1) * statistics.stdev(pairs) / math.sqrt(len(pairs))
-        allowed = min(allowed, paired)
-    return allowed
+        return quantile(tail, len(pairs) - 1) * statistics.stdev(pairs) / math.sqrt(len(pairs))
+    freedom = len(one) + len(other) - 2
+    squares = sum((len(side) - 1) * statistics.variance(side.values()) for side in (one, other))
+    error = math.sqrt(squares / freedom) * math.sqrt(1 / len(one) + 1 / len(other))
+    return quantile(tail, freedom) * error
 
 
 def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
@@ -137,7 +148,7 @@ def hardly_varying(values: Sequence[float | None]) -> str | None:
 def _detectable(share: float, count: int, level: float) -> float:
     """Change that is caught as often as wanted, as a share of the mean."""
     freedom = 2 * count - 2
-    needed = _quantile(level / 2, freedom) + _quantile(1 - CAUGHT, freedom)
+    needed = quantile(level, freedom) + quantile(1 - CAUGHT, freedom)
     return needed * share * math.sqrt(2 / count)
 
 
@@ -146,7 +157,8 @@ def _known(values: Mapping[int, float | None]) -> dict[int, float]:
 
 
 @cache
-def _quantile(tail: float, freedom: int) -> float:
+def quantile(tail: float, freedom: int) -> float:
+    """Value that Student's t exceeds with probability ``tail``."""
     from scipy.stats import t
 
     return float(t.isf(tail, freedom))

@@ -5,14 +5,23 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
 
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.base.given_files import read_given_text
+from odscen.regression.detection import DetectEntry, detection_of
 from odscen.regression.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
+from odscen.regression.scatter import FEWEST_SEEDS
 from odscen.regression.tolerance import Tolerances, parse_tolerance
 from odscen.results.measures.expectations import USABLE, parse_expectation
 from odscen.results.measures.registry import ALL_FIGURES
@@ -25,6 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.convert.model.conversion_settings import ConverterName
+    from odscen.regression.detection import Detection
     from odscen.regression.tolerance import Tolerance
     from odscen.results.measures.expectations import Expectation
     from odscen.results.measures.figure import Figure
@@ -67,10 +77,16 @@ def _tolerance_table(table: ToleranceTable, info: ValidationInfo) -> ToleranceTa
     return table
 
 
+def _change_only(entry: object) -> object:
+    """``"5 %"`` stands for ``{ change = "5 %" }``."""
+    return {"change": entry} if isinstance(entry, str) else entry
+
+
 class _Settings(Part):
     """What may stand at the top, for all scenarios, or at one of them."""
 
     seeds: Seeds | None = None
+    detect: Annotated[DetectEntry, BeforeValidator(_change_only)] | None = None
     redraw: Redraw | None = None
     expect: tuple[Annotated[str, AfterValidator(_expectation)], ...] = ()
     usable: bool | None = None
@@ -83,6 +99,13 @@ class _Settings(Part):
     better: Literal["pass", "fail"] | None = None
     map: Literal["report", "fail"] | None = None
     inputs: Literal["report", "fail"] | None = None
+
+    @model_validator(mode="after")
+    def _seeds_or_detect(self) -> Self:
+        if self.seeds is not None and self.detect is not None:
+            msg = "give seeds or detect, not both: detect chooses the seeds"
+            raise ValueError(msg)
+        return self
 
 
 class _ScenarioEntry(_Settings):
@@ -122,6 +145,9 @@ class Case:
         apart.
     redraw
         What a seed draws.
+    detect
+        The change that the seeds are chosen to catch: those are the baseline's, and ``seeds``
+        stands for them until there is one. ``None`` where the suite names seeds.
     other_seeds
         Whether the seeds were given in place of the suite's: a baseline whose scatter decides is
         then good for seeds that it does not have.
@@ -140,6 +166,7 @@ class Case:
     map_fails: bool = False
     inputs_fail: bool = False
     redraw: Redraw = "open"
+    detect: Detection | None = None
     other_seeds: bool = False
 
 
@@ -219,7 +246,7 @@ def read_suite(file: Path) -> Suite:
         raise ScenarioError(msg, problems=validation_problems(error), file=str(file)) from error
     with in_file(str(file)):
         refuse_tolerances(own)
-    return _suite(document, file, own)
+        return _suite(document, file, own)
 
 
 def _suite(document: _SuiteDocument, file: Path, own: Mapping[str, Figure]) -> Suite:
@@ -275,12 +302,16 @@ def _case(
     tolerances = _tolerances(document.tolerance, own=own) | _tolerances(entry.tolerance, own=own)
     wanted = document.usable if entry.usable is None else entry.usable
     expect = dict.fromkeys((*document.expect, *entry.expect))
+    seeds, detect = _seeds_and_detect(document, entry, own)
+    if detect is not None:
+        _refuse_in_vain(detect, tolerances, folder)
     if wanted is not False:
         expect = {USABLE.text: None, **expect}
     return Case(
         name=name,
         file=path,
-        seeds=tuple(dict.fromkeys(entry.seeds or document.seeds or (0,))),
+        seeds=seeds,
+        detect=detect,
         expectations=tuple(parse_expectation(text, own=own) for text in expect),
         tolerances=Tolerances(tolerances, own),
         until=entry.until or document.until,
@@ -292,6 +323,38 @@ def _case(
         inputs_fail=(entry.inputs or document.inputs) == "fail",
         redraw=entry.redraw or document.redraw or "open",
     )
+
+
+def _seeds_and_detect(
+    document: _SuiteDocument, entry: _ScenarioEntry, own: Mapping[str, Figure]
+) -> tuple[tuple[int, ...], Detection | None]:
+    """What the scenario says, else what the suite says; one of both is there at most."""
+    nearest: _Settings = entry
+    if entry.seeds is None and entry.detect is None:
+        nearest = document
+    if nearest.detect is None:
+        return tuple(dict.fromkeys(nearest.seeds or (0,))), None
+    known = {figure.name: figure for figure in ALL_FIGURES if figure.kind == "run"}
+    try:
+        detect = detection_of(nearest.detect, {**known, **own})
+    except InputError as error:
+        raise InputError(error.problem, element=f"detect.{error.element}") from error
+    return tuple(range(1, FEWEST_SEEDS + 1)), detect
+
+
+def _refuse_in_vain(
+    detect: Detection,
+    tolerances: Mapping[tuple[str, str], Tolerance],
+    folder: Path | None,
+) -> None:
+    """Refuse a change that could not be caught, or for which seeds could not be kept."""
+    name = detect.figure.name
+    if folder is None:
+        msg = "a change is caught against baselines; name their folder"
+        raise InputError(msg, element="baselines")
+    if ("run", name) in tolerances:
+        msg = f"detect sets what is allowed of {name}; leave out one of them"
+        raise InputError(msg, element=f"tolerance.{name}")
 
 
 def _tolerances(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from odscen.app.runs import CheckedRun
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.case_results import SeedResult
+    from odscen.regression.detection import Sizing
     from odscen.regression.suite import Case, Suite
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.map_entry import MapEntry
@@ -36,12 +37,14 @@ class LoadedCase:
     """A case with its scenario on the map that it will run on; ``run`` is without a seed.
 
     ``runs`` by seed, and ``refused``, the words of a seed that could not be run, are filled later.
+    So is ``sizing``, with the seeds of ``case``, where those are chosen for a new baseline.
     """
 
     case: Case
     run: CheckedRun
     made_of: Fingerprint
     baseline: Baseline | None
+    sizing: Sizing | None = None
     runs: dict[int, SeedResult] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
 
@@ -99,7 +102,11 @@ def _load(workspace: Workspace, case: Case, maps: _SuiteMaps, *, with_baseline: 
     made_of = fingerprint(scenario, entry.sha256, settings, network=network)
     baseline = read_baseline(case.baseline) if with_baseline and case.baseline else None
     run = replace(run, assets=shipped_assets())  # a baseline holds in every workspace
-    return LoadedCase(case, run, made_of, baseline)
+    if baseline is None:
+        return LoadedCase(case, run, made_of, None)
+    if case.detect is not None and not case.other_seeds:
+        case = replace(case, seeds=baseline.seeds)
+    return LoadedCase(case, run, made_of, baseline, baseline.sizing)
 
 
 def map_before(entry: MapEntry, digest: str, workspace: Workspace | None) -> MapEntry | None:

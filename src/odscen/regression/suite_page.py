@@ -10,7 +10,7 @@ from odscen.base.errors import OdscenError
 from odscen.base.markup import Markup, element, join
 from odscen.regression.case_results import CaseStatus
 from odscen.regression.suite_map import change_maps, ranked_places
-from odscen.regression.suite_words import details, headline
+from odscen.regression.suite_words import details, headline, seed_words, sizing_words
 from odscen.regression.verdict import Effect
 from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.sumo.folder.layout import REPORT_FILE
@@ -78,10 +78,12 @@ def _head(result: SuiteResult) -> Markup:
     bad = sum(not case.status.passes for case in result.cases)
     verdict = f"{bad} of {total} scenarios do not pass" if bad else "All scenarios pass"
     counts = ", ".join(f"{number} {status}" for status, number in result.counts.items())
+    sized = [case.sizing for case in result.cases if case.sizing is not None]
     return page_head(
         "Regression test",
         result.suite.name,
         element("p", f"{counts or 'no scenarios'}; {runs} runs."),
+        element("p", f"{sizing_words(sized)}.") if sized else None,
         verdict=verdict,
         style="bad" if bad else "good",
     )
@@ -109,7 +111,7 @@ def _case_row(case: CaseResult, ident: str) -> Markup:
         element("td", case.label, class_=_STYLES[case.status]),
         element("td", why, class_="wrap"),
         element("td", case.map_name),
-        element("td", ", ".join(str(run.seed) for run in case.runs)),
+        element("td", seed_words([run.seed for run in case.runs]), class_="wrap"),
         element("td", f"{case.wall_seconds:.1f}", class_="n"),
     )
 
@@ -144,6 +146,8 @@ def _case_section(
     in_table = {change.words for change in changes}
     in_table |= {f"better: {words}" for words in in_table}
     besides = [words for words in details(case) if words not in in_table]
+    if case.sizing is not None and case.sizing.words not in besides:
+        besides.append(case.sizing.words)
     if len(changes) > MOST_ROWS:
         besides.append(f"{len(changes) - MOST_ROWS} more changes are in the JSON of the suite")
     ranks = ranked_places(case)

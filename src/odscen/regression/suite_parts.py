@@ -7,7 +7,7 @@ those follow from the figures, the suite and its baselines.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, in_file
@@ -15,6 +15,7 @@ from odscen.base.given_files import read_given
 from odscen.base.stored_files import documents, read_document
 from odscen.regression.case_results import SeedResult
 from odscen.regression.causes import causes_between
+from odscen.regression.detection import Sizing
 from odscen.regression.measure import FigureKey
 from odscen.results.records.run_records import json_with_rows
 
@@ -44,6 +45,8 @@ class RunCase:
         What its runs were made of; empty if it could not be run.
     refused
         Why runs of it could not be prepared, in words.
+    sizing
+        What its seeds were chosen for.
     """
 
     name: str
@@ -51,6 +54,7 @@ class RunCase:
     made_of: Fingerprint
     runs: tuple[SeedResult, ...]
     refused: tuple[str, ...]
+    sizing: Sizing | None = None
 
 
 def results_json(result: SuiteResult, *, beside: Path) -> str:
@@ -64,6 +68,7 @@ def _row(case: CaseResult, beside: Path) -> dict[str, Any]:
     return {
         "name": case.name,
         "made_of": case.made_of,
+        **({"detect": case.sizing.model_dump(mode="json")} if case.sizing else {}),
         "refused": [words for words in case.errors if case.made_of and words not in failed],
         "runs": [_run(run, beside) for run in case.runs],
     }
@@ -121,12 +126,14 @@ def _files(path: Path) -> list[Path]:
 
 
 def _case(row: Mapping[str, Any], file: Path) -> RunCase:
+    chosen = row.get("detect")
     return RunCase(
         name=str(row["name"]),
         source=file,
         made_of={str(name): str(digest) for name, digest in row["made_of"].items()},
         runs=tuple(_seed_result(run, file.parent) for run in row["runs"]),
         refused=tuple(str(words) for words in row["refused"]),
+        sizing=None if chosen is None else Sizing.model_validate(chosen),
     )
 
 
@@ -149,8 +156,13 @@ def take_parts(
     cases: Sequence[LoadedCase | UnusableCase],
     loaded: Sequence[LoadedCase],
     parts: Mapping[str, RunCase],
+    *,
+    sizing: bool = False,
 ) -> None:
     """Give each scenario its runs from the parts; what is not there is its error.
+
+    ``sizing`` says that new baselines are made of them: seeds that odscen chooses are those that
+    the parts have chosen.
 
     Raises
     ------
@@ -163,10 +175,10 @@ def take_parts(
             msg = f"the suite has no scenario {part.name!r}, which was run here"
             raise InputError(msg, file=str(part.source))
     for case in loaded:
-        _take(case, parts.get(case.case.name))
+        _take(case, parts.get(case.case.name), sizing=sizing)
 
 
-def _take(case: LoadedCase, part: RunCase | None) -> None:
+def _take(case: LoadedCase, part: RunCase | None, *, sizing: bool) -> None:
     if part is None:
         case.refused[-1] = "none of the parts has run it: was one of them interrupted?"
         return
@@ -175,6 +187,13 @@ def _take(case: LoadedCase, part: RunCase | None) -> None:
         words = ", ".join(cause.words for cause in differ)
         case.refused[-1] = f"{part.source} was made with other inputs than are here: {words}"
         return
+    detect = case.case.detect
+    if sizing and detect is not None:
+        if part.sizing is None or not part.sizing.is_for(detect):
+            case.refused[-1] = f"{part.source} was run without --update-baseline, or other detect"
+            return
+        case.sizing = part.sizing
+        case.case = replace(case.case, seeds=tuple(run.seed for run in part.runs))
     case.runs.update({run.seed: run for run in part.runs if run.seed in case.case.seeds})
     case.refused.update(enumerate(part.refused, start=-len(part.refused)))
     lacking = [str(seed) for seed in case.case.seeds if seed not in case.runs]

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from odscen.regression.case_results import CaseStatus
-from odscen.regression.suite_words import headline
+from odscen.regression.suite_words import headline, sizing_words
 
 if TYPE_CHECKING:
     from odscen.regression.case_results import CaseResult, SuiteResult
@@ -31,6 +31,8 @@ def suite_summary(result: SuiteResult) -> str:
     sign = _SIGNS[CaseStatus.PASSED if result.exit_code == 0 else CaseStatus.FAILED]
     name = _plain(result.suite.name)
     parts = [f"## {sign} {name}\n\n{counts or 'no scenarios'}\n"]
+    if sized := [case.sizing for case in result.cases if case.sizing is not None]:
+        parts.append(f"{_plain(sizing_words(sized))}\n")
     if result.touched:
         rows = [
             f"- {_plain(words)}: {len(names)} of {len(result.cases)} scenarios"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from odscen.regression.case_results import CaseStatus
 from odscen.results.measures.figure import RunFigure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.regression.case_results import CaseResult, SuiteResult
+    from odscen.regression.detection import Sizing
     from odscen.regression.verdict import Change
 
 MOST = 6
@@ -132,6 +136,27 @@ def lines(case: CaseResult) -> list[str]:
     return [text for text in (top, *shown, *rest) if text]
 
 
+def seed_words(seeds: Sequence[int]) -> str:
+    """``"1-42"`` or ``"1, 2, 7-9"``."""
+    parts: list[str] = []
+    rows = enumerate(sorted(seeds))
+    for _, group in groupby(rows, key=lambda row: row[1] - row[0]):
+        run = [seed for _, seed in group]
+        parts += [f"{run[0]}-{run[-1]}"] if len(run) > 2 else map(str, run)
+    return ", ".join(parts)
+
+
+def sizing_words(sizings: Sequence[Sizing]) -> str:
+    """What the chosen seeds of scenarios catch, in one sentence."""
+    counts = [one.seeds for one in sizings]
+    few = f"{min(counts)} to {max(counts)}" if min(counts) < max(counts) else f"{counts[0]}"
+    enough = sum(one.enough for one in sizings)
+    return (
+        f"{few} seeds a scenario were chosen to catch what the suite wants to be caught; in "
+        f"{enough} of {len(sizings)} scenarios they do"
+    )
+
+
 def to_dict(result: SuiteResult) -> dict[str, Any]:
     """Return the whole result as data."""
     return {
@@ -156,6 +181,7 @@ def _case(case: CaseResult) -> dict[str, Any]:
         "headline": headline(case),
         "cause": _cause_name(case),
         "seeds": [run.seed for run in case.runs],
+        "detect": None if case.sizing is None else case.sizing.model_dump(mode="json"),
         "wall_seconds": round(case.wall_seconds, 3),
         "problems": list(case.problems),
         "notes": list(case.notes),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.regression.scatter import FLOOR, Level, allowed_by_chance
+from odscen.regression.scatter import FLOOR, WATCHED, Level, allowed_by_chance
 from odscen.regression.tolerance import EXACT, Tolerance
 from odscen.results.measures.comparison import compare_figure
 from odscen.results.measures.figure import Better
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.regression.baseline import Baseline
+    from odscen.regression.detection import Detection
     from odscen.regression.measure import FigureKey, Measured
     from odscen.regression.tolerance import Tolerances
     from odscen.results.measures.comparison import Difference
@@ -136,6 +137,7 @@ def hold_against(
     tolerances: Tolerances,
     *,
     better_fails: bool = False,
+    detect: Detection | None = None,
 ) -> BaselineVerdict:
     """Hold new runs, given by seed, against a baseline, by the means over the seeds of both.
 
@@ -147,14 +149,16 @@ def hold_against(
     ----------
     better_fails
         Whether a figure fails, too, that is better than its tolerance allows.
+    detect
+        A change that is to be caught: its figure has more of the false alarms than others.
     """
     compared = _compared(baseline, runs)
-    level = _level(compared, tolerances)
+    limits = _Limits(tolerances, _level(compared, tolerances, detect), detect, better_fails)
     changes = []
     for one in compared:
         tolerance = tolerances.of(one.key)
         if baseline.by_scatter and (one.key.kind, one.key.figure) not in tolerances.given:
-            tolerance = _by_scatter(one, tolerance, tolerances, level, better_fails=better_fails)
+            tolerance = limits.by_scatter(one, tolerance)
         change = _change(one, tolerance, tolerances, by_scatter=baseline.by_scatter)
         if change is not None:
             if better_fails and change.effect is Effect.BETTER:
@@ -203,39 +207,50 @@ def _compared(baseline: Baseline, runs: Mapping[int, Measured]) -> list[_Compare
     return [one._replace(weight=_vehicles(one.key, passed)) for one in compared]
 
 
-def _level(compared: Sequence[_Compared], tolerances: Tolerances) -> Level:
+def _level(
+    compared: Sequence[_Compared], tolerances: Tolerances, detect: Detection | None
+) -> Level:
     """Share out false alarms among the figures that can fail by scatter."""
     run = places = 0
     for one in compared:
         if (one.key.kind, one.key.figure) in tolerances.given or one.key.kind == "actor":
             continue
-        run += one.key.kind == "run"
+        run += one.key.kind == "run" and not (detect is not None and one.key == detect.key)
         places += one.key.kind != "run" and one.weight >= FEWEST
-    return Level.shared(run=run, places=places)
+    return Level.shared(run=run, places=places, watched=detect is not None)
 
 
-def _by_scatter(
-    one: _Compared,
-    usual: Tolerance,
-    tolerances: Tolerances,
-    level: Level,
-    *,
-    better_fails: bool,
-) -> Tolerance:
-    """What chance explains, where that is more than the least that matters."""
-    allowed = allowed_by_chance(
-        one.old,
-        one.new,
-        level=level.run if one.key.kind == "run" else level.place,
-        both_sides=better_fails or tolerances.entry(one.key).better is Better.NEITHER,
-    )
-    known = [value for value in one.old.values() if value is not None]
-    if allowed is None:
-        return usual
-    floor = usual.times(FLOOR)
-    if allowed <= floor.allowed(sum(known) / len(known)):
-        return floor
-    return Tolerance(absolute=allowed, by_scatter=True)
+class _Limits(NamedTuple):
+    """What scatter allows of each figure."""
+
+    tolerances: Tolerances
+    level: Level
+    detect: Detection | None
+    better_fails: bool
+
+    def by_scatter(self, one: _Compared, usual: Tolerance) -> Tolerance:
+        """What chance explains, where that is more than the least that matters."""
+        watched = self.detect if self.detect is not None and one.key == self.detect.key else None
+        level = self.level.run if one.key.kind == "run" else self.level.place
+        better = self.tolerances.entry(one.key).better
+        allowed = allowed_by_chance(
+            one.old,
+            one.new,
+            level=level if watched is None else WATCHED,
+            both_sides=self.better_fails or better is Better.NEITHER,
+        )
+        if allowed is None:
+            return usual
+        floor = usual.times(FLOOR)
+        mean = _mean_known(one.old)
+        if watched is not None and watched.floor(mean) < floor.allowed(mean):
+            floor = Tolerance(absolute=watched.floor(mean))
+        return floor if allowed <= floor.allowed(mean) else Tolerance(0.0, allowed, by_scatter=True)
+
+
+def _mean_known(values: Mapping[int, float | None]) -> float:
+    known = [value for value in values.values() if value is not None]
+    return sum(known) / len(known)
 
 
 def _change(
