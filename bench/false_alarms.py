@@ -1,23 +1,25 @@
 """Does the gate fail when nothing has changed, and does it see a change of 5 %?
 
-Every scenario of the shipped suite is run with many seeds that redraw its traffic, as it is and
-with drivers who keep a longer headway, chosen so that the mean delay grows by about 5 %. From
-these runs, baselines and reruns of several sizes are put together, fifty times each:
+Every scenario of the shipped suite is run with many seeds that redraw its traffic: as it is, with
+drivers who keep a longer headway, chosen so that the mean delay grows by about 5 %, and with steps
+of 1 s instead of 0.5 s, a change of another kind. From these runs, baselines and reruns are put
+together, fifty times each, in an order of the seeds that is drawn anew every time:
 
-- a false alarm is a rerun of the unchanged scenario with seeds that the baseline does not have, in
-  which any figure or place fails;
-- a change is caught if the mean delay fails. With other seeds it is raised by 5 %; with the
-  seeds of the baseline it differs as the longer headway makes it differ from seed to seed, but by
-  5 % on average.
+- the seeds of the baseline are chosen as ``detect = "5 %"`` chooses them, from the first seeds and
+  the longer headway; then with fixed numbers of seeds, without ``detect``;
+- a false alarm is a rerun of the unchanged scenario with as many seeds that the baseline does not
+  have, in which any figure or place fails;
+- a change is caught if the mean delay fails. The seeds are those of the baseline, and it differs as
+  the changed runs differ from seed to seed, but by 5 % on average; with other seeds it is raised by
+  5 %.
 
-``--seeds N`` runs each scenario with N seeds (64), ``--keep FILE`` stores what was measured, or
-reads it if the file is there.
+``--seeds N`` runs each scenario with N seeds (64). ``--keep FOLDER`` stores what was measured of
+each scenario, and reads what is there, so that all this is computed again without runs.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
 import pickle
 import statistics
 import tempfile
@@ -27,34 +29,36 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t
 
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.regression.baseline import baseline_of
+from odscen.regression.detection import DetectEntry, detection_of, size_of
 from odscen.regression.gates import run_suite
 from odscen.regression.measure import FigureKey, Measured
 from odscen.regression.scatter import (
     CAUGHT,
     CHANGE,
-    FEWEST_SEEDS,
     FLOOR,
     Level,
     allowed_by_chance,
     seeds_needed,
 )
-from odscen.regression.suite import Suite, read_suite
+from odscen.regression.seed_sizing import PILOT, PROBE, with_longer_headway
+from odscen.regression.suite import Case, Suite, read_suite
 from odscen.regression.tolerance import Tolerances, usual
 from odscen.regression.verdict import hold_against
-from odscen.scenario.document.validation import validated
 from odscen.sumo.realize.driving import HEADWAY
 from odscen.workspace.store import Workspace
 
 SUITE = Path(__file__).parents[1] / "suites" / "shipped.toml"
 RERUNS = 50
-PROBE_SEEDS, PROBE = 12, 1.0
-"""Seeds, and seconds more of headway, from which its effect is estimated."""
+PROBE_SEEDS = 12
+"""Seeds from which the effect of a longer headway is estimated."""
+STEP = 1.0
+"""Seconds of a long step."""
 SIZES = (8, 16, 24, 32, 48)
 DELAY = FigureKey("run", "", "mean_delay")
+DETECT = detection_of(DetectEntry(change=f"{100 * CHANGE:g} %"), {"mean_delay": DELAY.entry})
 
 Runs = dict[int, Measured]
 FloatArray = npt.NDArray[np.float64]
@@ -63,10 +67,11 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Pool:
-    """Runs of one scenario by seed, as it is and with a longer headway (s)."""
+    """Runs of one scenario by seed: as it is, with a longer headway (s), and with long steps."""
 
     before: Runs
     after: Runs
+    stepped: Runs
     headway: float
 
 
@@ -75,49 +80,58 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=64)
     parser.add_argument("--keep", type=Path)
     chosen = parser.parse_args()
-    if chosen.keep is not None and chosen.keep.is_file():
-        pools = pickle.loads(chosen.keep.read_bytes())
-    else:
-        with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
-            pools = measured_pools(Path(folder), chosen.seeds)
-        if chosen.keep is not None:
-            chosen.keep.write_bytes(pickle.dumps(pools))
+    with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
+        keep = chosen.keep or Path(folder)
+        keep.mkdir(exist_ok=True)
+        suite = replace(read_suite(SUITE), missing=())
+        workspace = Workspace.open(Path(folder) / "workspace")
+        pools = {
+            case.name: pool_of(workspace, suite, case, keep / f"{case.name}.pickle", chosen.seeds)
+            for case in suite.cases
+        }
     report(pools)
 
 
-def measured_pools(folder: Path, count: int) -> dict[str, Pool]:
-    workspace = Workspace.open(folder / "workspace")
-    suite = replace(read_suite(SUITE), missing=())
-    before = measured(workspace, suite, range(1, count + 1))
-    headways = dict.fromkeys(before, HEADWAY + PROBE)
-    probed = measured(workspace, slower(suite, headways, folder), range(1, PROBE_SEEDS + 1))
-    headways = {name: headway_for(before[name], probed[name]) for name in before}
-    after = measured(workspace, slower(suite, headways, folder), range(1, count + 1))
-    return {name: Pool(before[name], after[name], headways[name]) for name in before}
+def pool_of(workspace: Workspace, suite: Suite, case: Case, file: Path, count: int) -> Pool:
+    """The runs of a scenario, read if they are kept."""
+    if file.is_file():
+        found = pickle.loads(file.read_bytes())
+        assert isinstance(found, Pool)
+        return found
+    alone = replace(suite, cases=(case,), maps=tuple(suite.maps))
+    seeds = range(1, count + 1)
+    before = measured(workspace, alone, seeds)
+    probed = measured(workspace, slower(alone, HEADWAY + PROBE, file.parent), seeds[:PROBE_SEEDS])
+    headway = headway_for(before, probed)
+    after = measured(workspace, slower(alone, headway, file.parent), seeds)
+    stepped = measured(workspace, alone, seeds, step_length=STEP)
+    pool = Pool(before, after, stepped, headway)
+    file.write_bytes(pickle.dumps(pool))
+    return pool
 
 
-def measured(workspace: Workspace, suite: Suite, seeds: Sequence[int]) -> dict[str, Runs]:
-    cases = [
-        replace(case, seeds=tuple(seeds), redraw="traffic", baseline=None, expectations=())
-        for case in suite.cases
-    ]
-    found = run_suite(workspace, replace(suite, cases=tuple(cases)))
-    return {
-        case.name: {run.seed: run.figures for run in case.runs if run.error is None}
-        for case in found.cases
-    }
+def measured(
+    workspace: Workspace, suite: Suite, seeds: Sequence[int], *, step_length: float | None = None
+) -> Runs:
+    """Runs of the one scenario of a suite."""
+    case = replace(
+        suite.cases[0],
+        seeds=tuple(seeds),
+        redraw="traffic",
+        baseline=None,
+        expectations=(),
+        step_length=step_length,
+    )
+    found = run_suite(workspace, replace(suite, cases=(case,)))
+    return {run.seed: run.figures for run in found.cases[0].runs if run.error is None}
 
 
-def slower(suite: Suite, headways: dict[str, float], folder: Path) -> Suite:
-    """The suite with another headway for the drivers of each scenario."""
-    cases = []
-    for case in suite.cases:
-        scenario = read_scenario(case.file)
-        drivers = {"headway": round(headways[case.name], 3)}
-        changed = validated(type(scenario), {**dict(scenario), "drivers": drivers})
-        file = write_scenario(changed, folder / case.file.name)
-        cases.append(replace(case, file=file))
-    return replace(suite, cases=tuple(cases))
+def slower(suite: Suite, headway: float, folder: Path) -> Suite:
+    """The suite with another headway for the drivers of its scenario."""
+    case = suite.cases[0]
+    changed = with_longer_headway(read_scenario(case.file), headway - HEADWAY)
+    file = write_scenario(changed, folder / case.file.name)
+    return replace(suite, cases=(replace(case, file=file),))
 
 
 def headway_for(before: Runs, probed: Runs) -> float:
@@ -137,25 +151,83 @@ def chosen_of(runs: Runs, seeds: Sequence[int]) -> Runs:
 
 def report(pools: dict[str, Pool]) -> None:
     print(f"{'':<20} {'delay':>7} {'scatter':>8} {'seeds':>6}   {'headway':>7} {'delay':>7} "
-          f"{'scatter':>8} {'seeds':>6}")  # fmt: skip
+          f"{'scatter':>8}   {'delay':>7} {'scatter':>8}")  # fmt: skip
     for name, pool in pools.items():
-        old, new = paired_delays(pool)
-        mean, level = old.mean(), level_of(pool)
-        pairs = (new - old).std(ddof=1) / mean
-        print(f"{name:<20} {mean:5.1f} s {old.std(ddof=1) / mean:8.1%} "
-              f"{seeds_needed(old.tolist(), level=level):6d}   {pool.headway:5.2f} s "
-              f"{new.mean() / mean - 1:+7.1%} {pairs:8.1%} {pairs_needed(pairs, level):6d}"
+        old, new = delays_of(pool, pool.after)
+        mean = old.mean()
+        before, stepped = delays_of(pool, pool.stepped)
+        needed = seeds_needed(old.tolist(), level=level_of(pool))
+        print(f"{name:<20} {mean:5.1f} s {old.std(ddof=1) / mean:8.1%} {needed:6d}"
+              f"   {pool.headway:5.2f} s {effect(old, new)}   {effect(before, stepped)}"
               )  # fmt: skip
     random = np.random.default_rng(18)
-    print(f"\n{RERUNS} reruns of each scenario with as many seeds as the baseline")
+    print(f"\n{RERUNS} baselines of each scenario with the seeds that detect chooses, and reruns")
+    print(f"{'':<20} {'seeds':>12} {'false alarms':>13} {'caught: headway':>16} {'steps':>6}")
+    rows = [chosen_row(name, pool, random) for name, pool in pools.items()]
+    total = np.sum(rows, axis=0) / (RERUNS * len(pools))
+    print(f"{'all':<20} {'':>12} {total[0]:13.1%} {total[1]:16.1%} {total[2]:6.1%}")
+    print(f"\n{RERUNS} reruns of each scenario with as many seeds as the baseline, chosen by hand")
     print(f"{'seeds':>5} {'false alarms':>13} {'other seeds, +5 %':>18} {'same seeds, +5 %':>17}")
     for size in SIZES:
         print_size(pools, size, random)
 
 
-def paired_delays(pool: Pool) -> tuple[FloatArray, FloatArray]:
+def effect(old: FloatArray, new: FloatArray) -> str:
+    """How far the mean delay is off, and how far the differences scatter."""
+    return f"{new.mean() / old.mean() - 1:+7.1%} {(new - old).std(ddof=1) / old.mean():8.1%}"
+
+
+def chosen_row(name: str, pool: Pool, random: np.random.Generator) -> tuple[int, int, int]:
+    """False alarms, and changes that are caught: by a longer headway, and by long steps."""
+    old, new = delays_of(pool, pool.after)
+    before, stepped = delays_of(pool, pool.stepped)
+    counts, alarms, caught, otherwise = [], 0, 0, 0
+    for _ in range(RERUNS):
+        rows = random.permutation(len(old))
+        count = chosen_seeds(old[rows], new[rows])
+        counts.append(count)
+        alarms += alarmed(pool, rows, count)
+        caught += caught_by(old, raised(old, new), rows[:count])
+        rows = random.permutation(len(before))
+        otherwise += caught_by(before, raised(before, stepped), rows[:count])
+    some = f"{statistics.median(counts):.0f} ({min(counts)}-{max(counts)})"
+    print(f"{name:<20} {some:>12} {alarms:13d} {caught:16d} {otherwise:6d}", flush=True)
+    return alarms, caught, otherwise
+
+
+def chosen_seeds(old: FloatArray, new: FloatArray) -> int:
+    """How many seeds a suite with ``detect`` would choose, the first ones being the pilot."""
+    detect, count = replace(DETECT, seeds_max=len(old)), PILOT
+    while (found := size_of(detect, old[:count].tolist(), new[:count].tolist())).seeds > count:
+        count = min(found.seeds, 2 * count)
+    return found.seeds
+
+
+def alarmed(pool: Pool, rows: IntArray, count: int) -> bool:
+    """Whether other seeds, as many as there are up to ``count``, fail against a baseline."""
     seeds = sorted(pool.before.keys() & pool.after.keys())
-    sides = [[runs[seed][DELAY] for seed in seeds] for runs in (pool.before, pool.after)]
+    parts = (rows[:count], rows[count : 2 * count])
+    sides = [chosen_of(pool.before, [seeds[row] for row in part]) for part in parts]
+    verdict = hold_against(baseline_of(sides[0], {}), sides[1], Tolerances({}), detect=DETECT)
+    return bool(verdict.failing)
+
+
+def raised(old: FloatArray, new: FloatArray) -> FloatArray:
+    """Delays that differ from ``old`` as ``new`` does, but by 5 % on average."""
+    return new - (new - old).mean() + CHANGE * old.mean()
+
+
+def caught_by(old: FloatArray, new: FloatArray, rows: IntArray) -> bool:
+    sides: list[Runs] = [{int(row): {DELAY: float(side[row])} for row in rows}
+                         for side in (old, new)]  # fmt: skip
+    verdict = hold_against(baseline_of(sides[0], {}), sides[1], Tolerances({}), detect=DETECT)
+    return bool(verdict.failing)
+
+
+def delays_of(pool: Pool, changed: Runs) -> tuple[FloatArray, FloatArray]:
+    """Mean delays of the seeds that both have."""
+    seeds = sorted(pool.before.keys() & changed.keys())
+    sides = [[runs[seed][DELAY] for seed in seeds] for runs in (pool.before, changed)]
     old, new = (np.array(side, dtype=float) for side in sides)
     return old, new
 
@@ -165,23 +237,13 @@ def level_of(pool: Pool) -> float:
     return Level.shared(run=figures, places=1).run
 
 
-def pairs_needed(share: float, level: float) -> int:
-    """Seeds with which 5 % is caught, the same on both sides; differences scatter by a share."""
-    count = FEWEST_SEEDS
-    while (t.isf(level / 2, count - 1) + t.isf(1 - CAUGHT, count - 1)) * share > CHANGE * (
-        math.sqrt(count)
-    ):
-        count += 1
-    return count
-
-
 def print_size(pools: dict[str, Pool], size: int, random: np.random.Generator) -> None:
     """Shares over all scenarios, then of how many reruns of each."""
     counts = {name: np.zeros(3) for name in pools}
     alarms = all(2 * size <= len(pool.before) for pool in pools.values())
     for name, pool in pools.items():
-        old, new = paired_delays(pool)
-        shifted = new - (new - old).mean() + CHANGE * old.mean()
+        old, new = delays_of(pool, pool.after)
+        shifted = raised(old, new)
         seeds = sorted(pool.before.keys() & pool.after.keys())
         for _ in range(RERUNS):
             rows = random.permutation(len(seeds))

@@ -38,9 +38,9 @@ def test_what_is_allowed_between_other_seeds_is_the_interval_of_a_difference_of_
     variances = [np.var(list(side.values()), ddof=1) for side in (old, new)]
     pooled = math.sqrt((9 * variances[0] + 11 * variances[1]) / 20)
     error = pooled * math.sqrt(1 / 10 + 1 / 12)
-    assert allowed == pytest.approx(stats.t.ppf(0.98, 20) * error)
+    assert allowed == pytest.approx(stats.t.ppf(0.99, 20) * error)
     wider = allowed_by_chance(old, new, level=0.02, both_sides=True)
-    assert wider == pytest.approx(stats.t.ppf(0.99, 20) * error)
+    assert wider == pytest.approx(stats.t.ppf(0.995, 20) * error)
 
 
 def test_the_same_seeds_are_compared_in_pairs_which_allows_less():

@@ -1,14 +1,15 @@
 r"""How far a mean over seeds may be from the baseline's by chance alone, from the seeds' scatter.
 
 Other seeds of the same distributions give other means. The difference of two of them, over
-``n_0`` seeds at the baseline and ``n_1`` now, lies with probability ``1 - q`` below
+``n_0`` seeds at the baseline and ``n_1`` now, lies with probability ``1 - q`` at least below
 
-``allowed = t(1 - q, n_0 + n_1 - 2) * s * sqrt(1 / n_0 + 1 / n_1)``
+``allowed = t(1 - q / 2, n_0 + n_1 - 2) * s * sqrt(1 / n_0 + 1 / n_1)``
 
 where ``s`` is the standard deviation over the seeds of either side, pooled (Student's t). That of
 the baseline alone would not do: waiting times are skewed, and a rare long one that only the new
-seeds have would be an alarm. Where both sides have the same seeds, they are compared in pairs, same
-traffic under two conditions:
+seeds have would be an alarm. It takes half of q, as means of a few skewed values exceed the
+quantile more often than Student's t does. Where both sides have the same seeds, they are compared
+in pairs, same traffic under two conditions:
 
 ``allowed = t(1 - q, n - 1) * s_d / sqrt(n)``
 
@@ -110,7 +111,7 @@ def allowed_by_chance(
     freedom = len(one) + len(other) - 2
     squares = sum((len(side) - 1) * statistics.variance(side.values()) for side in (one, other))
     error = math.sqrt(squares / freedom) * math.sqrt(1 / len(one) + 1 / len(other))
-    return quantile(tail, freedom) * error
+    return quantile(tail / 2, freedom) * error
 
 
 def seeds_needed(values: Sequence[float], *, level: float) -> int | None:
@@ -148,7 +149,7 @@ def hardly_varying(values: Sequence[float | None]) -> str | None:
 def _detectable(share: float, count: int, level: float) -> float:
     """Change that is caught as often as wanted, as a share of the mean."""
     freedom = 2 * count - 2
-    needed = quantile(level, freedom) + quantile(1 - CAUGHT, freedom)
+    needed = quantile(level / 2, freedom) + quantile(1 - CAUGHT, freedom)
     return needed * share * math.sqrt(2 / count)
 
 
