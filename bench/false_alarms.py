@@ -6,7 +6,7 @@ of 1 s instead of 0.5 s, a change of another kind. From these runs, baselines an
 together, fifty times each, in an order of the seeds that is drawn anew every time:
 
 - the seeds of the baseline are chosen as ``detect = "5 %"`` chooses them, from the first seeds and
-  the longer headway; then with fixed numbers of seeds, without ``detect``;
+  both changes; then with fixed numbers of seeds, without ``detect``;
 - a false alarm is a rerun of the unchanged scenario with as many seeds that the baseline does not
   have, in which any figure or place fails;
 - a change is caught if the mean delay fails. The seeds are those of the baseline, and it differs as
@@ -32,7 +32,7 @@ import numpy.typing as npt
 
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.regression.baseline import baseline_of
-from odscen.regression.detection import DetectEntry, detection_of, size_of
+from odscen.regression.detection import DetectEntry, Pairs, detection_of, size_of
 from odscen.regression.gates import run_suite
 from odscen.regression.measure import FigureKey, Measured
 from odscen.regression.scatter import (
@@ -184,21 +184,24 @@ def chosen_row(name: str, pool: Pool, random: np.random.Generator) -> tuple[int,
     counts, alarms, caught, otherwise = [], 0, 0, 0
     for _ in range(RERUNS):
         rows = random.permutation(len(old))
-        count = chosen_seeds(old[rows], new[rows])
+        steps = rows[rows < len(before)]
+        kinds = ((old[rows], new[rows]), (before[steps], stepped[steps]))
+        count = chosen_seeds(
+            [list(zip(*(side.tolist() for side in kind), strict=True)) for kind in kinds]
+        )
         counts.append(count)
         alarms += alarmed(pool, rows, count)
         caught += caught_by(old, raised(old, new), rows[:count])
-        rows = random.permutation(len(before))
-        otherwise += caught_by(before, raised(before, stepped), rows[:count])
+        otherwise += caught_by(before, raised(before, stepped), steps[:count])
     some = f"{statistics.median(counts):.0f} ({min(counts)}-{max(counts)})"
     print(f"{name:<20} {some:>12} {alarms:13d} {caught:16d} {otherwise:6d}", flush=True)
     return alarms, caught, otherwise
 
 
-def chosen_seeds(old: FloatArray, new: FloatArray) -> int:
+def chosen_seeds(pairs: Sequence[Pairs]) -> int:
     """How many seeds a suite with ``detect`` would choose, the first ones being the pilot."""
-    detect, count = replace(DETECT, seeds_max=len(old)), PILOT
-    while (found := size_of(detect, old[:count].tolist(), new[:count].tolist())).seeds > count:
+    detect, count = replace(DETECT, seeds_max=len(pairs[0])), PILOT
+    while (found := size_of(detect, *(kind[:count] for kind in pairs))).seeds > count:
         count = min(found.seeds, 2 * count)
     return found.seeds
 

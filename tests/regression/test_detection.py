@@ -38,6 +38,10 @@ def caught(watched, before, after):
     return bool(hold_against(baseline, runs(after), Tolerances({}), detect=watched).failing)
 
 
+def sized(watched, before, after):
+    return size_of(watched, list(zip(before, after, strict=True)))
+
+
 def share_caught(watched, count, change, scatter, rounds=400):
     """Share of baselines of that many seeds that see a true change, differences being normal."""
     random = np.random.default_rng(7)
@@ -67,7 +71,7 @@ def test_the_chosen_seeds_catch_the_change_though_the_pilot_only_estimates_the_s
     for _ in range(300):
         before = random.normal(MEAN, 5.0, 16)
         after = before + random.normal(0.05 * MEAN, scatter, 16)
-        chosen.append(size_of(watched, before.tolist(), after.tolist()).needed)
+        chosen.append(sized(watched, before, after).needed)
     # The mean and the effect of a pilot vary as well, which moves some of the counts.
     assert np.mean(np.array(chosen) >= exact) == pytest.approx(ASSURANCE, abs=0.1)
     assert exact < np.median(chosen) < 2 * exact
@@ -101,7 +105,7 @@ def test_what_is_watched_is_caught_below_what_the_figure_is_allowed_otherwise():
 
 
 def test_seeds_that_hardly_vary_take_the_fewest():
-    sizing = size_of(detect(), [20.0] * 8, [21.0] * 8)
+    sizing = sized(detect(), [20.0] * 8, [21.0] * 8)
     assert (sizing.seeds, sizing.needed, sizing.scatter) == (8, 8, 0.0)
     assert sizing.words == "8 seeds catch a change of mean_delay by 5 % with probability 0.9"
 
@@ -109,7 +113,7 @@ def test_seeds_that_hardly_vary_take_the_fewest():
 def test_where_the_suite_does_not_allow_the_seeds_it_is_said_what_those_catch():
     before = [15.0, 25.0] * 8
     after = [value + (3.0 if row < 8 else -1.0) for row, value in enumerate(before)]
-    sizing = size_of(detect(seeds_max=12), before, after)
+    sizing = sized(detect(seeds_max=12), before, after)
     assert sizing.seeds == 12 < sizing.needed
     assert sizing.words == (
         "12 seeds, the most that the suite allows, catch a change of mean_delay by "
@@ -123,19 +127,31 @@ def test_where_the_suite_does_not_allow_the_seeds_it_is_said_what_those_catch():
 def test_a_pilot_that_changes_less_than_is_wanted_is_taken_to_scatter_more():
     before = [18.0, 22.0, 19.0, 21.0] * 4
     steps = np.tile([0.1, 0.3], 8)
-    found = scatter_of_differences(before, (np.array(before) + steps).tolist(), wanted=1.0)
+    pairs = list(zip(before, np.array(before) + steps, strict=True))
+    found = scatter_of_differences(pairs, wanted=1.0)
     margin = math.sqrt(15 / stats.chi2.ppf(1 - ASSURANCE, 15))
     assert found == pytest.approx(5 * np.std(steps, ddof=1) * margin)
-    same = scatter_of_differences(before, before, wanted=1.0)
+    assert scatter_of_differences(pairs) == pytest.approx(found / 5)
+    same = scatter_of_differences(list(zip(before, before, strict=True)), wanted=1.0)
     assert same == pytest.approx(math.sqrt(2) * np.std(before, ddof=1) * margin)
 
 
+def test_of_two_kinds_of_change_the_one_that_scatters_more_counts():
+    aimed = [(20.0, 21.0), (20.0, 21.2)] * 8
+    jolted = [(20.0, 23.0), (20.0, 17.0)] * 8
+    alone, both = size_of(detect(), aimed), size_of(detect(), aimed, jolted)
+    assert alone.seeds == 8
+    assert both.seeds > 40
+    assert both.scatter == pytest.approx(scatter_of_differences(jolted), abs=1e-4)
+    assert size_of(detect(), jolted, aimed).seeds >= both.seeds
+
+
 def test_a_baseline_is_good_for_the_change_that_its_seeds_were_chosen_for():
-    sizing = size_of(detect(), [20.0] * 8, [21.0] * 8)
+    sizing = sized(detect(), [20.0] * 8, [21.0] * 8)
     assert sizing.is_for(detect())
     assert not sizing.is_for(detect("4 %"))
     assert not sizing.is_for(detect(power=0.95))
-    short = size_of(detect(seeds_max=10), [15.0, 25.0] * 8, [20.0] * 16)
+    short = sized(detect(seeds_max=10), [15.0, 25.0] * 8, [20.0] * 16)
     assert short.is_for(detect(seeds_max=10))
     assert not short.is_for(detect(seeds_max=20))
     assert not short.is_for(detect(seeds_max=9))

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,7 +30,7 @@ from odscen.results.measures.figure import Better
 from odscen.scenario.document.document_parts import Label, Part
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from odscen.results.measures.figure import Figure
 
@@ -205,16 +206,24 @@ class Sizing(Part):
         return most and (self.enough or self.seeds == detect.seeds_max)
 
 
-def size_of(detect: Detection, before: Sequence[float], after: Sequence[float]) -> Sizing:
-    """Choose how many seeds catch a change.
+Pairs = Sequence[tuple[float, float]]
+"""A figure by seed, as it is and with a change, in its unit."""
+
+
+def size_of(detect: Detection, aimed: Pairs, jolted: Pairs = ()) -> Sizing:
+    """Choose how many seeds catch a change, of the kind that scatters more.
 
     Parameters
     ----------
-    before, after
-        The figure by seed, as it is and with a change, in the same order, in its unit.
+    aimed
+        With a change that is meant to be as large as the one that is to be caught.
+    jolted
+        With one that only moves traffic about, if at least three have the figure.
     """
-    mean = statistics.fmean(before)
-    scatter = scatter_of_differences(before, after, wanted=detect.size(mean))
+    mean = statistics.fmean(old for old, _ in aimed)
+    scatter = scatter_of_differences(aimed, wanted=detect.size(mean))
+    if len(jolted) > 2:
+        scatter = max(scatter, scatter_of_differences(jolted))
     needed = detect.seeds_for(scatter, mean=mean)
     count = min(needed, detect.seeds_max)
     return Sizing(
@@ -229,28 +238,21 @@ def size_of(detect: Detection, before: Sequence[float], after: Sequence[float]) 
     )
 
 
-def scatter_of_differences(
-    before: Sequence[float], after: Sequence[float], *, wanted: float
-) -> float:
-    """Standard deviation, at most, of the differences that the wanted change would make.
+def scatter_of_differences(pairs: Pairs, *, wanted: float = 0.0) -> float:
+    """Standard deviation, at most, of the differences that a change makes, in the figure's unit.
 
     Parameters
     ----------
-    before, after
-        A figure by seed, as it is and with a change, in the same order, in its unit.
     wanted
-        The change of the mean that is to be caught, in the same unit.
-
-    Notes
-    -----
-    Where the mean has changed by less than is wanted, differences are taken to grow with it, but
-    not beyond those of runs that have nothing in common: ``sqrt(2)`` times the scatter of runs.
+        The change of the mean that is to be caught, in the same unit. Where the mean has changed
+        by less, differences are taken to grow with it, but not beyond those of runs that have
+        nothing in common: ``sqrt(2)`` times the scatter of runs.
     """
-    pairs = [new - old for old, new in zip(before, after, strict=True)]
-    effect = abs(statistics.fmean(pairs))
-    unrelated = math.sqrt(2.0) * statistics.stdev(before)
-    found = statistics.stdev(pairs)
+    differences = [new - old for old, new in pairs]
+    effect = abs(statistics.fmean(differences))
+    found = statistics.stdev(differences)
     if effect < wanted:
+        unrelated = math.sqrt(2.0) * statistics.stdev(old for old, _ in pairs)
         found = max(found, min(unrelated, found * wanted / effect if effect else unrelated))
     return found * _assured(len(pairs))
 
