@@ -13,7 +13,7 @@ together, fifty times each, in an order of the seeds that is drawn anew every ti
   the changed runs differ from seed to seed, but by 5 % on average; with other seeds it is raised by
   5 %.
 
-``--seeds N`` runs each scenario with N seeds (64). ``--keep FOLDER`` stores what was measured of
+``--seeds N`` runs each scenario with N seeds (96). ``--keep FOLDER`` stores what was measured of
 each scenario, and reads what is there, so that all this is computed again without runs.
 """
 
@@ -38,6 +38,7 @@ from odscen.regression.measure import FigureKey, Measured
 from odscen.regression.scatter import (
     CAUGHT,
     CHANGE,
+    FEWEST_SEEDS,
     FLOOR,
     Level,
     allowed_by_chance,
@@ -77,7 +78,7 @@ class Pool:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=64)
+    parser.add_argument("--seeds", type=int, default=96)
     parser.add_argument("--keep", type=Path)
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="odscen-bench-") as folder:
@@ -190,7 +191,7 @@ def chosen_row(name: str, pool: Pool, random: np.random.Generator) -> tuple[int,
             [list(zip(*(side.tolist() for side in kind), strict=True)) for kind in kinds]
         )
         counts.append(count)
-        alarms += alarmed(pool, rows, count)
+        alarms += alarmed(pool, rows, count, random)
         caught += caught_by(old, raised(old, new), rows[:count])
         otherwise += caught_by(before, raised(before, stepped), steps[:count])
     some = f"{statistics.median(counts):.0f} ({min(counts)}-{max(counts)})"
@@ -206,11 +207,16 @@ def chosen_seeds(pairs: Sequence[Pairs]) -> int:
     return found.seeds
 
 
-def alarmed(pool: Pool, rows: IntArray, count: int) -> bool:
+def alarmed(pool: Pool, rows: IntArray, count: int, random: np.random.Generator) -> bool:
     """Whether other seeds, as many as there are up to ``count``, fail against a baseline."""
     seeds = sorted(pool.before.keys() & pool.after.keys())
-    parts = (rows[:count], rows[count : 2 * count])
-    sides = [chosen_of(pool.before, [seeds[row] for row in part]) for part in parts]
+    mine = [seeds[row] for row in rows[:count]]
+    others = [seed for seed in pool.before if seed not in mine]
+    if len(others) < FEWEST_SEEDS:
+        msg = f"{count} of {len(seeds)} seeds are chosen; run the bench with more --seeds"
+        raise SystemExit(msg)
+    rest = random.permutation(others)[:count]
+    sides = [chosen_of(pool.before, part) for part in (mine, rest)]
     verdict = hold_against(baseline_of(sides[0], {}), sides[1], Tolerances({}), detect=DETECT)
     return bool(verdict.failing)
 
