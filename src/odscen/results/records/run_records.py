@@ -213,6 +213,7 @@ class EventKind(StrEnum):
     MEASURE_BEGIN = "measure_begin"
     MEASURE_END = "measure_end"
     RULE_STARTED = "rule_started"
+    RULE_ACTED = "rule_acted"
     RULE_ENDED = "rule_ended"
     RULE_FAILED = "rule_failed"
     RULE_OVERRIDDEN = "rule_overridden"

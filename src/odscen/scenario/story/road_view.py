@@ -95,6 +95,12 @@ class RoadView(Protocol):
         ``None`` if there is no such lane for it. The line ends where the lanes do.
         """
 
+    def lane_line_to(self, actor: str, place: str | Point) -> tuple[Point, ...] | None:
+        """Centre line of the lane beside an actor, or its own, that leads to a place.
+
+        ``None`` if none does.
+        """
+
     def walking_speed(self, actor: str) -> float:
         """Speed at which a person walks if no rule says otherwise, m/s."""
 

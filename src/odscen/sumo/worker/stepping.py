@@ -69,6 +69,11 @@ class Stepper:
         """Whether a user who watches has ended the run."""
         return self._watch is not None and self._watch.stopped
 
+    @property
+    def waits(self) -> bool:
+        """Whether a rule may let an actor appear that is not there yet."""
+        return self.story is not None and self.story.waits
+
     def run(self, session: Session, until: float, *, more: bool = False) -> float:
         """Step until ``until``, or until no road user is left; simulated seconds then.
 
@@ -83,7 +88,7 @@ class Stepper:
         if self._start is None:
             self._start = now, self.recorder.departed
         begin, waited = clock(), 0.0
-        while now < until and (more or session.expected() > 0):
+        while now < until and (more or session.expected() > 0 or self.waits):
             if watch is not None:
                 asked = clock()
                 if not watch.next_step(session, self.recorder):
@@ -111,7 +116,7 @@ class Stepper:
 
     def _finish(self, session: Session, now: float, *, more: bool) -> None:
         """Say how it ends, if it does, and show it to who watches."""
-        empty = not more and session.expected() == 0
+        empty = not more and session.expected() == 0 and not self.waits
         if empty:
             self.recorder.road_is_empty(now)
         if self._diversions is not None and (empty or now >= self._plan.until):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
 from odscen.scenario.story.road_view import ActorView
-from odscen.scenario.story.side_motion import beside
+from odscen.scenario.story.side_motion import beside, line_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +21,8 @@ _STANDING = 0.1
 """m/s below which a road user stands."""
 _USUAL_WALK = 1.39
 """m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
+_ON_LANE = 1.5
+"""Metres from its centre line in which a place is on a lane."""
 _BEHIND = -10.0
 """Metres; less than that is behind."""
 
@@ -112,6 +114,17 @@ class StoryView:
             if by == 0 or (left > 0.0) == (by > 0):
                 return line
         return None
+
+    def lane_line_to(self, actor: str, place: str | Point) -> tuple[Point, ...] | None:
+        """Centre line of the lane beside an actor, or its own, that leads to a place."""
+        point = self.place(place)
+        found = []
+        for shape in self._road.lines(actor):
+            line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
+            along, left = beside(line, point)
+            if 0.0 <= along <= line_length(line) and abs(left) < _ON_LANE:
+                found.append((abs(left), line))
+        return min(found)[1] if found else None
 
     def walking_speed(self, actor: str) -> float:
         """Speed at which a person walks if no rule says otherwise, m/s."""
