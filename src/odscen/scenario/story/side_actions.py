@@ -48,6 +48,8 @@ def move_aside(part: LateralMove, one: ActingActor) -> float:
         If the actor is on no lane.
     """
     line = one.view.lane_line(one.actor.id, 0)
+    if line is None and one.channel.side is not None:
+        line = one.channel.line  # it is beside the lane that it was led along until now
     if line is None:
         msg = "it is on no lane"
         raise CannotAct(msg)
@@ -75,7 +77,9 @@ def cut_in(part: CuttingIn, one: ActingActor) -> float:
 
 
 def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
-    """Choose the speed of this step by the gap that is left.
+    """Choose the speed of this step by the gap that is left, until it is half over.
+
+    Then the actor is in the other lane, and the other one may brake for it.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
         If the lane ends, or the gap cannot be reached in time.
     """
     lane_lasts(part, one, end)
-    if end - one.instant > one.step:
+    if end - one.instant > part.over / 2.0:
         _reach_gap(part, one, _other(part, one), end)
     return end
 

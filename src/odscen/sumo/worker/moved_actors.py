@@ -107,6 +107,10 @@ class MovedActors:
         except self._errors:
             return None
 
+    def edge_of(self, lane: str) -> str:
+        """Edge of a lane."""
+        return str(self._sumo.lane.getEdgeID(lane))
+
     def lane_width(self, lane: str) -> float:
         """Metres."""
         return float(self._sumo.lane.getWidth(lane))

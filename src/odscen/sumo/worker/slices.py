@@ -111,6 +111,8 @@ class _RunningSlice:
             if not last:
                 # SUMO puts a state where it puts outputs, relative to the folder that it is given.
                 session.save(self._run / layout.SUMO_FOLDER / STATE_FILE)
+                if stepper.story is not None:
+                    stepper.story.mend(part / STATE_FILE)
         routes.unlink()
         events = stepper.recorder.drain()
         seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)

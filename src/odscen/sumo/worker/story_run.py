@@ -15,6 +15,7 @@ from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
 from odscen.sumo.realize.rules.story_files import StoryPlan
 from odscen.sumo.worker.body_contacts import BodyContacts
 from odscen.sumo.worker.moved_actors import SavedWalk
+from odscen.sumo.worker.saved_walks import mend_walks
 from odscen.sumo.worker.story_hands import StoryHands
 from odscen.sumo.worker.story_view import StoryView
 
@@ -58,6 +59,7 @@ class StoryRun:
         self._fastest: dict[str, float] = {}
         self._waits: dict[str, Pose] = {}
         self._goal_edges: dict[str, str] = {}
+        self._sent: dict[str, float] = {}
         self._lost: list[Event] = []
 
     @classmethod
@@ -103,6 +105,11 @@ class StoryRun:
                     self._moves[name] = move
         recorder.events.extend(self._lost)
 
+    def mend(self, state: Path) -> None:
+        """Let a state that SUMO has saved be one that it can load."""
+        if self._sent:
+            mend_walks(state, self._sent, self._road.edge_of)
+
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         return {
@@ -111,6 +118,7 @@ class StoryRun:
             "contacts": self._contacts.state(),
             "hands": self._hands.state(),
             "goal_edges": self._goal_edges,
+            "sent": self._sent,
             "moves": {name: asdict(move) for name, move in self._moves.items()},
             "fastest": self._fastest,
             "waits": {name: list(pose) for name, pose in self._waits.items()},
@@ -124,6 +132,7 @@ class StoryRun:
         self._contacts.restore(state["contacts"])
         self._hands.restore(state["hands"])
         self._goal_edges = dict(state["goal_edges"])
+        self._sent = dict(state["sent"])
         for name, kept in state["moves"].items():
             pose = kept["pose"]
             lights = None if kept["lights"] is None else tuple(kept["lights"])
@@ -204,7 +213,7 @@ class StoryRun:
             self._put_person(road, name, move.pose)
             return
         if move.rejoins and name in self._walks:
-            if road.resume_walk(name, self._walks[name]):
+            if self._resume(road, name, self._walks[name]):
                 del self._walks[name]
             elif (one := self._view.actor(name)) is not None:
                 self._waits[name] = Pose(one.x, one.y, one.hdg)
@@ -223,8 +232,14 @@ class StoryRun:
         walk = self._hands.new_goal(road, name, move.goal or "", self._view.time)
         if walk is not None and (name in self._walks or move.pose is not None):
             self._walks[name] = walk
-        elif walk is not None and not road.resume_walk(name, walk):
+        elif walk is not None and not self._resume(road, name, walk):
             self._lose_way(name, "no walk leads from where it is to its new goal")
+
+    def _resume(self, road: MovedActors, name: str, walk: SavedWalk) -> bool:
+        resumes = road.resume_walk(name, walk)
+        if resumes:
+            self._sent[name] = walk.arrival
+        return resumes
 
     def _put_person(self, road: MovedActors, name: str, pose: Pose) -> None:
         half = self._actors[name].length / 2.0
