@@ -38,14 +38,14 @@ def mend_walks(state: Path, arrivals: Mapping[str, float], edge_of: Callable[[st
     """
     with gzip.open(state, "rt", encoding="utf-8") as file:
         lines = file.read().splitlines(keepends=True)
-    name = None
+    name: str | None = None
     for number, line in enumerate(lines):
         begins = _PERSON.match(line)
         if begins is not None:
             name = begins[1]
         elif _END in line:
             name = None
-        elif name in arrivals:
+        elif name is not None and name in arrivals:
             following = _REMOVED.search(lines[number + 1])
             lines[number] = _mended(line, arrivals[name], following and edge_of(following[1]))
     raw = "".join(lines).encode()

@@ -103,6 +103,8 @@ class StoryView:
         else:
             where = self._where(to)
         metres = self._road.driving_distance(actor, *where)
+        if metres is None and other is None:
+            return _under(own, self.place(to))
         return None if metres is None or metres < _BEHIND else metres + ahead
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
@@ -230,6 +232,18 @@ class StoryView:
             standing=self._standing.get(planned.id),
             off_road=off_road,
         )
+
+
+def _under(one: ActorView, place: Point) -> float | None:
+    """Metres that a place is ahead of a body's centre if it is under the body.
+
+    Where the front has left the edge of the place, SUMO knows of no way there any more.
+    """
+    c, s = math.cos(one.hdg), math.sin(one.hdg)
+    dx, dy = place[0] - one.x, place[1] - one.y
+    ahead, aside = dx * c + dy * s, dy * c - dx * s
+    inside = abs(ahead) <= one.length / 2.0 + 1.0 and abs(aside) <= one.width
+    return ahead if inside else None
 
 
 def stranger(
