@@ -105,6 +105,11 @@ class StoryEngine:
         """What the last step wants that is no motion: actors and switched lights, in order."""
         return self._asked
 
+    def add(self, rule: StoryRule) -> None:
+        """Add a rule to those that there are."""
+        self._rules[rule.id] = rule
+        self._states[rule.id] = _RuleState()
+
     def may_fire(self, rule: str) -> bool:
         """Whether a rule can fire yet, or is about something."""
         state = self._states[rule]

@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from odscen.sumo.worker.diversions import Diversions
+from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.protocol import Progress
 from odscen.sumo.worker.recorder import Recorder
 
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.worker.lockstep import LockstepWatch
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
     from odscen.sumo.worker.story_run import StoryRun
@@ -60,6 +60,8 @@ class Stepper:
         self._diversions = Diversions(plan) if plan.measures else None
         self._send = send
         self._watch = watch
+        self._led = watch if isinstance(watch, LockstepWatch) and watch.rules else None
+        self._due: float | None = None
         self._sent = 0.0
         self._start: tuple[float, int] | None = None
         self._busy = 0.0
@@ -94,10 +96,12 @@ class Stepper:
                 if not watch.next_step(session, self.recorder):
                     break
                 waited += clock() - asked
+            self._take_rules(session)
             now = self._step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
                 self._report(session, now, self._busy + self._sent - begin - waited)
+        self._take_rules(session)
         self._busy += clock() - begin - waited
         self._finish(session, now, more=more)
         return now
@@ -109,10 +113,26 @@ class Stepper:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
         after = session.step()
         recorder.record(session, now)
-        if self.story is not None:
-            self.story.after_step(now, recorder)
+        if self.story is not None or self._led is not None:
+            self._due = now
+        if self._led is None:
+            self._take_rules(session)
         self.steps += 1
         return after
+
+    def _take_rules(self, session: Session) -> None:
+        """Let rules act on the last step: at once, or when a program has given others."""
+        heard = [] if self._led is None else self._led.heard
+        if heard and self.story is None:
+            from odscen.sumo.worker.story_run import StoryRun
+
+            self.story = StoryRun.without_rules(self._plan)
+            self.story.begin(session)
+        while heard and self.story is not None:
+            self.story.add(heard.pop(0))
+        if self._due is not None and self.story is not None:
+            self.story.after_step(self._due, self.recorder)
+        self._due = None
 
     def _finish(self, session: Session, now: float, *, more: bool) -> None:
         """Say how it ends, if it does, and show it to who watches."""

@@ -39,6 +39,7 @@ class StoryRun:
 
     def __init__(self, story: StoryPlan, plan: Plan) -> None:
         names = set(_names(story))
+        self._plan = story
         self._planned = {actor.id: actor for actor in plan.actors}
         self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
         self._engine = StoryEngine(story.rules, step=plan.step_length)
@@ -67,6 +68,23 @@ class StoryRun:
         """Rules of the run in a folder."""
         file = run / SUMO_FOLDER / STORY_FILE
         return cls(StoryPlan.from_json(file.read_text(encoding="utf-8")), plan)
+
+    @classmethod
+    def without_rules(cls, plan: Plan) -> StoryRun:
+        """A run to which rules may come."""
+        return cls(StoryPlan(()), plan)
+
+    def add(self, text: str) -> None:
+        """Add rules, the text of a story file; they act from the next look on."""
+        more = StoryPlan.from_json(text)
+        for rule in more.rules:
+            self._engine.add(rule)
+        self._rules = (*self._rules, *more.rules)
+        self._plan.places.update(more.places)
+        self._plan.signals.update(more.signals)
+        for name in _names(more):
+            if name in self._planned:
+                self._actors[name] = self._planned[name]
 
     def begin(self, session: Session) -> None:
         """Begin with a simulation; after a saved state, do again what the state does not hold."""
