@@ -197,7 +197,8 @@ class EventKind(StrEnum):
     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
     and end; their id stands for that of an actor.
-    What a rule does is reported of its actor, at the instant, which may lie inside a step.
+    What a rule does is reported of its actor, at the instant, which may lie inside a step;
+    ``rule_acted`` is what no motion follows from, such as lights.
     """
 
     DEPARTED = "departed"

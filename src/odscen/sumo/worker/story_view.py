@@ -52,6 +52,7 @@ class StoryView:
         self._road: MovedActors
         self._views: dict[str, ActorView] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
+        self._half_widths: dict[str, float] = {}
         self._travelled: dict[str, float] = {}
         self._standing: dict[str, float] = {}
         self._last: dict[str, tuple[float, float, float]] = {}
@@ -170,7 +171,12 @@ class StoryView:
         seen = self._road.vehicle(planned.id)
         if seen is None:
             return None
-        half = self._road.lane_width(seen.lane) / 2.0 if seen.lane else 0.0
+        half = 0.0
+        if seen.lane:
+            known = self._half_widths.get(seen.lane)
+            if known is None:
+                known = self._half_widths[seen.lane] = self._road.lane_width(seen.lane) / 2.0
+            half = known
         return self._view(
             planned,
             seen,
