@@ -85,18 +85,18 @@ def traffic(loaded: LoadedMap, *, rules: bool) -> Scenario:
 
 
 def _rules(count: int) -> list[StoryRule]:
-    """Two for each actor: a distance and a speed are watched all the time, and each acts."""
+    """One for each actor: what it watches is read in every step, and some act."""
     found: list[dict[str, Any]] = []
     for n in range(count):
         other = f"a{(n + 1) % count}"
-        near = {"any": [{"ttc": {"to": other, "below": 2.0}}, {"time": {"after": 20.0 + n}}]}
-        then = [{"speed": {"to": 6.0, "rate": 1.0}}, {"release": {}}]
-        found.append({"id": f"slow{n}", "actor": f"a{n}", "when": near, "then": then})
-        fast = {"all": [{"speed": {"above": 4.0}}, {"distance": {"to": other, "above": 5.0}}]}
-        found.append({
-            "id": f"aside{n}", "actor": f"a{n}", "when": {"all": [fast, {"time": {"after": 40.0}}]},
-            "then": [{"offset": {"to": 0.3, "over": 2.0}}, {"offset": {"to": 0.0, "over": 2.0}}],
-        })  # fmt: skip
+        when = (
+            {"ttc": {"to": other, "below": 1.5}},
+            {"distance": {"to": other, "below": 6.0}},
+            {"all": [{"speed": {"above": 12.0}}, {"headway": {"to": other, "below": 2.0}}]},
+            {"travelled": {"above": 150.0}},
+        )[n % 4]
+        then = [{"speed": {"to": 6.0, "rate": 1.0}}, {"offset": {"to": 0.3}}, {"release": {}}]
+        found.append({"id": f"r{n}", "actor": f"a{n}", "when": when, "then": then})
     return [StoryRule.model_validate(one) for one in found]
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: many are made in each step, and that takes three times as long
 class ActorView:
     """An actor on the road.
 

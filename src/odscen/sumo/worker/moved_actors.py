@@ -34,6 +34,11 @@ LIGHT_BITS = {
 }  # fmt: skip
 """Bits of ``setSignals``."""
 
+_SEEN = (
+    "getAngle", "getSpeed", "getAcceleration", "getDistance", "getLaneID", "getLateralLanePosition"
+)  # fmt: skip
+"""Getters of :class:`SeenVehicle`, in its order."""
+
 Shape = tuple[tuple[float, float], ...]
 
 
@@ -76,7 +81,10 @@ class MovedActors:
         errors: tuple[type[Exception], ...],
         lanes_of_edge: Mapping[str, Sequence[str]],
         admits: Callable[[str, str], bool],
+        native: Callable[[str, str], Callable[[str], Any]],
     ) -> None:
+        self._position = native("vehicle", "getPosition")
+        self._seen = tuple(native("vehicle", getter) for getter in _SEEN)
         self._sumo = sumo
         self._errors = errors
         self._lanes_of_edge = lanes_of_edge
@@ -84,15 +92,11 @@ class MovedActors:
 
     def vehicle(self, name: str) -> SeenVehicle | None:
         """A vehicle, ``None`` if it is not on the road."""
-        one = self._sumo.vehicle
         try:
-            x, y = one.getPosition(name)
+            x, y = self._position(name)
             if abs(x) > _NOWHERE:
                 return None
-            return SeenVehicle(
-                x, y, one.getAngle(name), one.getSpeed(name), one.getAcceleration(name),
-                one.getDistance(name), one.getLaneID(name), one.getLateralLanePosition(name),
-            )  # fmt: skip
+            return SeenVehicle(x, y, *(getter(name) for getter in self._seen))
         except self._errors:
             return None
 
