@@ -93,7 +93,7 @@ def follow_path(part: PathFollowing, one: ActingActor) -> float:
     elif one.speed > 0.0:
         channel.take_line(line, 0.0, None, one.owner, one.instant)
     else:
-        msg = "it stands; the path has to say how fast it is followed"
+        msg = "it is stopped; the path has to say how fast it is followed"
         raise CannotAct(msg)
     return math.inf
 
@@ -205,7 +205,7 @@ def _at_points(
     for length, after in zip(legs, speeds, strict=True):
         if length > 0.0:
             if before + after <= 0.0:
-                msg = "it stands, and is to stand at the first point"
+                msg = "it is stopped, and is to stop at the first point"
                 raise CannotAct(msg)
             t += 2.0 * length / (before + after)
         knots.append((t, after))
