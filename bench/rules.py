@@ -1,7 +1,7 @@
 """What rules cost: 20 actors with rules amid 300 vehicles, against the same run without them.
 
 ``python -m bench rules``. Both runs are made in turn with steps of 0.1 s; their seconds are
-those of the processor for the processes of the simulation, as others may use the machine.
+those of the processor, as others may use the machine, and without what starting costs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from odscen.sumo.folder.finished_run import Run
 
 MAP = Path(__file__).parents[1] / "maps" / "town_5x5.xodr"
-ACTORS, SECONDS, ROUNDS = 20, 90.0, 5
+ACTORS, ROUNDS = 20, 3
+SHORT, LONG = 20.0, 80.0
+"""Seconds of the two runs of which the difference is taken: what starting costs is in both."""
 PER_KM = 24.0
 """Vehicles per kilometre of lane, which are about 300 on the map."""
 
@@ -48,8 +50,8 @@ def main() -> None:
         ratios = []
         print(f"{'round':>5} {'without, s':>10} {'with, s':>8} {'ratio':>6} {'vehicles':>8}")
         for number in range(ROUNDS + 1):
-            plain, most = _seconds(workspace, traffic(loaded, rules=False), root / f"a{number}")
-            ruled, _ = _seconds(workspace, traffic(loaded, rules=True), root / f"b{number}")
+            plain, most = _per_minute(workspace, traffic(loaded, rules=False), root / f"a{number}")
+            ruled, _ = _per_minute(workspace, traffic(loaded, rules=True), root / f"b{number}")
             if number:  # the first round warms up
                 ratios.append(ruled / plain)
                 print(f"{number:>5} {plain:>10.2f} {ruled:>8.2f} {ratios[-1]:>6.3f} {most:>8}")
@@ -79,7 +81,7 @@ def traffic(loaded: LoadedMap, *, rules: bool) -> Scenario:
         roi=tuple(graph.segments.ids),
         actors=actors,
         demand=Demand(background=(Background(id="traffic", per_km=PER_KM),)),
-        simulation=Simulation(duration=SECONDS, step_length=0.1),
+        simulation=Simulation(duration=LONG, step_length=0.1),
         rules=tuple(_rules(len(actors))) if rules else (),
     )
 
@@ -98,6 +100,17 @@ def _rules(count: int) -> list[StoryRule]:
         then = [{"speed": {"to": 6.0, "rate": 1.0}}, {"offset": {"to": 0.3}}, {"release": {}}]
         found.append({"id": f"r{n}", "actor": f"a{n}", "when": when, "then": then})
     return [StoryRule.model_validate(one) for one in found]
+
+
+def _per_minute(workspace: Workspace, scenario: Scenario, folder: Path) -> tuple[float, int]:
+    """Processor seconds of the minute by which the longer run is longer, and vehicles in it."""
+    times, most = [], 0
+    for until in (SHORT, LONG):
+        longer = Simulation(duration=until, step_length=0.1)
+        one = scenario.model_copy(update={"simulation": longer})
+        seconds, most = _seconds(workspace, one, folder.with_name(f"{folder.name}-{until:g}"))
+        times.append(seconds)
+    return times[1] - times[0], most
 
 
 def _seconds(workspace: Workspace, scenario: Scenario, folder: Path) -> tuple[float, int]:
