@@ -17,6 +17,7 @@ ALL = (
     "saturation",
     "signal_timing",
     "recording",
+    "rules",
     "long_run",
     "live_view",
     "server_load",

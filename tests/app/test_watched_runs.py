@@ -11,6 +11,8 @@ from odscen.app.runs import run
 from odscen.app.scenarios import read_scenario
 from odscen.app.watched_runs import watch
 from odscen.base.errors import ConflictError, ScenarioError
+from odscen.results.records.run_records import events_from_json
+from odscen.scenario.document.scenario_document import Scenario
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.run_settings import RunSettings
 from odscen.workspace.store import Workspace
@@ -121,3 +123,51 @@ def test_an_interrupted_run_in_the_folder_is_refused_to_whoever_asks_for_steps(
     ):
         list(steps)
     assert watchers() == []
+
+
+def _driven(path: Path) -> Scenario:
+    """The scenario with one car that has an empty road, at 10 m/s."""
+    scenario = read_scenario(path)
+    car = next(one for one in scenario.actors if one.category == "car")
+    fast = car.model_copy(update={"initial_speed": 5.0, "depart": 0.0, "id": "own"})
+    simulation = scenario.simulation.model_copy(update={"step_length": 0.1})
+    return scenario.model_copy(
+        update={"actors": (fast,), "flows": (), "rules": (), "simulation": simulation}
+    )
+
+
+def test_a_program_lets_an_actor_brake_and_drive_on_from_the_step_it_looks_at(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    speeds = {}
+    with watch(workspace, _driven(sampled), settings=RunSettings(until=8.0), out=tmp_path) as steps:
+        for step in steps:
+            speeds[round(step.time, 1)] = float(step.speed[0])
+            if step.time == pytest.approx(1.0):
+                steps.act("own", brake={"by": 2.0}, horn={})
+            if step.time == pytest.approx(5.0):
+                steps.act("own", go={})
+    begin = speeds[1.0]
+    for number in range(1, 10):
+        mean = begin - 0.2 * (number - 0.5)  # of the step that leads there
+        assert speeds[round(1.0 + number / 10, 1)] == pytest.approx(mean, abs=0.01)
+    assert speeds[5.0] == 0.0
+    assert speeds[7.9] > 3.0
+    events = events_from_json((steps.run.folder / "events.json").read_text())
+    said = [(one.rule, str(one.kind), one.time) for one in events if one.rule]
+    assert said[:2] == [("act-1", "rule_started", 1.0), ("act-1", "rule_acted", 1.0)]
+
+
+def test_what_is_wrong_with_an_action_is_said_at_once(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    with watch(workspace, _driven(sampled), settings=RunSettings(until=2.0), out=tmp_path) as steps:
+        with pytest.raises(ConflictError, match="while a step is looked at"):
+            steps.act("own", go={})
+        next(steps)
+        with pytest.raises(ScenarioError, match="no actor 'lorry'"):
+            steps.act("lorry", go={})
+        with pytest.raises(ScenarioError, match="brake"):
+            steps.act("own", brake={"hard": True})
+        with pytest.raises(ScenarioError, match="for pedestrians"):
+            steps.act("own", walk={"to": [0.0, 0.0]})

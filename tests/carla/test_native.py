@@ -19,7 +19,9 @@ import pytest
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario
 from odscen.carla.native_plan import native_actors
+from odscen.carla.native_run import left_out
 from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.rules_document import StoryRule
 from odscen.sumo.runner.prepare import prepare
 from odscen.workspace.store import Workspace
 from tests.carla.conftest import MAPS, Sample
@@ -54,6 +56,18 @@ def test_everybody_begins_where_and_ends_where_the_plan_says(planned: Any, sampl
         assert np.sum(np.hypot(*steps.T)) == pytest.approx(wanted.route_length)
         limit = np.inf if wanted.speed is None else wanted.speed
         assert actor.speed.max() <= limit + 1e-9
+
+
+def test_what_carla_alone_does_not_do_of_rules_is_said(sample: Sample) -> None:
+    scenario = read_scenario(sample(TOWN, seed=3))
+    name = scenario.actors[0].id
+    rule = {
+        "id": "r", "actor": name, "when": {"time": {"after": 1}},
+        "then": [{"brake": {"by": 4}}, {"together": [{"go": {}}, {"horn": {}}]}],
+    }  # fmt: skip
+    ruled = scenario.model_copy(update={"rules": (StoryRule.model_validate(rule),)})
+    assert left_out(scenario) == []
+    assert left_out(ruled) == [f"CARLA alone does not do rule r of {name}: brake, go, horn"]
 
 
 def test_a_path_has_one_point_for_each_junction_outside_of_any(

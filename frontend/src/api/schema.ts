@@ -1109,8 +1109,16 @@ export interface components {
             offset: components["schemas"]["LateralMove"] | null;
             keep_gap: components["schemas"]["GapKeeping"] | null;
             walk: components["schemas"]["Walking"] | null;
+            cut_in: components["schemas"]["CuttingIn"] | null;
+            goal: components["schemas"]["NewGoal"] | null;
+            path: components["schemas"]["PathFollowing"] | null;
+            replay: components["schemas"]["Replaying"] | null;
             arrive: components["schemas"]["Arriving"] | null;
+            appear: components["schemas"]["Appearing"] | null;
             vanish: components["schemas"]["Vanishing"] | null;
+            signal: components["schemas"]["SignalSwitch"] | null;
+            lights: components["schemas"]["VehicleLights"] | null;
+            horn: components["schemas"]["Honking"] | null;
             ignore: components["schemas"]["Ignoring"] | null;
             release: components["schemas"]["Releasing"] | null;
             /** Together */
@@ -1265,6 +1273,23 @@ export interface components {
         AfterTime: {
             /** After */
             after: number;
+        };
+        /**
+         * Appearing
+         * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
+         *
+         *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
+         *     speed or ``speed``.
+         */
+        Appearing: {
+            /** At */
+            at: [
+                number,
+                number,
+                number
+            ] | null;
+            /** Speed */
+            speed: number | null;
         };
         /**
          * Arriving
@@ -1791,6 +1816,23 @@ export interface components {
             width: number;
         };
         /**
+         * CuttingIn
+         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+         *
+         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+         */
+        CuttingIn: {
+            /** To */
+            to: string;
+            /** Gap */
+            gap: number | null;
+            /**
+             * Over
+             * @default 3
+             */
+            over: number;
+        };
+        /**
          * DayMade
          * @description A scenario that was given a day of traffic, and what that asks of the busiest junction.
          *
@@ -2268,10 +2310,11 @@ export interface components {
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
          *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
          *     and end; their id stands for that of an actor.
-         *     What a rule does is reported of its actor, at the instant, which may lie inside a step.
+         *     What a rule does is reported of its actor, at the instant, which may lie inside a step;
+         *     ``rule_acted`` is what no motion follows from, such as lights.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_ended" | "rule_failed" | "rule_overridden";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
         /**
          * ExpectationInfo
          * @description An expectation, what came of it, and whether it was met.
@@ -2555,6 +2598,11 @@ export interface components {
             workspace: string;
         };
         /**
+         * Honking
+         * @description Sound the horn.
+         */
+        Honking: Record<string, never>;
+        /**
          * Ignoring
          * @description Heed neither red lights nor right of way, or one of the two.
          */
@@ -2787,11 +2835,18 @@ export interface components {
         };
         /**
          * LaneChange
-         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
+         *
+         *     It takes ``over`` seconds.
          */
         LaneChange: {
             /** By */
-            by: number;
+            by: number | null;
+            /** To */
+            to: string | [
+                number,
+                number
+            ] | null;
             /**
              * Over
              * @default 3
@@ -3136,6 +3191,14 @@ export interface components {
             source: string | null;
         };
         /**
+         * NewGoal
+         * @description Go to another node of the map from here on.
+         */
+        NewGoal: {
+            /** To */
+            to: string;
+        };
+        /**
          * NewName
          * @description Another name.
          */
@@ -3320,6 +3383,32 @@ export interface components {
                 number,
                 number
             ][];
+        };
+        /**
+         * PathFollowing
+         * @description Follow a line over the ground from where the actor is, through ``points``.
+         *
+         *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
+         *     the begin at which it is there; none of them leaves the speed as it is.
+         */
+        PathFollowing: {
+            /** Points */
+            points: (string | [
+                number,
+                number
+            ])[];
+            /** Speed */
+            speed: number | null;
+            /**
+             * Speeds
+             * @default []
+             */
+            speeds: number[];
+            /**
+             * Times
+             * @default []
+             */
+            times: number[];
         };
         /**
          * PhaseInfo
@@ -3678,6 +3767,22 @@ export interface components {
             speed: number[];
             /** Actors */
             actors: components["schemas"]["ReplayActor"][];
+        };
+        /**
+         * Replaying
+         * @description Be where a recorded road user was: ``rows`` of seconds after the begin, x, y and heading.
+         *
+         *     Centre of the body, OpenDRIVE frame; metres, and radians counter-clockwise from x. Between rows
+         *     it moves evenly.
+         */
+        Replaying: {
+            /** Rows */
+            rows: [
+                number,
+                number,
+                number,
+                number
+            ][];
         };
         /**
          * RoadClosure
@@ -4851,6 +4956,25 @@ export interface components {
             shows: "red" | "yellow" | "green";
         };
         /**
+         * SignalSwitch
+         * @description Switch a traffic light.
+         *
+         *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
+         *     right of way as without lights. ``program``: the program that ran before.
+         */
+        SignalSwitch: {
+            /** Light */
+            light: string;
+            /**
+             * Shows
+             * @default green
+             * @enum {string}
+             */
+            shows: "green" | "off" | "program";
+            /** Movement */
+            movement: string | null;
+        };
+        /**
          * Signals
          * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
          *
@@ -5356,6 +5480,24 @@ export interface components {
             ][];
         };
         /**
+         * VehicleLights
+         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
+         */
+        VehicleLights: {
+            /** Indicator */
+            indicator: ("off" | "left" | "right" | "hazard") | null;
+            /** Brake */
+            brake: boolean | null;
+            /** Front */
+            front: boolean | null;
+            /** High Beam */
+            high_beam: boolean | null;
+            /** Fog */
+            fog: boolean | null;
+            /** Emergency */
+            emergency: boolean | null;
+        };
+        /**
          * WalkColumns
          * @description The pedestrian graph; ``kind`` of an edge: 0 sidewalk, 1 roadside, 2 crosswalk, 3 joint.
          *
@@ -5607,9 +5749,25 @@ export interface components {
             /** @default null */
             walk?: components["schemas"]["Walking-File"] | null;
             /** @default null */
+            cut_in?: components["schemas"]["CuttingIn-File"] | null;
+            /** @default null */
+            goal?: components["schemas"]["NewGoal-File"] | null;
+            /** @default null */
+            path?: components["schemas"]["PathFollowing-File"] | null;
+            /** @default null */
+            replay?: components["schemas"]["Replaying-File"] | null;
+            /** @default null */
             arrive?: components["schemas"]["Arriving-File"] | null;
             /** @default null */
+            appear?: components["schemas"]["Appearing-File"] | null;
+            /** @default null */
             vanish?: components["schemas"]["Vanishing-File"] | null;
+            /** @default null */
+            signal?: components["schemas"]["SignalSwitch-File"] | null;
+            /** @default null */
+            lights?: components["schemas"]["VehicleLights-File"] | null;
+            /** @default null */
+            horn?: components["schemas"]["Honking-File"] | null;
             /** @default null */
             ignore?: components["schemas"]["Ignoring-File"] | null;
             /** @default null */
@@ -5709,6 +5867,29 @@ export interface components {
         "AfterTime-File": {
             /** After */
             after: number;
+        };
+        /**
+         * Appearing
+         * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
+         *
+         *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
+         *     speed or ``speed``.
+         */
+        "Appearing-File": {
+            /**
+             * At
+             * @default null
+             */
+            at?: [
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
         };
         /**
          * Arriving
@@ -5955,6 +6136,26 @@ export interface components {
                 number,
                 number
             ][];
+        };
+        /**
+         * CuttingIn
+         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+         *
+         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+         */
+        "CuttingIn-File": {
+            /** To */
+            to: string;
+            /**
+             * Gap
+             * @default null
+             */
+            gap?: number | null;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
         };
         /**
          * DayPlan
@@ -6260,6 +6461,11 @@ export interface components {
          */
         "Going-File": Record<string, never>;
         /**
+         * Honking
+         * @description Sound the horn.
+         */
+        "Honking-File": Record<string, never>;
+        /**
          * Ignoring
          * @description Heed neither red lights nor right of way, or one of the two.
          */
@@ -6353,11 +6559,24 @@ export interface components {
         };
         /**
          * LaneChange
-         * @description Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds.
+         * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
+         *
+         *     It takes ``over`` seconds.
          */
         "LaneChange-File": {
-            /** By */
-            by: number;
+            /**
+             * By
+             * @default null
+             */
+            by?: number | null;
+            /**
+             * To
+             * @default null
+             */
+            to?: string | [
+                number,
+                number
+            ] | null;
             /**
              * Over
              * @default 3
@@ -6468,6 +6687,14 @@ export interface components {
             ][];
         };
         /**
+         * NewGoal
+         * @description Go to another node of the map from here on.
+         */
+        "NewGoal-File": {
+            /** To */
+            to: string;
+        };
+        /**
          * Normal
          * @description Normal distribution, drawn again while outside ``low`` to ``high``.
          */
@@ -6573,6 +6800,35 @@ export interface components {
             description?: string;
         };
         /**
+         * PathFollowing
+         * @description Follow a line over the ground from where the actor is, through ``points``.
+         *
+         *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
+         *     the begin at which it is there; none of them leaves the speed as it is.
+         */
+        "PathFollowing-File": {
+            /** Points */
+            points: (string | [
+                number,
+                number
+            ])[];
+            /**
+             * Speed
+             * @default null
+             */
+            speed?: number | null;
+            /**
+             * Speeds
+             * @default []
+             */
+            speeds?: number[];
+            /**
+             * Times
+             * @default []
+             */
+            times?: number[];
+        };
+        /**
          * Profile
          * @description How demand is spread over a day: relative shares of equal slices, from midnight on.
          */
@@ -6674,6 +6930,22 @@ export interface components {
          * @description SUMO drives as if there had been no rule.
          */
         "Releasing-File": Record<string, never>;
+        /**
+         * Replaying
+         * @description Be where a recorded road user was: ``rows`` of seconds after the begin, x, y and heading.
+         *
+         *     Centre of the body, OpenDRIVE frame; metres, and radians counter-clockwise from x. Between rows
+         *     it moves evenly.
+         */
+        "Replaying-File": {
+            /** Rows */
+            rows: [
+                number,
+                number,
+                number,
+                number
+            ][];
+        };
         /**
          * RoadClosure
          * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
@@ -6844,6 +7116,28 @@ export interface components {
              * @enum {string}
              */
             shows: "red" | "yellow" | "green";
+        };
+        /**
+         * SignalSwitch
+         * @description Switch a traffic light.
+         *
+         *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
+         *     right of way as without lights. ``program``: the program that ran before.
+         */
+        "SignalSwitch-File": {
+            /** Light */
+            light: string;
+            /**
+             * Shows
+             * @default green
+             * @enum {string}
+             */
+            shows?: "green" | "off" | "program";
+            /**
+             * Movement
+             * @default null
+             */
+            movement?: string | null;
         };
         /**
          * Signals
@@ -7224,6 +7518,42 @@ export interface components {
                 string,
                 number
             ][];
+        };
+        /**
+         * VehicleLights
+         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
+         */
+        "VehicleLights-File": {
+            /**
+             * Indicator
+             * @default null
+             */
+            indicator?: ("off" | "left" | "right" | "hazard") | null;
+            /**
+             * Brake
+             * @default null
+             */
+            brake?: boolean | null;
+            /**
+             * Front
+             * @default null
+             */
+            front?: boolean | null;
+            /**
+             * High Beam
+             * @default null
+             */
+            high_beam?: boolean | null;
+            /**
+             * Fog
+             * @default null
+             */
+            fog?: boolean | null;
+            /**
+             * Emergency
+             * @default null
+             */
+            emergency?: boolean | null;
         };
         /**
          * Walking

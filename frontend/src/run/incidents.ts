@@ -14,6 +14,7 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   teleport_start: "teleported",
   teleport_end: "teleported",
   rule_started: "rule",
+  rule_acted: "rule",
   rule_ended: "rule",
   rule_failed: "rule",
   rule_overridden: "rule",
@@ -52,6 +53,8 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return `Measure ${incident.actor} ended`;
     case "rule_started":
       return `${who} began rule ${incident.rule}${values(incident)}`;
+    case "rule_acted":
+      return `${who}: ${incident.detail ?? ""} (rule ${incident.rule})`;
     case "rule_ended":
       return `${who} has done rule ${incident.rule}`;
     case "rule_failed":

@@ -10,16 +10,22 @@ import queue
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.app.runs import carry_out, check_given, prepare_run
 from odscen.base.errors import ConflictError
+from odscen.scenario.checks.rule_checks import rule_problems
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.document.validation import validated
+from odscen.scenario.placing.region import Region
+from odscen.sumo.realize.rules.story_files import story_plan
 from odscen.sumo.realize.run_settings import AS_DESIGNED
 from odscen.sumo.runner.elevation import ElevationLookup
 from odscen.sumo.runner.in_step import InStep
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from odscen.app.runs import CheckedRun
@@ -50,11 +56,13 @@ class WatchedRun:
     def __init__(self, checked: CheckedRun) -> None:
         self._checked = checked
         self._prepared = prepare_run(checked)
-        ground = ElevationLookup(checked.map.sumo.graph, checked.entry.lane_table())
-        self._in_step = InStep(self._prepared.plan, ground, self._hand_over)
+        self._map = checked.map
+        ground = ElevationLookup(self._map.sumo.graph, checked.entry.lane_table())
+        self._in_step = InStep(self._prepared.plan, ground, self._hand_over, rules=True)
+        self._rules = list(checked.scenario.rules)
         self._steps: queue.SimpleQueue[Step | None] = queue.SimpleQueue()
         self._wanted = threading.Semaphore(0)
-        self._closing = self._over = False
+        self._closing = self._over = self._handed = False
         self._run: Run | None = None
         self._error: BaseException | None = None
         self._thread = threading.Thread(target=self._follow, name="odscen-watch", daemon=True)
@@ -67,8 +75,10 @@ class WatchedRun:
         """Let SUMO make its next step."""
         if self._over:
             raise StopIteration
-        self._wanted.release()
+        if self._handed:
+            self._wanted.release()
         step = self._next()
+        self._handed = step is not None
         if step is None:
             self._over = True
             self._refuse_error()
@@ -88,6 +98,50 @@ class WatchedRun:
             msg = "the run has not ended; it ends with its last step, or with the block of watch"
             raise ConflictError(msg)
         return self._run
+
+    def act(self, actor: str, **action: Any) -> None:
+        """Let an actor do something from this step on, as a rule of the scenario would.
+
+        Parameters
+        ----------
+        actor
+            Its id.
+        **action
+            One kind of action with its fields: ``brake={"by": 6}``; several run together.
+
+        Raises
+        ------
+        ScenarioError
+            If there is no such actor or action, or it is not possible for it.
+        ConflictError
+            If no step is being looked at.
+        """
+        together = [{kind: part} for kind, part in action.items()]
+        then = together[0] if len(together) == 1 else {"together": together}
+        name = f"act-{len(self._rules) + 1}"
+        self.add_rule({"id": name, "actor": actor, "when": {"time": {"after": 0}}, "then": [then]})
+
+    def add_rule(self, rule: Mapping[str, Any]) -> None:
+        """Add a rule, as in the scenario document, that holds from this step on.
+
+        Raises
+        ------
+        ScenarioError
+            If something is wrong with it, in words.
+        ConflictError
+            If no step is being looked at.
+        """
+        if not self._handed or self._over:
+            msg = "rules are given while a step is looked at, inside the loop"
+            raise ConflictError(msg)
+        made = validated(StoryRule, rule)
+        known, on = self._checked.scenario, self._map
+        whole = known.model_copy(update={"rules": (*self._rules, made)})
+        region = Region.of(on.sumo.graph, known.roi)
+        refuse_errors(rule_problems(whole, region, on.lights))
+        alone = known.model_copy(update={"rules": (made,)})
+        self._in_step.add_rules(story_plan(alone, on.sumo).to_json())
+        self._rules.append(made)
 
     def close(self) -> None:
         """Stop after the present step, and wait until results and report are written.
@@ -117,11 +171,10 @@ class WatchedRun:
             raise self._error
 
     def _hand_over(self, step: Step) -> None:
+        self._steps.put(step)
         self._wanted.acquire()
         if self._closing:
             self._in_step.stop()
-        else:
-            self._steps.put(step)
 
     def _follow(self) -> None:
         try:
@@ -141,7 +194,7 @@ def watch(
     name: str | None = None,
     out: Path | None = None,
 ) -> Iterator[WatchedRun]:
-    """Run a scenario and see every step of it; SUMO waits for the loop.
+    """Run a scenario, see every step of it, and act in it; SUMO waits for the loop.
 
     Leaving the block early, by ``break`` or by an error, stops the run; what happened until then is
     written like the results of any run.
@@ -165,7 +218,8 @@ def watch(
         Iterate over it for the steps, each a :class:`~odscen.sumo.runner.in_step.Step`: ``time``
         (s) and arrays of shape ``(N,)`` of the road users under way, ``ids``, ``x``, ``y``, ``z``
         (m), ``hdg``, ``pitch`` (rad) of body centres in the OpenDRIVE frame, ``speed`` (m/s). When
-        the block has ended, ``run`` is the finished run.
+        the block has ended, ``run`` is the finished run. ``act`` and ``add_rule`` of the run let
+        actors do what rules can say, from the step that is looked at on.
 
     Raises
     ------
@@ -184,6 +238,8 @@ def watch(
     ...     for step in steps:
     ...         if step.time > 60 and (step.speed < 0.1).all():
     ...             break
+    ...         if step.time == 30:
+    ...             steps.act("van", brake={"by": 6, "hold": 2})
     >>> steps.run.status
     """
     settings = replace(settings, slice_length=None)

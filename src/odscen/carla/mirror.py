@@ -32,7 +32,7 @@ PAUSE = 10
 JUMP = 12.0
 """Metres that a road user moves in a step more than driving takes: a teleport, shown as one."""
 
-POSITION, LOW_BEAM, BRAKE, RIGHT, LEFT, FOG, SIREN = 1, 2, 8, 16, 32, 128, 512
+POSITION, LOW_BEAM, HIGH_BEAM, BRAKE, RIGHT, LEFT, FOG, SIREN = 1, 2, 4, 8, 16, 32, 128, 512
 """Bits of CARLA's ``VehicleLightState``; the siren's light is its ``Special1``."""
 
 _NO_SHAPE = Shape((0.0, 0.0, 0.0))
@@ -228,6 +228,10 @@ class Mirror:
         flags += BRAKE * ((signals & VehicleSignal.BRAKE) > 0)
         flags += RIGHT * (((signals & VehicleSignal.BLINKER_RIGHT) | hazard) > 0)
         flags += LEFT * (((signals & VehicleSignal.BLINKER_LEFT) | hazard) > 0)
+        # Lights of the time of day are on already; a rule may switch on more.
+        flags |= LOW_BEAM * ((signals & VehicleSignal.FRONT) > 0)
+        flags |= FOG * ((signals & VehicleSignal.FOG) > 0)
+        flags += HIGH_BEAM * ((signals & VehicleSignal.HIGH_BEAM) > 0)
         flags += SIREN * ((signals & VehicleSignal.EMERGENCY_BLUE) > 0)
         listed: list[int] = flags.tolist()
         return listed

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from odscen.app.runs import CheckedRun
     from odscen.carla.native_worker import Told
     from odscen.results.records.run_records import Plan
+    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.worker.protocol import OnProgress
@@ -92,6 +94,7 @@ def run_native(
     settings: RunSettings = AS_DESIGNED,
     out: Path | None = None,
     progress: OnProgress | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> tuple[Run, NativeReport]:
     """Let CARLA's Traffic Manager and walkers run a scenario.
 
@@ -109,6 +112,8 @@ def run_native(
         Folder that gets the run's folder; the workspace's ``runs`` if not given.
     progress
         Called in this thread with each tick.
+    tell
+        Called before the run with each part of the scenario that CARLA will not do.
 
     Raises
     ------
@@ -120,6 +125,9 @@ def run_native(
     if options.pictures.any or options.on_picture:
         options.pictures.check()
     run = check_file(workspace, path, out=out, settings=replace(settings, slice_length=None))
+    if tell is not None:
+        for words in left_out(run.scenario):
+            tell(words)
     prepared = prepare_run(run)
     plan = prepared.plan
     report = NativeReport()
@@ -143,6 +151,18 @@ def run_native(
         about={**prepared.about, "driven_by": "carla"},
     )
     return carry_out(run, prepared, simulate=simulate), report
+
+
+def left_out(scenario: Scenario) -> list[str]:
+    """What CARLA alone does not do of a scenario, in words: a line for each of its rules."""
+    return [
+        f"CARLA alone does not do rule {rule.id} of {rule.actor}: {_actions(rule)}"
+        for rule in scenario.rules
+    ]
+
+
+def _actions(rule: StoryRule) -> str:
+    return ", ".join(one.kind for item in rule.then for one in item.parts)
 
 
 def _job(run: CheckedRun, plan: Plan, options: NativeOptions, *, log: Path) -> NativeJob:

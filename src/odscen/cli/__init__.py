@@ -30,7 +30,7 @@ from odscen.cli.regression_commands import compare, gate
 from odscen.cli.removal_commands import remove, remove_map, trash
 from odscen.cli.report_command import report
 from odscen.cli.run_commands import resume, run
-from odscen.cli.scenario_commands import check, export, generate
+from odscen.cli.scenario_commands import check, export, generate, replay
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.sweep_command import sweep
@@ -62,6 +62,7 @@ app.add_typer(trash, name="trash")
 app.command()(generate)
 app.command()(check)
 app.command()(export)
+app.command()(replay)
 app.command()(run)
 app.command()(resume)
 app.command()(report)

@@ -173,6 +173,7 @@ def _run_native(
             options,
             settings=settings,
             out=out,
+            tell=log,
             progress=lambda message: step(
                 f"{message.time:.0f} s, {message.running} on the road", message.share
             ),

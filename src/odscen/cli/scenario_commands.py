@@ -1,4 +1,4 @@
-"""``odscen generate``, ``check`` and ``export``: scenarios before they run."""
+"""``odscen generate``, ``check``, ``replay`` and ``export``: scenarios before they run."""
 
 from __future__ import annotations
 
@@ -134,6 +134,42 @@ def _checked(workspace: Workspace, path: Path) -> dict[str, Any]:
         "warnings": len(problems) - errors,
         "problems": [asdict(problem) for problem in problems],
     }
+
+
+def replay(
+    scenario: ScenarioArgument,
+    trajectory: Annotated[
+        Path,
+        typer.Argument(help="CSV or Parquet with time, x, y; or a run's folder.", metavar="SOURCE"),
+    ],
+    actor: Annotated[str, typer.Option(help="Actor of the scenario that is to do the same.")],
+    of: Annotated[
+        str | None, typer.Option(help="Who was recorded. (default: the only one)")
+    ] = None,
+    begin: Annotated[
+        float | None, typer.Option(min=0, help="Second of the run. (default: as recorded)")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="File to write. (default: the scenario itself)"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Let an actor of a scenario move as one was recorded; SUMO's traffic reacts to it.
+
+    The recording becomes part of the scenario, as a rule of it.
+    """
+    from odscen.app.scenarios import read_scenario, write_scenario
+    from odscen.app.trajectories import attach_trajectory
+
+    document = attach_trajectory(
+        read_scenario(scenario), trajectory, actor=actor, of=of, begin=begin
+    )
+    rule = document.rules[-1]
+    path = write_scenario(document, out or scenario)
+    log(f"{path}: rule {rule.id}")
+    if as_json:
+        print_json({"file": str(path), "rule": rule.id})
 
 
 def export(

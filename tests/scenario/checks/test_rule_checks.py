@@ -54,6 +54,21 @@ def test_good_rules_have_no_problems() -> None:
         ),
         (rule(when={"rule": {"id": "x"}}), "unknown_rule", "rules[0].when.rule.id"),
         (
+            rule(then=[{"goal": {"to": "ped.1.0.-2.0"}}]),
+            "action_not_possible",
+            "rules[0].then[0].goal.to",
+        ),
+        (
+            rule(then=[{"path": {"points": ["1.0.-1.4", "9.9.9.9"], "speed": 5}}]),
+            "unknown_place",
+            "rules[0].then[0].path.points[1]",
+        ),
+        (
+            rule(then=[{"cut_in": {"to": "lorry"}}]),
+            "unknown_actor",
+            "rules[0].then[0].cut_in.to",
+        ),
+        (
             rule(then=[{"go": {}}, {"walk": {"to": "1.0.-1.5"}}]),
             "action_not_possible",
             "rules[0].then[1].walk",

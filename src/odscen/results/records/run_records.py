@@ -197,7 +197,8 @@ class EventKind(StrEnum):
     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
     and end; their id stands for that of an actor.
-    What a rule does is reported of its actor, at the instant, which may lie inside a step.
+    What a rule does is reported of its actor, at the instant, which may lie inside a step;
+    ``rule_acted`` is what no motion follows from, such as lights.
     """
 
     DEPARTED = "departed"
@@ -213,6 +214,7 @@ class EventKind(StrEnum):
     MEASURE_BEGIN = "measure_begin"
     MEASURE_END = "measure_end"
     RULE_STARTED = "rule_started"
+    RULE_ACTED = "rule_acted"
     RULE_ENDED = "rule_ended"
     RULE_FAILED = "rule_failed"
     RULE_OVERRIDDEN = "rule_overridden"

@@ -48,6 +48,7 @@ EVENT_WORDS = {
     EventKind.MEASURE_BEGIN: ("began", ""),
     EventKind.MEASURE_END: ("ended", ""),
     EventKind.RULE_STARTED: ("began to do what a rule says", ""),
+    EventKind.RULE_ACTED: ("did what a rule says", ""),
     EventKind.RULE_ENDED: ("has done what a rule says", ""),
     EventKind.RULE_FAILED: (
         "could not do what a rule says",

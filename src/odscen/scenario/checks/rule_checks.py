@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region
     from odscen.scenario.signals.light import Light
 
-_SPEED = frozenset({"speed", "brake", "stop", "keep_gap", "arrive"})
-_PLACE = frozenset({"lane", "offset", "walk"})
+_SPEED = frozenset({"speed", "brake", "stop", "keep_gap", "arrive", "replay"})
+_PLACE = frozenset({"lane", "cut_in", "offset", "walk", "path", "replay"})
 _LISTED = 8
 """Names that a message lists at most."""
 
@@ -72,6 +72,20 @@ def _part(
             who = "pedestrians" if action.persons_only else "vehicles"
             message = f"{kind!r} is for {who}; {rule.actor!r} is a {category}"
             yield error("action_not_possible", where, message)
+        yield from _goal(found, rule.actor, region, on_foot=on_foot)
+    if kind == "appear" and ".then[" in where and rule.actor not in known:
+        message = f"{rule.actor!r} is of a flow, which says when it departs; let an actor appear"
+        yield error("action_not_possible", where, message)
+
+
+def _goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -> Iterator[Problem]:
+    """Yield that a new goal is not where the actor can go."""
+    node = getattr(found.part, "to", None)
+    place = region.place(node) if found.kind == "goal" and isinstance(node, str) else None
+    if place is not None and place.walk != on_foot:
+        where, other = ("on a sidewalk", "a lane") if on_foot else ("on a lane", "a sidewalk")
+        message = f"the goal of {actor!r} has to be {where}; {node!r} is on {other}"
+        yield error("action_not_possible", f"{found.where}.to", message, nodes=[str(node)])
 
 
 def _actor(
@@ -94,7 +108,7 @@ def _signal(found: RulePart, lights: Sequence[Light] | None) -> Iterator[Problem
         names = [one.names[0] for one in lights if one.names]
         message = f"the map has no traffic light {name!r}; there are {_listed(names)}"
         yield error("unknown_light", f"{where}.light", message)
-    elif not find_movements(movement, light.movements):
+    elif movement is not None and not find_movements(movement, light.movements):
         names = list(known_names(light.movements))
         message = f"light {name!r} has no movement {movement!r}; there are {_listed(names)}"
         yield error("unknown_movement", f"{where}.movement", message)

@@ -6,16 +6,22 @@ Metres, seconds, m/s, m/s^2; left is positive. What each kind means is in
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odscen.scenario.document.conditions_document import RulePlace, one_of
-from odscen.scenario.document.document_parts import Identifier, Part
+from odscen.scenario.document.conditions_document import Coordinate, RulePlace, one_of
+from odscen.scenario.document.document_parts import Identifier, Label, Part
 
 Positive = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 Rate = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 RuleSpeed = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+Heading = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+"""Radians counter-clockwise from x."""
+TrajectoryRow = tuple[
+    Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)], Coordinate, Coordinate, Heading
+]
 WalkingSpeed = Annotated[float, Field(gt=0, le=15, allow_inf_nan=False)]
 
 
@@ -60,17 +66,33 @@ class Going(Part):
 
 
 class LaneChange(Part):
-    """Change ``by`` so many lanes to the left (negative: right), ``over`` so many seconds."""
+    """Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
 
-    by: Annotated[int, Field(ge=-10, le=10)]
+    It takes ``over`` seconds.
+    """
+
+    by: Annotated[int, Field(ge=-10, le=10)] | None = None
+    to: RulePlace | None = None
     over: Positive = 3.0
 
     @model_validator(mode="after")
     def _some_lane(self) -> Self:
+        one_of(self, ("by", "to"), "lane")
         if self.by == 0:
             msg = "by must not be 0"
             raise ValueError(msg)
         return self
+
+
+class CuttingIn(Part):
+    """Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+
+    With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+    """
+
+    to: Identifier
+    gap: Positive | None = None
+    over: Positive = 3.0
 
 
 class LateralMove(Part):
@@ -103,6 +125,65 @@ class Walking(Part):
     speed: WalkingSpeed | None = None
 
 
+class NewGoal(Part):
+    """Go to another node of the map from here on."""
+
+    to: Label
+
+
+class PathFollowing(Part):
+    """Follow a line over the ground from where the actor is, through ``points``.
+
+    ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
+    the begin at which it is there; none of them leaves the speed as it is.
+    """
+
+    points: Annotated[tuple[RulePlace, ...], Field(min_length=1, max_length=10_000)]
+    speed: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    speeds: Annotated[tuple[RuleSpeed, ...], Field(max_length=10_000)] = ()
+    times: Annotated[tuple[Positive, ...], Field(max_length=10_000)] = ()
+
+    @model_validator(mode="after")
+    def _one_timing(self) -> Self:
+        given = [name for name in ("speed", "speeds", "times") if getattr(self, name)]
+        if len(given) > 1:
+            msg = f"give one of speed, speeds and times, not {' and '.join(given)}"
+            raise ValueError(msg)
+        for name in given:
+            values = getattr(self, name)
+            if name != "speed" and len(values) != len(self.points):
+                msg = f"{len(values)} {name} for {len(self.points)} points; give one for each"
+                raise ValueError(msg)
+        if any(a >= b for a, b in itertools.pairwise(self.times)):
+            msg = "times must grow"
+            raise ValueError(msg)
+        if any(a == b == 0.0 for a, b in itertools.pairwise(self.speeds)):
+            msg = "two speeds of 0 follow one another; the second point is never reached"
+            raise ValueError(msg)
+        return self
+
+
+class Replaying(Part):
+    """Be where a recorded road user was: ``rows`` of seconds after the begin, x, y and heading.
+
+    Centre of the body, OpenDRIVE frame; metres, and radians counter-clockwise from x. Between rows
+    it moves evenly.
+    """
+
+    rows: Annotated[tuple[TrajectoryRow, ...], Field(min_length=2, max_length=100_000)]
+
+    @model_validator(mode="after")
+    def _growing(self) -> Self:
+        for index, (one, other) in enumerate(itertools.pairwise(self.rows)):
+            if one[0] >= other[0]:
+                msg = f"rows[{index + 1}] is at {other[0]:g} s, not after {one[0]:g} s"
+                raise ValueError(msg)
+        if self.rows[0][0] != 0.0:
+            msg = f"rows must begin at 0 s, not at {self.rows[0][0]:g} s"
+            raise ValueError(msg)
+        return self
+
+
 class Arriving(Part):
     """Be at a place at the instant at which ``to`` is at another one.
 
@@ -112,6 +193,51 @@ class Arriving(Part):
     at: RulePlace
     to: Identifier
     when_at: RulePlace
+
+
+class Appearing(Part):
+    """Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
+
+    It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
+    speed or ``speed``.
+    """
+
+    at: tuple[Coordinate, Coordinate, Heading] | None = None
+    speed: RuleSpeed | None = None
+
+
+class SignalSwitch(Part):
+    """Switch a traffic light.
+
+    ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
+    right of way as without lights. ``program``: the program that ran before.
+    """
+
+    light: Label
+    shows: Literal["green", "off", "program"] = "green"
+    movement: Label | None = None
+
+    @model_validator(mode="after")
+    def _green_of_some(self) -> Self:
+        if (self.shows == "green") != (self.movement is not None):
+            msg = "green needs a movement, and only green does"
+            raise ValueError(msg)
+        return self
+
+
+class VehicleLights(Part):
+    """Set lights of a vehicle: what is not given is off; without any the driver sets them again."""
+
+    indicator: Literal["off", "left", "right", "hazard"] | None = None
+    brake: bool | None = None
+    front: bool | None = None
+    high_beam: bool | None = None
+    fog: bool | None = None
+    emergency: bool | None = None
+
+
+class Honking(Part):
+    """Sound the horn."""
 
 
 class Vanishing(Part):
@@ -140,8 +266,16 @@ class Action(Part):
     offset: LateralMove | None = None
     keep_gap: GapKeeping | None = None
     walk: Walking | None = None
+    cut_in: CuttingIn | None = None
+    goal: NewGoal | None = None
+    path: PathFollowing | None = None
+    replay: Replaying | None = None
     arrive: Arriving | None = None
+    appear: Appearing | None = None
     vanish: Vanishing | None = None
+    signal: SignalSwitch | None = None
+    lights: VehicleLights | None = None
+    horn: Honking | None = None
     ignore: Ignoring | None = None
     release: Releasing | None = None
     together: Annotated[tuple[Action, ...], Field(min_length=2)] | None = None

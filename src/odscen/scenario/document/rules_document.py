@@ -8,7 +8,10 @@ from pydantic import Field
 
 from odscen.scenario.document.actions_document import (
     Action,
+    Appearing,
+    LaneChange,
     LateralMove,
+    NewGoal,
     SpeedChange,
     Walking,
 )
@@ -16,7 +19,7 @@ from odscen.scenario.document.conditions_document import Condition, RulePlace
 from odscen.scenario.document.document_parts import Identifier, Part
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
 
 class StoryRule(Part):
@@ -64,12 +67,15 @@ def _conditions(condition: Condition, where: str) -> Iterator[RulePart]:
 
 def places_of(part: Part) -> Iterator[tuple[str, RulePlace]]:
     """Places that a condition or action names, with the names of their fields."""
+    if isinstance(part, Appearing):  # an exact pose, no place of the map
+        return
     for name in ("place", "to", "at", "when_at"):
         value = getattr(part, name, None)
         if value is not None and not (name == "to" and _to_is_actor(part)):
             yield name, value
-    for index, value in enumerate(getattr(part, "through", ())):
-        yield f"through[{index}]", value
+    for name in ("through", "points"):
+        for index, value in enumerate(getattr(part, name, ())):
+            yield f"{name}[{index}]", value
 
 
 def actors_of(part: Part) -> Iterator[tuple[str, str]]:
@@ -80,6 +86,16 @@ def actors_of(part: Part) -> Iterator[tuple[str, str]]:
             yield name, value
 
 
+def appearing_actors(rules: Iterable[StoryRule]) -> frozenset[str]:
+    """Actors that rules let appear, and that are not on the road before."""
+    return frozenset(
+        rule.actor
+        for rule in rules
+        for item in rule.then
+        if any(one.appear is not None for one in item.parts)
+    )
+
+
 def _to_is_actor(part: Part) -> bool:
     """Whether ``to`` is an actor: it is a place, a speed or an offset in some."""
-    return not isinstance(part, Walking | SpeedChange | LateralMove)
+    return not isinstance(part, Walking | SpeedChange | LateralMove | LaneChange | NewGoal)

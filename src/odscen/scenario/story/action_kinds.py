@@ -12,12 +12,44 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
 from odscen.scenario.story.arrivals import arrive, synchronise
-from odscen.scenario.story.side_motion import SideLaw, beside, line_length
+from odscen.scenario.story.asked_actions import (
+    Wanted,
+    ask_to_appear,
+    ask_to_switch,
+    has_appeared,
+    said_of_goal,
+    said_of_horn,
+    said_of_lights,
+    said_of_signal,
+    set_goal,
+    set_lights,
+    sound_horn,
+)
+from odscen.scenario.story.path_actions import (
+    end_of_path,
+    end_of_replay,
+    end_of_walk,
+    follow_path,
+    on_the_line,
+    on_the_path,
+    replay,
+    replay_further,
+    stay,
+    walk,
+)
+from odscen.scenario.story.side_actions import (
+    after_cut_in,
+    change_lane,
+    cut_in,
+    cut_in_further,
+    lane_lasts,
+    leave_line,
+    move_aside,
+)
 from odscen.scenario.story.speed_laws import (
     SpeedLaw,
     braking,
     speed_change,
-    steady,
     stopping,
 )
 
@@ -29,15 +61,12 @@ if TYPE_CHECKING:
         GapKeeping,
         Going,
         Ignoring,
-        LaneChange,
-        LateralMove,
         Releasing,
         SpeedChange,
         Stopping,
         Vanishing,
-        Walking,
     )
-    from odscen.scenario.story.road_view import Point
+    from odscen.scenario.story.road_view import RoadView
 
 _HELD = 1e-3
 """Metres of a line on which a person stands."""
@@ -51,7 +80,9 @@ class ActionKind:
 
     ``begin`` takes over what the action needs and gives the instant at which it is over, infinity
     if that is not known yet. ``update`` is asked at the beginning of each further step, and gets
-    and gives that instant. ``finish`` says what comes after it.
+    and gives that instant. ``finish`` says what comes after it. An action with ``ask`` has no
+    ``begin``: it is done by the simulator, and its actor need not be on the road. ``says`` gives
+    what is reported when it has begun, of those that no motion follows from.
     """
 
     name: str
@@ -60,11 +91,13 @@ class ActionKind:
     sumo: str
     openscenario: str
     carla: str
-    begin: Callable[[Any, ActingActor], float]
+    begin: Callable[[Any, ActingActor], float] | None = None
     update: Callable[[Any, ActingActor, float], float] | None = None
     finish: Callable[[Any, ActingActor], None] | None = None
     vehicles_only: bool = False
     persons_only: bool = False
+    ask: Callable[[Any, str, RoadView], Wanted] | None = None
+    says: Callable[[Any], str] | None = None
 
 
 def _speed(part: SpeedChange, one: ActingActor) -> float:
@@ -103,7 +136,7 @@ def _stop(part: Stopping, one: ActingActor) -> float:
 
 def _stand(_: Any, one: ActingActor) -> None:
     if one.actor.person:
-        _stay(one)
+        stay(one)
     else:
         one.channel.keep_speed()
 
@@ -115,50 +148,6 @@ def _go(_: Going, one: ActingActor) -> float:
         channel.rejoins = True
     channel.release_speed(one.instant)
     return one.instant
-
-
-def _lane(part: LaneChange, one: ActingActor) -> float:
-    line = one.view.lane_line(one.actor.id, part.by)
-    if line is None:
-        lanes = f"{abs(part.by)} to the {'left' if part.by > 0 else 'right'}"
-        msg = f"there is no lane {lanes} for it"
-        raise CannotAct(msg)
-    _beside_lane(line, 0.0, part.over, one)
-    one.channel.keeps_lane = True
-    return one.instant + part.over
-
-
-def _offset(part: LateralMove, one: ActingActor) -> float:
-    line = one.view.lane_line(one.actor.id, 0)
-    if line is None:
-        msg = "it is on no lane"
-        raise CannotAct(msg)
-    _beside_lane(line, part.to, part.over, one)
-    one.channel.keeps_lane = True
-    return one.instant + part.over
-
-
-def _beside_lane(line: tuple[Point, ...], left: float, over: float, one: ActingActor) -> None:
-    """Move the front to ``left`` metres of a line."""
-    actor, channel = one.actor, one.channel
-    ahead = actor.length / 2.0 + channel.metres(one.view.time, one.instant)
-    front = actor.x + ahead * math.cos(actor.hdg), actor.y + ahead * math.sin(actor.hdg)
-    place = beside(line, front)
-    side = SideLaw(one.instant, place.left, left, over)
-    channel.take_line(line, place.along, side, one.owner, one.instant)
-
-
-def _lane_lasts(_: Any, one: ActingActor, end: float) -> float:
-    channel = one.channel
-    metres = channel.metres(one.instant, one.instant + one.step)
-    if channel.along + metres > line_length(channel.line or ()):
-        msg = "the lane ends before it is there"
-        raise CannotAct(msg)
-    return end
-
-
-def _leave_line(_: Any, one: ActingActor) -> None:
-    one.channel.leaves = True
 
 
 def _keep_gap(part: GapKeeping, one: ActingActor) -> float:
@@ -194,40 +183,6 @@ def _follow(part: GapKeeping, one: ActingActor) -> None:
     one.channel.take_speed(law, one.owner)
 
 
-def _walk(part: Walking, one: ActingActor) -> float:
-    places = [one.view.place(place) for place in (*part.through, part.to)]
-    line = (one.spot(), *places)
-    if line_length(line) < 1e-6:
-        return one.instant
-    _along_line(line, part.speed, one)
-    return math.inf
-
-
-def _along_line(line: tuple[Point, ...], speed: float | None, one: ActingActor) -> None:
-    channel = one.channel
-    usual = speed or one.view.walking_speed(one.actor.id)
-    if speed is not None or channel.law is None or channel.held or channel.borrowed:
-        # ... unless a rule has said how fast it goes
-        channel.take_speed(steady(one.instant, usual), one.owner)
-    channel.take_line(line, 0.0, None, one.owner, one.instant)
-
-
-def _on_the_walk(_: Any, one: ActingActor, __: float) -> float:
-    end = one.channel.reaches_end(one.instant, one.instant + one.step)
-    return math.inf if end is None else end
-
-
-def _end_of_walk(part: Walking, one: ActingActor) -> None:
-    _stay(one)
-    one.channel.leaves = isinstance(part.to, str) and part.to.startswith("ped.")
-
-
-def _stay(one: ActingActor) -> None:
-    channel = one.channel
-    channel.take_speed(steady(one.instant, 0.0), None)
-    channel.held = True
-
-
 def _vanish(_: Vanishing, one: ActingActor) -> float:
     one.channel.vanishes = True
     return one.instant
@@ -244,6 +199,7 @@ def _release(_: Releasing, one: ActingActor) -> float:
     channel.release_line()
     channel.release_speed(one.instant)
     channel.ignore_red = channel.ignore_right_of_way = channel.keeps_lane = False
+    channel.lights = None
     return one.instant
 
 
@@ -273,15 +229,23 @@ ACTIONS = {
             _MIRRORED, _go,
         ),
         ActionKind(
-            "lane", "change `by` lanes to the left (negative: right) `over` so many seconds on a "
-            "half-cosine; the speed stays unless another action changes it", "s",
-            "`moveToXY`", "LaneChangeAction (sinusoidal)", _MIRRORED, _lane, _lane_lasts,
-            _leave_line, vehicles_only=True,
+            "lane", "change `by` lanes to the left (negative: right), or to the lane that leads "
+            "`to` a place, `over` so many seconds on a half-cosine; the speed stays unless another "
+            "action changes it", "s",
+            "`moveToXY`", "LaneChangeAction (sinusoidal)", _MIRRORED, change_lane, lane_lasts,
+            leave_line, vehicles_only=True,
+        ),
+        ActionKind(
+            "cut_in", "change into the lane of `to`, `over` so many seconds on a half-cosine; with "
+            "`gap` the speed changes evenly so that the gap behind it is that in the end, if `to` "
+            "keeps its speed", "m, s", "`moveToXY`, `setSpeed`",
+            "LaneChangeAction (RelativeTargetLane), SpeedAction", _MIRRORED, cut_in,
+            cut_in_further, after_cut_in, vehicles_only=True,
         ),
         ActionKind(
             "offset", "move the front to `to` metres left of the lane's centre, `over` so many "
             "seconds on a half-cosine", "m, s", "`moveToXY`", "LaneOffsetAction", _MIRRORED,
-            _offset, _lane_lasts, _leave_line, vehicles_only=True,
+            move_aside, lane_lasts, leave_line, vehicles_only=True,
         ),
         ActionKind(
             "keep_gap", "follow `to` at a free gap of `metres`, or of `seconds` at the own speed, "
@@ -293,7 +257,23 @@ ACTIONS = {
             "walk", "walk straight to a place, `through` others, across a road as well; on a "
             "pedestrian node SUMO leads on to the goal, elsewhere the walker stays", "m/s",
             "`person.moveToXY`; drivers brake for the walker", "FollowTrajectoryAction",
-            _MIRRORED, _walk, _on_the_walk, _end_of_walk, persons_only=True,
+            _MIRRORED, walk, on_the_line, end_of_walk, persons_only=True,
+        ),
+        ActionKind(
+            "path", "follow a line over the ground through `points`, with one `speed`, `speeds` at "
+            "the points or `times` at which it is there; SUMO leads a vehicle on from its end",
+            "m/s, s", "`moveToXY`", "FollowTrajectoryAction (Polyline)", _MIRRORED, follow_path,
+            on_the_path, end_of_path,
+        ),
+        ActionKind(
+            "replay", "be where a recorded road user was: `rows` of seconds, x, y and heading of "
+            "the body's centre, evenly between them", "s, m, rad", "`moveToXY`",
+            "FollowTrajectoryAction (Polyline, timing)", _MIRRORED, replay, replay_further,
+            end_of_replay,
+        ),
+        ActionKind(
+            "goal", "go to another node from here on", "", "`changeTarget`; persons: a new walk",
+            "AcquirePositionAction", _MIRRORED, set_goal, says=said_of_goal,
         ),
         ActionKind(
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
@@ -302,12 +282,33 @@ ACTIONS = {
             synchronise, _stand,
         ),
         ActionKind(
+            "appear", "be on the road from now on, where it is placed or `at` x, y and heading of "
+            "its centre, with its initial or a given `speed`; before that it is not there", "m/s",
+            "`add` on a whole step", "AddEntityAction", _MIRRORED, update=has_appeared,
+            ask=ask_to_appear, says=lambda _: "appears",
+        ),
+        ActionKind(
             "vanish", "leave the simulation", "", "`remove`", "DeleteEntityAction", _MIRRORED,
             _vanish,
         ),
         ActionKind(
             "ignore", "heed no `red`, or no `right_of_way`", "", "`setSpeedMode`",
             "none", _MIRRORED, _ignore, vehicles_only=True,
+        ),
+        ActionKind(
+            "signal", "switch a `light`: its program jumps to where `movement` has green, or it "
+            "`shows` `off` or its `program` again", "", "`setPhase`, `setProgram` on a whole step",
+            "TrafficSignalControllerAction", _MIRRORED, ask=ask_to_switch, says=said_of_signal,
+        ),
+        ActionKind(
+            "lights", "set `indicator`, `brake`, `front`, `high_beam`, `fog` and `emergency` "
+            "lights; the others are off. Without any the driver's own again", "", "`setSignals`",
+            "LightStateAction (1.2)", "lights of the vehicle", set_lights, says=said_of_lights,
+            vehicles_only=True,
+        ),
+        ActionKind(
+            "horn", "sound the horn", "", "an event", "none", "an event; CARLA has no horns",
+            sound_horn, says=said_of_horn, vehicles_only=True,
         ),
         ActionKind(
             "release", "SUMO drives as if there had been no rule", "", "all of the above undone",

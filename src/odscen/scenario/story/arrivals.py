@@ -61,7 +61,8 @@ def synchronise(part: Arriving, one: ActingActor, end: float) -> float:
         msg = f"it would have to go at {needed:.1f} m/s to be there in time"
         raise CannotAct(msg)
     channel.take_speed(steady(one.instant, needed), one.owner)
-    return one.instant + left if abs(other.acceleration) < _STEADY else math.inf
+    settled = abs(other.acceleration) < _STEADY or left <= one.step
+    return one.instant + left if settled else math.inf
 
 
 def _own_rest(part: Arriving, one: ActingActor) -> float:

@@ -12,8 +12,28 @@ if TYPE_CHECKING:
 
 
 def body_distance(one: ActorView, other: ActorView) -> float:
-    """Metres between two bodies, 0 where they overlap."""
-    return polygon_distance(one.corners, other.corners)
+    """Metres between two bodies, 0 where they overlap.
+
+    Of two that do not, a corner of one of them is nearest.
+    """
+    dx, dy = other.x - one.x, other.y - one.y
+    reach = (one.length + one.width + other.length + other.width) / 2.0
+    if abs(dx) <= reach and abs(dy) <= reach and overlap(one.corners, other.corners):
+        return 0.0
+    return min(_nearest(one, other.corners), _nearest(other, one.corners))
+
+
+def _nearest(body: ActorView, points: Sequence[Point]) -> float:
+    """Metres from a body to the nearest of some points outside of it."""
+    x, y, c, s = body.x, body.y, math.cos(body.hdg), math.sin(body.hdg)
+    half, side = body.length / 2.0, body.width / 2.0
+    least = math.inf
+    for px, py in points:
+        dx, dy = px - x, py - y
+        ahead, aside = abs(dx * c + dy * s) - half, abs(dy * c - dx * s) - side
+        away = math.hypot(ahead, aside) if ahead > 0.0 and aside > 0.0 else max(ahead, aside, 0.0)
+        least = min(least, away)
+    return least
 
 
 def polygon_distance(one: Sequence[Point], other: Sequence[Point]) -> float:

@@ -10,13 +10,14 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.story.side_motion import SideLaw, line_length, point_on
-from odscen.scenario.story.speed_laws import SpeedLaw, steady
+from odscen.scenario.story.side_motion import SideLaw, heading_on, line_length, point_on
+from odscen.scenario.story.speed_laws import law_from_state, steady
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.scenario.story.road_view import ActorView, Point
+    from odscen.scenario.story.speed_laws import AnyLaw
 
 _HALVINGS = 60
 
@@ -50,6 +51,10 @@ class WantedMove:
         Whether a person is back on foot: SUMO leads it on to its goal.
     vanishes
         Whether it leaves the simulation.
+    goal
+        Node that it goes to from now on; ``None`` leaves its goal.
+    lights
+        Lights that are on, and no others; ``None`` leaves them to the driver.
     """
 
     speed: float | None = None
@@ -60,6 +65,8 @@ class WantedMove:
     keeps_lane: bool = False
     rejoins: bool = False
     vanishes: bool = False
+    goal: str | None = None
+    lights: tuple[str, ...] | None = None
 
 
 @dataclass(slots=True)
@@ -74,6 +81,8 @@ class Channel:
         Whether the law is there only because the actor is moved along a line.
     line, along, side
         Where it is moved along: how far it has come, metres, and the offset.
+    headings
+        Where the actor looks at each point of the line; along the line without.
     held
         Whether a person stays at the end of its line.
     leaves
@@ -84,10 +93,11 @@ class Channel:
         Who has taken over speed and place: rule and number of the action.
     """
 
-    law: SpeedLaw | None = None
+    law: AnyLaw | None = None
     exact: bool = False
     borrowed: bool = False
     line: tuple[Point, ...] | None = None
+    headings: tuple[float, ...] | None = None
     along: float = 0.0
     side: SideLaw | None = None
     held: bool = False
@@ -98,9 +108,11 @@ class Channel:
     ignore_red: bool = False
     ignore_right_of_way: bool = False
     keeps_lane: bool = False
+    goal: str | None = None
+    lights: tuple[str, ...] | None = None
     speed_owner: str | None = None
     line_owner: str | None = None
-    _laws: list[tuple[float, SpeedLaw]] = field(default_factory=list)
+    _laws: list[tuple[float, AnyLaw]] = field(default_factory=list)
     _forced: bool = False
 
     def begin_step(self, view: ActorView, time: float) -> None:
@@ -128,7 +140,7 @@ class Channel:
                 total += law.metres(first, last)
         return total
 
-    def take_speed(self, law: SpeedLaw, owner: str | None, *, exact: bool = True) -> None:
+    def take_speed(self, law: AnyLaw, owner: str | None, *, exact: bool = True) -> None:
         """Take over the speed from the beginning of a law on."""
         if law.begin <= self._laws[-1][0]:
             self._laws.pop()
@@ -157,9 +169,11 @@ class Channel:
         side: SideLaw | None,
         owner: str,
         instant: float,
+        *,
+        headings: tuple[float, ...] | None = None,
     ) -> None:
         """Lead the actor along a line, on which it has come ``along`` metres at ``instant``."""
-        self.line, self.side, self.line_owner = line, side, owner
+        self.line, self.side, self.line_owner, self.headings = line, side, owner, headings
         self.held = self.leaves = self.rejoins = False
         # What is covered in this step before the instant is added at its end.
         self.along = along - self.metres(self._laws[0][0], instant)
@@ -170,7 +184,7 @@ class Channel:
 
     def release_line(self) -> None:
         """Leave the line."""
-        self.line = self.side = self.line_owner = None
+        self.line = self.side = self.line_owner = self.headings = None
         self.held = self.leaves = False
         if self.borrowed:
             self.law, self.borrowed = None, False
@@ -214,8 +228,10 @@ class Channel:
             keeps_lane=self.keeps_lane,
             rejoins=self.rejoins,
             vanishes=self.vanishes,
+            goal=self.goal,
+            lights=self.lights,
         )
-        self.rejoins = False
+        self.rejoins, self.goal = False, None
         return move
 
     def _pose(self, instant: float, *, person: bool) -> Pose:
@@ -223,6 +239,8 @@ class Channel:
         left = self.side.offset(instant) if self.side else 0.0
         along = min(self.along, line_length(line)) if person else self.along
         found = point_on(line, along, left=left)
+        if self.headings is not None:
+            return Pose(found.x, found.y, heading_on(line, self.headings, along))
         speed = self.speed(instant)
         turned = math.atan2(self.side.sideways(instant), speed) if self.side and speed else 0.0
         return Pose(found.x, found.y, found.hdg + turned)
@@ -236,8 +254,10 @@ class Channel:
     def from_state(cls, state: Mapping[str, Any]) -> Channel:
         """Inverse of :meth:`state`."""
         data = dict(state)
-        data["law"] = None if data["law"] is None else SpeedLaw(**data["law"])
+        data["law"] = law_from_state(data["law"])
         data["side"] = None if data["side"] is None else SideLaw(**data["side"])
         if data["line"] is not None:
             data["line"] = tuple((float(x), float(y)) for x, y in data["line"])
+        for name in ("headings", "lights"):
+            data[name] = None if data[name] is None else tuple(data[name])
         return cls(**data)

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 NEVER = -1.0
 """Margin of what is not so, for conditions that are true or not and nothing between."""
+_FAR = 60.0
+"""Metres beyond a bound that no one covers in a step."""
 COLOURS = {"red": "ru", "yellow": "yY", "green": "gG"}
 """Letters of SUMO's states by colour."""
 
@@ -157,6 +159,10 @@ def _distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | No
 def _to_actor(
     part: DistanceBounded, one: ActorView, other: ActorView, view: RoadView
 ) -> float | None:
+    if part.along == "straight":
+        if not part.free:
+            return math.dist(_centre(one), _centre(other))
+        return _straight(one, other, (part.below or 0.0) + (part.above or 0.0))
     found = _lengthwise(one, other)
     if part.along == "longitudinal":
         return max(found.gap, 0.0) if part.free else abs(found.ahead)
@@ -167,7 +173,15 @@ def _to_actor(
         metres = view.lane_distance(one.id, other.id)
         half = (one.length + other.length) / 2.0
         return metres if metres is None or not part.free else max(metres - half, 0.0)
-    return body_distance(one, other) if part.free else math.dist(_centre(one), _centre(other))
+    msg = f"unknown direction {part.along!r}"
+    raise ValueError(msg)
+
+
+def _straight(one: ActorView, other: ActorView, bound: float) -> float:
+    """Metres between two bodies; at least so many where they are much farther than the bound."""
+    least = math.dist(_centre(one), _centre(other))
+    least -= (one.length + one.width + other.length + other.width) / 2.0
+    return least if least > bound + _FAR else body_distance(one, other)
 
 
 def _to_place(part: DistanceBounded, one: ActorView, view: RoadView) -> float | None:

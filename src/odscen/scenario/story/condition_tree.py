@@ -32,6 +32,26 @@ class LeafMemory(NamedTuple):
     value: float | None = None
 
 
+class _Node(NamedTuple):
+    """A condition, taken apart once: its kind, its part, its key if it is a leaf, what is below."""
+
+    kind: str
+    part: Any
+    key: str | None
+    children: tuple[tuple[Condition, str], ...] = ()
+
+
+def _node(condition: Condition, where: str) -> _Node:
+    kind = condition.kind
+    part = getattr(condition, kind)
+    if kind == "not_":
+        return _Node(kind, part, None, ((part, f"{where}.not"),))
+    if kind in ("all", "any"):
+        below = tuple((one, f"{where}.{kind}[{n}]") for n, one in enumerate(part))
+        return _Node(kind, part, None, below)
+    return _Node(kind, part, None if kind == "rule" else f"{where}.{kind}")
+
+
 @dataclass
 class ConditionTrees:
     """The conditions of all rules, with what they remember from step to step.
@@ -44,7 +64,7 @@ class ConditionTrees:
 
     step: float
     _values: dict[str, tuple[float, float]] = field(default_factory=dict)
-    _kinds: dict[str, str] = field(default_factory=dict)
+    _nodes: dict[str, _Node] = field(default_factory=dict)
     _leaves: dict[str, LeafMemory] = field(default_factory=dict)
     _past: dict[str, Flips] = field(default_factory=dict)
     _seen: dict[str, Flips] = field(default_factory=dict)
@@ -57,22 +77,20 @@ class ConditionTrees:
         It can be asked several times for one step, and knows better each time which rules have
         started and ended meanwhile; :meth:`next_step` ends the step.
         """
-        kind = self._kinds.get(where)
-        if kind is None:
-            kind = self._kinds[where] = condition.kind
-        if kind in ("all", "any"):
-            parts = [
-                self.look(one, f"{where}.{kind}[{index}]", actor, view)
-                for index, one in enumerate(getattr(condition, kind))
-            ]
-            flips = together(parts, every=kind == "all")
-        elif kind == "not_" and condition.not_ is not None:
-            flips = self.look(condition.not_, f"{where}.not", actor, view).opposite()
-        elif kind == "rule" and condition.rule is not None:
-            asked = condition.rule
-            flips = Flips(False, view.rule_changes(asked.id, asked.has)[:1]).after(view.time)
+        node = self._nodes.get(where)
+        if node is None:
+            node = self._nodes[where] = _node(condition, where)
+        kind, part, key, children = node
+        if key is not None:
+            flips = self._leaf(kind, part, key, actor, view)
+        elif kind == "rule":
+            flips = Flips(False, view.rule_changes(part.id, part.has)[:1]).after(view.time)
+        elif kind == "not_":
+            [(one, below)] = children
+            flips = self.look(one, below, actor, view).opposite()
         else:
-            flips = self._leaf(kind, getattr(condition, kind), f"{where}.{kind}", actor, view)
+            parts = [self.look(one, below, actor, view) for one, below in children]
+            flips = together(parts, every=kind == "all")
         if condition.delay or condition.edge == "rising":
             flips = self._later(condition, where, flips, view.time)
         return flips

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: many are made in each step, and that takes three times as long
 class ActorView:
     """An actor on the road.
 
@@ -93,6 +93,12 @@ class RoadView(Protocol):
         """Centre line of the lane ``by`` lanes to the left of an actor's, and of where it leads.
 
         ``None`` if there is no such lane for it. The line ends where the lanes do.
+        """
+
+    def lane_line_to(self, actor: str, place: str | Point) -> tuple[Point, ...] | None:
+        """Centre line of the lane beside an actor, or its own, that leads to a place.
+
+        ``None`` if none does.
         """
 
     def walking_speed(self, actor: str) -> float:

@@ -73,6 +73,18 @@ def point_on(line: Sequence[Point], along: float, *, left: float = 0.0) -> OnLin
     return OnLine(x, y, 0.0)
 
 
+def heading_on(line: Sequence[Point], headings: Sequence[float], along: float) -> float:
+    """Heading at so many metres of a line with one at each point, the shorter way between two."""
+    rest = along
+    for index, (a, b) in enumerate(itertools.pairwise(line)):
+        length = math.dist(a, b)
+        if rest < length:
+            turn = math.remainder(headings[index + 1] - headings[index], math.tau)
+            return headings[index] + turn * max(0.0, rest) / length
+        rest -= length
+    return headings[-1]
+
+
 class Beside(NamedTuple):
     """Where a point is along a line, and how far to its left; metres."""
 

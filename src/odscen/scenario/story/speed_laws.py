@@ -8,11 +8,14 @@ with t from 0 to T, dv = v1 - v0; before it the speed is v0, after it v1.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from odscen.scenario.document.actions_document import SpeedChange
 
 
@@ -56,6 +59,63 @@ class SpeedLaw:
             turn = math.pi / self.duration
             return covered + change / 2.0 * (inside - math.sin(turn * inside) / turn)
         return covered + change * inside * inside / (2.0 * self.duration)
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedTable:
+    """From ``begin`` on, speeds at instants, even between them.
+
+    ``knots`` are seconds since the begin and m/s, in order; two at one instant are a jump.
+    """
+
+    begin: float
+    knots: tuple[tuple[float, float], ...]
+
+    @property
+    def end(self) -> float:
+        """Instant of the last speed."""
+        return self.begin + self.knots[-1][0]
+
+    @property
+    def v1(self) -> float:
+        """Last speed, m/s."""
+        return self.knots[-1][1]
+
+    def speed(self, instant: float) -> float:
+        """Speed at an instant, m/s."""
+        t = instant - self.begin
+        for (t0, v0), (t1, v1) in itertools.pairwise(self.knots):
+            if t0 <= t < t1:
+                return v0 + (v1 - v0) * (t - t0) / (t1 - t0)
+        return self.knots[0][1] if t < self.knots[0][0] else self.v1
+
+    def metres(self, start: float, stop: float) -> float:
+        """Metres from one instant to another."""
+        return self._covered(stop - self.begin) - self._covered(start - self.begin)
+
+    def _covered(self, t: float) -> float:
+        if t <= 0.0:
+            return self.knots[0][1] * t
+        covered = 0.0
+        for (t0, v0), (t1, v1) in itertools.pairwise(self.knots):
+            if t <= t0:
+                break
+            inside = min(t, t1) - t0
+            if inside > 0.0:
+                covered += inside * (v0 + (v1 - v0) * inside / (t1 - t0) / 2.0)
+        return covered + self.v1 * max(0.0, t - self.knots[-1][0])
+
+
+AnyLaw = SpeedLaw | SpeedTable
+
+
+def law_from_state(state: Mapping[str, Any] | None) -> AnyLaw | None:
+    """Law from what ``asdict`` has made of it and JSON has kept."""
+    if state is None:
+        return None
+    if "knots" in state:
+        return SpeedTable(state["begin"], tuple((t, v) for t, v in state["knots"]))
+    return SpeedLaw(**state)
 
 
 def steady(begin: float, speed: float) -> SpeedLaw:

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.action_kinds import ACTIONS
+from odscen.scenario.story.action_kinds import ACTIONS, ActionKind
 from odscen.scenario.story.channels import Channel, WantedMove
 from odscen.scenario.story.condition_tree import ConditionTrees
 
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 
     from odscen.scenario.document.actions_document import Action
     from odscen.scenario.document.rules_document import StoryRule
-    from odscen.scenario.story.flips import Flips
+    from odscen.scenario.story.asked_actions import Wanted
     from odscen.scenario.story.road_view import RoadView
 
 STARTED, ENDED, FAILED, OVERRIDDEN = "started", "ended", "failed", "overridden"
+ACTED = "acted"
 """What can be said of a rule."""
 
 _MOST_TURNS = 1000
@@ -90,7 +91,7 @@ class StoryEngine:
         self._states = {rule.id: _RuleState() for rule in rules}
         self._channels: dict[str, Channel] = {}
         self._events: list[StoryEvent] = []
-        self._holds: dict[str, Flips] = {}
+        self._asked: list[Wanted] = []
 
     def rule_changes(self, rule: str, has: str) -> tuple[float, ...]:
         """Instants at which a rule has first started, or ended."""
@@ -99,9 +100,24 @@ class StoryEngine:
             return ()
         return tuple(state.started if has == STARTED else state.ended)
 
+    @property
+    def asked(self) -> Sequence[Wanted]:
+        """What the last step wants that is no motion: actors and switched lights, in order."""
+        return self._asked
+
+    def add(self, rule: StoryRule) -> None:
+        """Add a rule to those that there are."""
+        self._rules[rule.id] = rule
+        self._states[rule.id] = _RuleState()
+
+    def may_fire(self, rule: str) -> bool:
+        """Whether a rule can fire yet, or is about something."""
+        state = self._states[rule]
+        return state.item is not None or state.fired < self._rules[rule].times
+
     def step(self, view: RoadView) -> tuple[dict[str, WantedMove], list[StoryEvent]]:
         """Look at the road; what is wanted of whom until the next look, and what happened."""
-        self._events = []
+        self._events, self._asked = [], []
         self._begin_step(view)
         now = view.time
         for _ in range(_MOST_TURNS):
@@ -199,11 +215,7 @@ class StoryEngine:
         state.started = state.started or [now]
         values = self._trees.values(f"{rule.id}.when.", now - view.time)
         self._say(now, STARTED, rule, values=values or None)
-        if view.actor(rule.actor) is None:
-            self._say(now, FAILED, rule, f"{rule.actor!r} is not on the road")
-            self._over(rule, now)
-        else:
-            self._next_item(view, now, rule)
+        self._next_item(view, now, rule)
 
     def _next_item(self, view: RoadView, now: float, rule: StoryRule) -> None:
         """Begin the next item of ``then``; the rule has ended after the last."""
@@ -224,22 +236,38 @@ class StoryEngine:
         self, view: RoadView, now: float, rule: StoryRule, action: Action, one: _Running
     ) -> None:
         kind, part = ACTIONS[action.kind], getattr(action, action.kind)
-        acting = self._acting(view, now, rule, one)
-        owners = acting.channel.speed_owner, acting.channel.line_owner
         try:
-            if (kind.persons_only and not acting.actor.person) or (
-                kind.vehicles_only and acting.actor.person
-            ):
-                who = "a person" if acting.actor.person else "a vehicle"
-                msg = f"{kind.name!r} is not for {who}"
-                raise CannotAct(msg)
-            one.end = kind.begin(part, acting)
-            if one.end == math.inf and kind.update is not None:
-                one.end = kind.update(part, acting, one.end)
+            if kind.ask is not None:
+                self._asked.append(kind.ask(part, rule.actor, view))
+                one.end = math.inf if kind.update else now
+            else:
+                self._move(view, now, rule, kind, part, one)
         except CannotAct as error:
             self._fail(rule, now, str(error))
             return
-        after = acting.channel.speed_owner, acting.channel.line_owner
+        if kind.says is not None:
+            self._say(now, ACTED, rule, kind.says(part))
+
+    def _move(
+        self,
+        view: RoadView,
+        now: float,
+        rule: StoryRule,
+        kind: ActionKind,
+        part: Any,
+        one: _Running,
+    ) -> None:
+        """Begin an action of an actor that is on the road."""
+        acting = self._acting(view, now, rule, one)
+        channel, person = acting.channel, acting.actor.person
+        if (kind.persons_only and not person) or (kind.vehicles_only and person):
+            msg = f"{kind.name!r} is not for {'a person' if person else 'a vehicle'}"
+            raise CannotAct(msg)
+        owners = channel.speed_owner, channel.line_owner
+        one.end = now if kind.begin is None else kind.begin(part, acting)
+        if one.end == math.inf and kind.update is not None:
+            one.end = kind.update(part, acting, one.end)
+        after = channel.speed_owner, channel.line_owner
         for owner, new in zip(owners, after, strict=True):
             if owner is not None and new != owner:
                 self._override(owner, now, rule)

@@ -21,6 +21,7 @@ from odscen.lanegraph.shortest_paths import Router
 from odscen.results.records.run_records import Plan, PlannedActor
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.rules_document import appearing_actors
 from odscen.scenario.placing.region import Region
 from odscen.scenario.sampling.redrawn_traffic import redrawn
 from odscen.scenario.signals.detectors import without_detectors
@@ -141,7 +142,10 @@ def realize(
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
     effect = _effect(scenario.environment, assets) if settings.weather else NO_EFFECT
-    demand = RoutesFile((SSM_PARAMETER,) if recording.criticality else ())
+    rules = () if settings.meso else scenario.rules
+    demand = RoutesFile(
+        (SSM_PARAMETER,) if recording.criticality else (), held_back=appearing_actors(rules)
+    )
     for vehicle in breakdowns(scenario, sumo_map, until=until):
         demand.add_breakdown(vehicle)
     actions = measure_actions(scenario, sumo_map, until=until)
@@ -183,7 +187,7 @@ def realize(
     if scenario.rules and settings.meso:
         writer.notes.append("meso: the rules of the scenario are left out")
     elif scenario.rules:
-        files[STORY_FILE] = story_plan(scenario, sumo_map).to_json()
+        files[STORY_FILE] = story_plan(scenario, sumo_map, demand.held).to_json()
     return Realization(
         files,
         plan,

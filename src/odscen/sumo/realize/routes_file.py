@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
@@ -10,13 +11,25 @@ from odscen.base.categories import Category
 from odscen.sumo.realize.driving import number
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from odscen.sumo.realize.driving import Driver
     from odscen.sumo.realize.road_user import RoadUser, StopVisit
     from odscen.sumo.realize.route_planner import Route
     from odscen.sumo.realize.traffic_measures.breakdowns import Breakdown
     from odscen.sumo.realize.walk_planner import Walk
+
+
+@dataclass(frozen=True, slots=True)
+class HeldActor:
+    """A road user that is not inserted before a rule says so: SUMO's words for its departure.
+
+    ``attributes`` are those of ``<vehicle>`` or of ``<person>`` with its ``<walk>``.
+    """
+
+    edges: tuple[str, ...]
+    attributes: Mapping[str, str]
+    person: bool = False
 
 
 class RoutesFile:
@@ -30,9 +43,18 @@ class RoutesFile:
     ----------
     vehicle_parameters
         Of every vType of vehicles: key and value.
+    held_back
+        Ids of those that rules let appear: they are not in the file, but in ``held``.
     """
 
-    def __init__(self, vehicle_parameters: Sequence[tuple[str, str]] = ()) -> None:
+    def __init__(
+        self,
+        vehicle_parameters: Sequence[tuple[str, str]] = (),
+        *,
+        held_back: Collection[str] = (),
+    ) -> None:
+        self.held: dict[str, HeldActor] = {}
+        self._held_back = held_back
         self._parameters = vehicle_parameters
         self._types: dict[tuple[tuple[str, str], ...], str] = {}
         self._counts: dict[str, int] = {}
@@ -72,6 +94,9 @@ class RoutesFile:
             ("arrivalPos", number(route.arrival_pos, digits=4)),
             ("speedFactor", number(driver.speed_factor, digits=4)),
         ]
+        if user.id in self._held_back:
+            self.held[user.id] = HeldActor(tuple(route.edges), dict(attributes))
+            return
         if user.depart == 0.0:
             attributes.append(("insertionChecks", "none"))
         lines = [
@@ -95,6 +120,10 @@ class RoutesFile:
             ("departPosLat", number(walk.depart_pos_lat, digits=4)),
             ("arrivalPos", number(walk.arrival_pos, digits=4)),
         ]
+        if user.id in self._held_back:
+            own = dict([*person, *stage[1:]])
+            self.held[user.id] = HeldActor(tuple(walk.edges), own, person=True)
+            return
         lines = [f"    <person{_xml(person)}>", f"        <walk{_xml(stage)}/>", "    </person>"]
         self._lines.append((user.depart, user.id, lines))
 

@@ -11,7 +11,7 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.base.frames import SumoPose
 from odscen.sumo.worker.lockstep import COLUMNS
-from odscen.sumo.worker.protocol import Command, EgoPose, Lockstep, State, encode
+from odscen.sumo.worker.protocol import Command, EgoPose, Lockstep, MoreRules, State, encode
 
 if TYPE_CHECKING:
     import subprocess
@@ -77,10 +77,12 @@ class InStep:
         step, if there is one. May call :meth:`stop`; must not raise.
     placed
         Row in the plan of the vehicle that is driven from outside.
+    rules
+        Whether rules may be given between steps, with :meth:`add_rules`.
 
     Notes
     -----
-    Without such a vehicle SUMO makes its next step while ``on_step`` works on the last one.
+    Without either SUMO makes its next step while ``on_step`` works on the last one.
     """
 
     def __init__(
@@ -90,11 +92,14 @@ class InStep:
         on_step: Callable[[Step], EgoPose | None],
         *,
         placed: int | None = None,
+        rules: bool = False,
     ) -> None:
         self._plan = plan
         self._ground = ground
         self._on_step = on_step
         self._placed = placed
+        self._rules = rules
+        self._waits = rules or placed is not None
         self._ids = np.array([actor.id for actor in plan.actors], dtype=np.str_)
         self._lengths = np.array([actor.length for actor in plan.actors])
         self._z = np.array([actor.z for actor in plan.actors])
@@ -107,7 +112,7 @@ class InStep:
     @property
     def start(self) -> Lockstep:
         """How the worker is to go."""
-        return Lockstep(-1 if self._placed is None else self._placed)
+        return Lockstep(-1 if self._placed is None else self._placed, self._rules)
 
     def attach(self, process: subprocess.Popen[bytes]) -> None:
         """Let the worker make its first step."""
@@ -118,7 +123,7 @@ class InStep:
         """Work on a step."""
         if not isinstance(message, State):
             return
-        if self._placed is None and not self._stopped:
+        if not self._waits and not self._stopped:
             self._say(Command("step"))
         step = self._step(message, payload)
         if self._stopped:
@@ -126,7 +131,7 @@ class InStep:
         driven = self._on_step(step)
         if driven is not None:
             self._say(driven)
-        if self._placed is not None and not self._stopped:
+        if self._waits and not self._stopped:
             self._say(Command("step"))
 
     def detach(self) -> None:
@@ -142,7 +147,11 @@ class InStep:
             self._stopped = True
             self._say(Command("stop"))
 
-    def _say(self, command: Command | EgoPose) -> None:
+    def add_rules(self, story: str) -> None:
+        """Give the worker rules, the text of a story file, while it waits for the next step."""
+        self._say(MoreRules(story))
+
+    def _say(self, command: Command | EgoPose | MoreRules) -> None:
         if self._stdin is None:
             return
         with suppress(OSError, ValueError):  # the worker has just ended

@@ -23,6 +23,7 @@ from odscen.sumo.worker.protocol import (
     EgoPose,
     Failed,
     FrameMessage,
+    MoreRules,
     Progress,
     ShotMessage,
     State,
@@ -179,7 +180,7 @@ def messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]
         return
     for line in process.stdout:
         message = decode(line)
-        if message is None or isinstance(message, Command | EgoPose):
+        if message is None or isinstance(message, Command | EgoPose | MoreRules):
             continue
         size = message.size if isinstance(message, FrameMessage | State | ShotMessage) else 0
         yield message, process.stdout.read(size)

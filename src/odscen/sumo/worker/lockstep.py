@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.results.records.run_records import EventKind, event_row
-from odscen.sumo.worker.protocol import Command, EgoPose, State, decode
+from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, State, decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,7 @@ INVALID = 1e8
 """SUMO's INVALID_DOUBLE_VALUE is -2^30; no place is this far out."""
 
 _BLOCK = 65536
+_COMMANDS = Command | EgoPose | MoreRules
 _PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED)
 
 
@@ -57,18 +58,24 @@ class LockstepWatch:
     ----------
     stopped
         Whether the run has been ended before its time.
+    rules
+        Whether rules may come between steps; they act when the next step is asked for.
+    heard
+        Rules that have come and not been taken: texts of story files.
     """
 
     def __init__(
         self, plan: Plan, how: Lockstep, commands: int, send: Callable[[Message, bytes], None]
     ) -> None:
         self.stopped = False
+        self.rules = how.rules
+        self.heard: list[str] = []
         self._row = {actor.id: row for row, actor in enumerate(plan.actors)}
         self._placed = plan.actors[how.placed].id if how.placed >= 0 else None
         self._step_length = plan.step_length
         self._commands = commands
         self._rest = b""
-        self._queue: list[Command | EgoPose] = []
+        self._queue: list[Command | EgoPose | MoreRules] = []
         self._send = send
         self._steps = 0
         self._reported = 0
@@ -83,6 +90,8 @@ class LockstepWatch:
             if isinstance(command, EgoPose):
                 if self._placed is not None:
                     session.place(self._placed, command)
+            elif isinstance(command, MoreRules):
+                self.heard.append(command.story)
             elif command.do == "step":
                 self._steps += 1
                 return True
@@ -133,7 +142,7 @@ class LockstepWatch:
         rows[:, 7] = [pos for _, pos in places]
         return rows[(rows[:, 0] >= 0) & (np.abs(rows[:, 1]) < INVALID)]
 
-    def _next(self) -> Command | EgoPose:
+    def _next(self) -> Command | EgoPose | MoreRules:
         """Wait for the next command; to stop, once there is no one to give one."""
         while not self._queue:
             block = os.read(self._commands, _BLOCK)
@@ -141,5 +150,5 @@ class LockstepWatch:
                 return Command("stop")
             *lines, self._rest = (self._rest + block).split(b"\n")
             heard = (decode(line) for line in lines)
-            self._queue += [message for message in heard if isinstance(message, Command | EgoPose)]
+            self._queue += [message for message in heard if isinstance(message, _COMMANDS)]
         return self._queue.pop(0)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from odscen.sumo.realize.routes_file import HeldActor
+
 _ALL_CHECKS, _SAFE, _NO_CHECKS = 31, 95, 96
 """``setSpeedMode``: SUMO's own; safe, but faster than the limit; what is set and nothing else."""
 _OWN_LANES, _ROUTE_ONLY = 1621, 1537
@@ -20,6 +22,22 @@ _AHEAD = 600.0
 _NOWHERE = 1e8
 _RIGHT_OF_WAY, _RED = 8, 16
 """Bits of ``setSpeedMode``."""
+
+_NOW = -3.0
+"""``depart`` of a person that is added while the simulation runs."""
+_GREEN = "gG"
+DARK = "off"
+"""Program of a light that is switched off."""
+LIGHT_BITS = {
+    "right": 1, "left": 2, "hazard": 4, "brake": 8, "front": 16, "fog": 32, "high_beam": 64,
+    "emergency": 2048,
+}  # fmt: skip
+"""Bits of ``setSignals``."""
+
+_SEEN = (
+    "getAngle", "getSpeed", "getAcceleration", "getDistance", "getLaneID", "getLateralLanePosition"
+)  # fmt: skip
+"""Getters of :class:`SeenVehicle`, in its order."""
 
 Shape = tuple[tuple[float, float], ...]
 
@@ -63,7 +81,10 @@ class MovedActors:
         errors: tuple[type[Exception], ...],
         lanes_of_edge: Mapping[str, Sequence[str]],
         admits: Callable[[str, str], bool],
+        native: Callable[[str, str], Callable[[str], Any]],
     ) -> None:
+        self._position = native("vehicle", "getPosition")
+        self._seen = tuple(native("vehicle", getter) for getter in _SEEN)
         self._sumo = sumo
         self._errors = errors
         self._lanes_of_edge = lanes_of_edge
@@ -71,15 +92,11 @@ class MovedActors:
 
     def vehicle(self, name: str) -> SeenVehicle | None:
         """A vehicle, ``None`` if it is not on the road."""
-        one = self._sumo.vehicle
         try:
-            x, y = one.getPosition(name)
+            x, y = self._position(name)
             if abs(x) > _NOWHERE:
                 return None
-            return SeenVehicle(
-                x, y, one.getAngle(name), one.getSpeed(name), one.getAcceleration(name),
-                one.getDistance(name), one.getLaneID(name), one.getLateralLanePosition(name),
-            )  # fmt: skip
+            return SeenVehicle(x, y, *(getter(name) for getter in self._seen))
         except self._errors:
             return None
 
@@ -93,6 +110,10 @@ class MovedActors:
             return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
         except self._errors:
             return None
+
+    def edge_of(self, lane: str) -> str:
+        """Edge of a lane."""
+        return str(self._sumo.lane.getEdgeID(lane))
 
     def lane_width(self, lane: str) -> float:
         """Metres."""
@@ -171,6 +192,88 @@ class MovedActors:
     def _walkable(self, edge: str) -> bool:
         return any(self._admits(lane, "pedestrian") for lane in self._lanes_of_edge[edge])
 
+    def goal_edge(self, vehicle: str) -> str:
+        """Edge on which the route of a vehicle ends."""
+        return str(self._sumo.vehicle.getRoute(vehicle)[-1])
+
+    def lead_to(self, vehicle: str, edge: str, *, through: bool = False) -> bool:
+        """Give a vehicle a route to an edge, and beyond it if ``through``; false if there is none.
+
+        Beyond, so that it does not end its trip before it is where it is to arrive.
+        """
+        one, links = self._sumo.vehicle, self._sumo.lane.getLinks
+        kind = one.getVehicleClass(vehicle)
+        beyond = next(
+            (
+                self._sumo.lane.getEdgeID(link[0])
+                for lane in self._lanes_of_edge.get(edge, ())
+                for link in (links(lane) if through and self._admits(lane, kind) else ())
+                if self._admits(link[0], kind)
+            ),
+            None,
+        )
+        try:
+            one.setVia(vehicle, [edge] if beyond is not None else [])
+            one.changeTarget(vehicle, beyond or edge)
+        except self._errors:
+            return False
+        return edge in one.getRoute(vehicle)
+
+    def arrive(self, vehicle: str) -> None:
+        """End the trip of a vehicle where it is."""
+        self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_ARRIVED)
+
+    def insert(self, name: str, one: HeldActor, speed: float | None) -> bool:
+        """Let a road user depart as soon as there is room; false if SUMO cannot."""
+        own = one.attributes
+        try:
+            if one.person:
+                persons = self._sumo.person
+                pos = float(own["departPos"])
+                persons.add(name, one.edges[0], pos, _NOW, own["type"])
+                persons.appendWalkingStage(name, list(one.edges), float(own["arrivalPos"]))
+            else:
+                route, begin = f"{name} appears", own["departSpeed"]
+                begin = begin if speed is None else f"{speed:.4f}"
+                self._sumo.route.add(route, one.edges)
+                self._sumo.vehicle.add(
+                    name, route, own["type"], "now", own["departLane"], own["departPos"],
+                    begin, own["arrivalLane"], own["arrivalPos"],
+                )  # fmt: skip
+                self._sumo.vehicle.setSpeedFactor(name, float(own["speedFactor"]))
+        except self._errors:
+            return False
+        return True
+
+    def show_lights(self, vehicle: str, lights: Sequence[str] | None) -> None:
+        """Set the lights of a vehicle, or give them back to the driver."""
+        bits = -1 if lights is None else sum(LIGHT_BITS[name] for name in lights)
+        self._sumo.vehicle.setSignals(vehicle, bits)
+
+    def program(self, light: str) -> str:
+        """Program that a traffic light runs."""
+        return str(self._sumo.trafficlight.getProgram(light))
+
+    def run_program(self, light: str, program: str) -> None:
+        """Let a traffic light run a program; :data:`DARK` is none."""
+        self._sumo.trafficlight.setProgram(light, program)
+
+    def jump_to_green(self, light: str, link: int) -> bool:
+        """Let the program of a light resume where a link has green next; false if it never has."""
+        lights = self._sumo.trafficlight
+        own = lights.getProgram(light)
+        phases = next(
+            (one.phases for one in lights.getAllProgramLogics(light) if one.programID == own), ()
+        )
+        now = lights.getPhase(light)
+        for ahead in range(len(phases)):
+            number = (now + ahead) % len(phases)
+            if phases[number].state[link] in _GREEN:
+                if ahead:
+                    lights.setPhase(light, number)
+                return True
+        return False
+
     def remove(self, name: str, *, person: bool) -> None:
         """Take a road user out of the simulation."""
         if person:
@@ -214,6 +317,16 @@ class MovedActors:
             for n in sorted(rows)
             if 0 <= n < len(lanes) and self._admits(lanes[n], kind)
         )
+
+    def lines(self, vehicle: str) -> tuple[Shape, ...]:
+        """Centre lines of all lanes of its edge that a vehicle may use, and of where they lead."""
+        one = self._sumo.vehicle
+        own = one.getLaneID(vehicle)
+        if not own:
+            return ()
+        kind = one.getVehicleClass(vehicle)
+        lanes = self._in_order(self._sumo.lane.getEdgeID(own))
+        return tuple(self._line(vehicle, lane, kind) for lane in lanes if self._admits(lane, kind))
 
     def bodies_near(self, lane: str) -> list[tuple[str, bool]]:
         """Vehicles and persons on the edge of a lane, with whether each is a person."""

@@ -111,10 +111,12 @@ class Command:
 class Lockstep:
     """As an argument of the worker: make a step only when asked to, and report all after each.
 
-    ``placed`` is the row in the plan of a vehicle that another program drives, -1 for none.
+    ``placed`` is the row in the plan of a vehicle that another program drives, -1 for none. With
+    ``rules``, more of them may come between steps, and all act when the next step is asked for.
     """
 
     placed: int = -1
+    rules: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +157,13 @@ class EgoPose:
 
 
 @dataclass(frozen=True, slots=True)
+class MoreRules:
+    """To the worker: rules from now on, as the text of a story file."""
+
+    story: str
+
+
+@dataclass(frozen=True, slots=True)
 class ShotMessage:
     """A camera's picture of a mirrored run; ``size`` bytes of JPEG follow the line."""
 
@@ -176,7 +185,7 @@ Message = (
 )
 OnProgress = Callable[[Progress], None]
 
-_KINDS: dict[str, type[Message | Command | EgoPose]] = {
+_KINDS: dict[str, type[Message | Command | EgoPose | MoreRules]] = {
     "progress": Progress,
     "done": Done,
     "failed": Failed,
@@ -189,17 +198,18 @@ _KINDS: dict[str, type[Message | Command | EgoPose]] = {
     "state": State,
     "shot": ShotMessage,
     "place": EgoPose,
+    "rules": MoreRules,
     "command": Command,
 }
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 
-def encode(message: Message | Command | EgoPose) -> str:
+def encode(message: Message | Command | EgoPose | MoreRules) -> str:
     """One line, newline included."""
     return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
 
 
-def decode(line: str | bytes) -> Message | Command | EgoPose | None:
+def decode(line: str | bytes) -> Message | Command | EgoPose | MoreRules | None:
     """Inverse of :func:`encode`; ``None`` for a line that is no message."""
     try:
         data = json.loads(line)

@@ -125,6 +125,11 @@ class Recorder:
             if event.kind is EventKind.STRANDED:
                 self._departures.pop(event.actor, None)
 
+    def arrive(self, time: float, name: str) -> None:
+        """Record an arrival that SUMO does not report: at the goal that a rule has given."""
+        self._settle()
+        self._arrive(time, name)
+
     def lose(self, time: float, names: Iterable[str]) -> None:
         """Say that SUMO did not bring these back with a saved state."""
         self.events.extend(Event(time, EventKind.LOST, name) for name in sorted(names))

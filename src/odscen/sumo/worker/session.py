@@ -13,7 +13,7 @@ import os
 import sys
 from collections import Counter, defaultdict
 from contextlib import contextmanager, suppress
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -220,7 +220,8 @@ class Session:
 
     def moved_actors(self) -> MovedActors:
         """Hand of rules on single road users."""
-        return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits)
+        native = partial(_native, self._sumo)
+        return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits, native)
 
     def place(self, vehicle: str, at: EgoPose) -> bool:
         """Put a vehicle where another program has driven it; false if SUMO cannot.

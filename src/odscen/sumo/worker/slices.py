@@ -111,6 +111,8 @@ class _RunningSlice:
             if not last:
                 # SUMO puts a state where it puts outputs, relative to the folder that it is given.
                 session.save(self._run / layout.SUMO_FOLDER / STATE_FILE)
+                if stepper.story is not None:
+                    stepper.story.mend(part / STATE_FILE)
         routes.unlink()
         events = stepper.recorder.drain()
         seconds = time.perf_counter() - start + (before.wall_seconds if before else 0.0)
@@ -153,7 +155,7 @@ class _RunningSlice:
         stepper.recorder.lose(session.time, missing)
 
     def _is_last(self, session: Session, stepper: Stepper, now: float, *, more: bool) -> bool:
-        empty = not more and session.expected() == 0
+        empty = not more and session.expected() == 0 and not stepper.waits
         return now >= self._plan.until or empty or stepper.stopped
 
 

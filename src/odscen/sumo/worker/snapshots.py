@@ -41,6 +41,9 @@ class VehicleSignal(IntFlag):
     BLINKER_LEFT = 2
     BLINKER_EMERGENCY = 4
     BRAKE = 8
+    FRONT = 16
+    FOG = 32
+    HIGH_BEAM = 64
     EMERGENCY_BLUE = 2048
 
 

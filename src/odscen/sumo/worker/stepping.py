@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from odscen.sumo.worker.diversions import Diversions
+from odscen.sumo.worker.lockstep import LockstepWatch
 from odscen.sumo.worker.protocol import Progress
 from odscen.sumo.worker.recorder import Recorder
 
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from odscen.results.records.run_records import Plan
-    from odscen.sumo.worker.lockstep import LockstepWatch
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
     from odscen.sumo.worker.story_run import StoryRun
@@ -60,6 +60,8 @@ class Stepper:
         self._diversions = Diversions(plan) if plan.measures else None
         self._send = send
         self._watch = watch
+        self._led = watch if isinstance(watch, LockstepWatch) and watch.rules else None
+        self._due: float | None = None
         self._sent = 0.0
         self._start: tuple[float, int] | None = None
         self._busy = 0.0
@@ -68,6 +70,11 @@ class Stepper:
     def stopped(self) -> bool:
         """Whether a user who watches has ended the run."""
         return self._watch is not None and self._watch.stopped
+
+    @property
+    def waits(self) -> bool:
+        """Whether a rule may let an actor appear that is not there yet."""
+        return self.story is not None and self.story.waits
 
     def run(self, session: Session, until: float, *, more: bool = False) -> float:
         """Step until ``until``, or until no road user is left; simulated seconds then.
@@ -83,16 +90,18 @@ class Stepper:
         if self._start is None:
             self._start = now, self.recorder.departed
         begin, waited = clock(), 0.0
-        while now < until and (more or session.expected() > 0):
+        while now < until and (more or session.expected() > 0 or self.waits):
             if watch is not None:
                 asked = clock()
                 if not watch.next_step(session, self.recorder):
                     break
                 waited += clock() - asked
+            self._take_rules(session)
             now = self._step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
                 self._report(session, now, self._busy + self._sent - begin - waited)
+        self._take_rules(session)
         self._busy += clock() - begin - waited
         self._finish(session, now, more=more)
         return now
@@ -104,14 +113,30 @@ class Stepper:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
         after = session.step()
         recorder.record(session, now)
-        if self.story is not None:
-            self.story.after_step(now, recorder)
+        if self.story is not None or self._led is not None:
+            self._due = now
+        if self._led is None:
+            self._take_rules(session)
         self.steps += 1
         return after
 
+    def _take_rules(self, session: Session) -> None:
+        """Let rules act on the last step: at once, or when a program has given others."""
+        heard = [] if self._led is None else self._led.heard
+        if heard and self.story is None:
+            from odscen.sumo.worker.story_run import StoryRun
+
+            self.story = StoryRun.without_rules(self._plan)
+            self.story.begin(session)
+        while heard and self.story is not None:
+            self.story.add(heard.pop(0))
+        if self._due is not None and self.story is not None:
+            self.story.after_step(self._due, self.recorder)
+        self._due = None
+
     def _finish(self, session: Session, now: float, *, more: bool) -> None:
         """Say how it ends, if it does, and show it to who watches."""
-        empty = not more and session.expected() == 0
+        empty = not more and session.expected() == 0 and not self.waits
         if empty:
             self.recorder.road_is_empty(now)
         if self._diversions is not None and (empty or now >= self._plan.until):

@@ -15,6 +15,8 @@ from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
 from odscen.sumo.realize.rules.story_files import StoryPlan
 from odscen.sumo.worker.body_contacts import BodyContacts
 from odscen.sumo.worker.moved_actors import SavedWalk
+from odscen.sumo.worker.saved_walks import mend_walks
+from odscen.sumo.worker.story_hands import StoryHands
 from odscen.sumo.worker.story_view import StoryView
 
 if TYPE_CHECKING:
@@ -22,7 +24,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.results.records.run_records import Plan
-    from odscen.scenario.story.road_view import ActorView
     from odscen.scenario.story.story_engine import StoryEvent
     from odscen.sumo.worker.moved_actors import MovedActors
     from odscen.sumo.worker.recorder import Recorder
@@ -38,6 +39,7 @@ class StoryRun:
 
     def __init__(self, story: StoryPlan, plan: Plan) -> None:
         names = set(_names(story))
+        self._plan = story
         self._planned = {actor.id: actor for actor in plan.actors}
         self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
         self._engine = StoryEngine(story.rules, step=plan.step_length)
@@ -47,6 +49,8 @@ class StoryRun:
             net_offset=plan.net_offset,
             rule_changes=self._engine.rule_changes,
         )
+        self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
+        self._rules = story.rules
         self._contacts = BodyContacts(self._planned, plan.net_offset)
         self._step = plan.step_length
         self._offset = plan.net_offset
@@ -55,6 +59,8 @@ class StoryRun:
         self._walks: dict[str, SavedWalk] = {}
         self._fastest: dict[str, float] = {}
         self._waits: dict[str, Pose] = {}
+        self._goal_edges: dict[str, str] = {}
+        self._sent: dict[str, float] = {}
         self._lost: list[Event] = []
 
     @classmethod
@@ -63,11 +69,36 @@ class StoryRun:
         file = run / SUMO_FOLDER / STORY_FILE
         return cls(StoryPlan.from_json(file.read_text(encoding="utf-8")), plan)
 
+    @classmethod
+    def without_rules(cls, plan: Plan) -> StoryRun:
+        """A run to which rules may come."""
+        return cls(StoryPlan(()), plan)
+
+    def add(self, text: str) -> None:
+        """Add rules, the text of a story file; they act from the next look on."""
+        more = StoryPlan.from_json(text)
+        for rule in more.rules:
+            self._engine.add(rule)
+        self._rules = (*self._rules, *more.rules)
+        self._plan.places.update(more.places)
+        self._plan.signals.update(more.signals)
+        for name in _names(more):
+            if name in self._planned:
+                self._actors[name] = self._planned[name]
+
     def begin(self, session: Session) -> None:
         """Begin with a simulation; after a saved state, do again what the state does not hold."""
         self._road = session.moved_actors()
+        self._hands.begin(self._road)
         for name, move in self._moves.items():
             self._act(self._road, name, move, None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether an actor may appear that is not there yet: the run is not over before."""
+        return any(
+            self._hands.held(rule.actor) and self._engine.may_fire(rule.id) for rule in self._rules
+        )
 
     def after_step(self, time: float, recorder: Recorder) -> None:
         """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
@@ -78,10 +109,12 @@ class StoryRun:
             if move.pose is not None and self._actors[name].person
         }
         self._view.look(road, time, self._step, driven)
+        self._hands.arrivals(road, recorder, time)
         contacts = self._contacts.look(road, self._view, self._moves, time, self._step)
         moves, events = self._engine.step(self._view)
         recorder.events.extend([*contacts, *map(self._event, events)])
-        self._lost = []
+        self._lost = self._hands.lost = []
+        self._hands.obey(road, self._engine.asked, time)
         before, self._moves = self._moves, {}
         for name, move in moves.items():
             if self._view.actor(name) is not None:
@@ -90,12 +123,20 @@ class StoryRun:
                     self._moves[name] = move
         recorder.events.extend(self._lost)
 
+    def mend(self, state: Path) -> None:
+        """Let a state that SUMO has saved be one that it can load."""
+        if self._sent:
+            mend_walks(state, self._sent, self._road.edge_of)
+
     def state(self) -> dict[str, Any]:
         """What has to be remembered from one slice of a run to the next, for JSON."""
         return {
             "engine": self._engine.state(),
             "view": self._view.state(),
             "contacts": self._contacts.state(),
+            "hands": self._hands.state(),
+            "goal_edges": self._goal_edges,
+            "sent": self._sent,
             "moves": {name: asdict(move) for name, move in self._moves.items()},
             "fastest": self._fastest,
             "waits": {name: list(pose) for name, pose in self._waits.items()},
@@ -107,9 +148,14 @@ class StoryRun:
         self._engine.restore(state["engine"])
         self._view.restore(state["view"])
         self._contacts.restore(state["contacts"])
+        self._hands.restore(state["hands"])
+        self._goal_edges = dict(state["goal_edges"])
+        self._sent = dict(state["sent"])
         for name, kept in state["moves"].items():
             pose = kept["pose"]
-            data = {**kept, "pose": None if pose is None else Pose(*_numbers(pose))}
+            lights = None if kept["lights"] is None else tuple(kept["lights"])
+            pose = None if pose is None else Pose(*_numbers(pose))
+            data = {**kept, "pose": pose, "goal": None, "lights": lights}
             self._moves[name] = WantedMove(**data)
         self._fastest = dict(state["fastest"])
         self._waits = {name: Pose(*_numbers(pose)) for name, pose in state["waits"].items()}
@@ -142,11 +188,26 @@ class StoryRun:
                 ignore_red=move.ignore_red,
                 ignore_right_of_way=move.ignore_right_of_way,
             )
+        if move.lights != before.lights:
+            road.show_lights(name, move.lights)
         if move.keeps_lane != before.keeps_lane:
             road.keep_lane(name, keeps=move.keeps_lane)
+        self._lead(road, name, move)
         if (pose := move.pose) is not None:
             x, y = pose.x + self._offset[0], pose.y + self._offset[1]
             road.put_vehicle(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+
+    def _lead(self, road: MovedActors, name: str, move: WantedMove) -> None:
+        """Keep the goal of a vehicle that is put somewhere: SUMO forgets its route beside it."""
+        if move.goal is not None:
+            self._goal_edges.pop(name, None)
+            self._hands.new_goal(road, name, move.goal, self._view.time)
+        if move.pose is not None:
+            self._goal_edges.setdefault(name, road.goal_edge(name))
+            return
+        edge = self._goal_edges.pop(name, None)
+        if edge is not None and road.goal_edge(name) != edge and not road.lead_to(name, edge):
+            self._lose_way(name, "no route leads from where it is to its goal")
 
     def _let(self, road: MovedActors, name: str, speed: float | None) -> None:
         """Let a vehicle go faster than its type, while a rule wants it."""
@@ -161,6 +222,8 @@ class StoryRun:
     def _move_person(
         self, road: MovedActors, name: str, move: WantedMove, before: WantedMove | None
     ) -> None:
+        if move.goal is not None:
+            self._new_walk(road, name, move)
         if move.pose is not None:
             if name not in self._walks:
                 self._walks[name] = road.saved_walk(name)
@@ -168,11 +231,12 @@ class StoryRun:
             self._put_person(road, name, move.pose)
             return
         if move.rejoins and name in self._walks:
-            if road.resume_walk(name, self._walks[name]):
+            if self._resume(road, name, self._walks[name]):
                 del self._walks[name]
             elif (one := self._view.actor(name)) is not None:
                 self._waits[name] = Pose(one.x, one.y, one.hdg)
-                self._lost.append(_no_walk(self._view.time, one))
+                why = "there is no sidewalk to resume its walk on; it stays where it is"
+                self._lose_way(name, why)
         if (pose := self._waits.get(name)) is not None:
             self._put_person(road, name, pose)
             return
@@ -182,11 +246,31 @@ class StoryRun:
         if speed is not None:
             road.walk_speed(name, speed)
 
+    def _new_walk(self, road: MovedActors, name: str, move: WantedMove) -> None:
+        walk = self._hands.new_goal(road, name, move.goal or "", self._view.time)
+        if walk is not None and (name in self._walks or move.pose is not None):
+            self._walks[name] = walk
+        elif walk is not None and not self._resume(road, name, walk):
+            self._lose_way(name, "no walk leads from where it is to its new goal")
+
+    def _resume(self, road: MovedActors, name: str, walk: SavedWalk) -> bool:
+        resumes = road.resume_walk(name, walk)
+        if resumes:
+            self._sent[name] = walk.arrival
+        return resumes
+
     def _put_person(self, road: MovedActors, name: str, pose: Pose) -> None:
         half = self._actors[name].length / 2.0
         x = pose.x + half * math.cos(pose.hdg) + self._offset[0]
         y = pose.y + half * math.sin(pose.hdg) + self._offset[1]
         road.put_person(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+
+    def _lose_way(self, name: str, why: str) -> None:
+        """Say that SUMO cannot lead an actor on; a person would end it in a fault."""
+        one = self._view.actor(name)
+        x, y = (None, None) if one is None else (one.x, one.y)
+        time = self._view.time
+        self._lost.append(Event(time, EventKind.RULE_FAILED, name, x=x, y=y, detail=why))
 
     def _event(self, event: StoryEvent) -> Event:
         one = self._view.actor(event.actor)
@@ -208,12 +292,6 @@ def _names(story: StoryPlan) -> Iterator[str]:
         for _, _, part in rule_parts(rule, ""):
             for _, name in actors_of(part):
                 yield name
-
-
-def _no_walk(time: float, one: ActorView) -> Event:
-    """Event of a person for whom SUMO has no walk on: it would end in a fault without sidewalk."""
-    detail = "there is no sidewalk to resume its walk on; it stays where it is"
-    return Event(time, EventKind.RULE_FAILED, one.id, x=one.x, y=one.y, detail=detail)
 
 
 def _numbers(pose: Any) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.frames import SumoPose, body_centre, sumo_to_xodr
 from odscen.scenario.story.road_view import ActorView
-from odscen.scenario.story.side_motion import beside
+from odscen.scenario.story.side_motion import beside, line_length
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +21,8 @@ _STANDING = 0.1
 """m/s below which a road user stands."""
 _USUAL_WALK = 1.39
 """m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
+_ON_LANE = 1.5
+"""Metres from its centre line in which a place is on a lane."""
 _BEHIND = -10.0
 """Metres; less than that is behind."""
 
@@ -50,6 +52,7 @@ class StoryView:
         self._road: MovedActors
         self._views: dict[str, ActorView] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
+        self._half_widths: dict[str, float] = {}
         self._travelled: dict[str, float] = {}
         self._standing: dict[str, float] = {}
         self._last: dict[str, tuple[float, float, float]] = {}
@@ -101,6 +104,8 @@ class StoryView:
         else:
             where = self._where(to)
         metres = self._road.driving_distance(actor, *where)
+        if metres is None and other is None:
+            return _under(own, self.place(to))
         return None if metres is None or metres < _BEHIND else metres + ahead
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
@@ -112,6 +117,17 @@ class StoryView:
             if by == 0 or (left > 0.0) == (by > 0):
                 return line
         return None
+
+    def lane_line_to(self, actor: str, place: str | Point) -> tuple[Point, ...] | None:
+        """Centre line of the lane beside an actor, or its own, that leads to a place."""
+        point = self.place(place)
+        found = []
+        for shape in self._road.lines(actor):
+            line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
+            along, left = beside(line, point)
+            if 0.0 <= along <= line_length(line) and abs(left) < _ON_LANE:
+                found.append((abs(left), line))
+        return min(found)[1] if found else None
 
     def walking_speed(self, actor: str) -> float:
         """Speed at which a person walks if no rule says otherwise, m/s."""
@@ -155,7 +171,12 @@ class StoryView:
         seen = self._road.vehicle(planned.id)
         if seen is None:
             return None
-        half = self._road.lane_width(seen.lane) / 2.0 if seen.lane else 0.0
+        half = 0.0
+        if seen.lane:
+            known = self._half_widths.get(seen.lane)
+            if known is None:
+                known = self._half_widths[seen.lane] = self._road.lane_width(seen.lane) / 2.0
+            half = known
         return self._view(
             planned,
             seen,
@@ -217,6 +238,18 @@ class StoryView:
             standing=self._standing.get(planned.id),
             off_road=off_road,
         )
+
+
+def _under(one: ActorView, place: Point) -> float | None:
+    """Metres that a place is ahead of a body's centre if it is under the body.
+
+    Where the front has left the edge of the place, SUMO knows of no way there any more.
+    """
+    c, s = math.cos(one.hdg), math.sin(one.hdg)
+    dx, dy = place[0] - one.x, place[1] - one.y
+    ahead, aside = dx * c + dy * s, dy * c - dx * s
+    inside = abs(ahead) <= one.length / 2.0 + 1.0 and abs(aside) <= one.width
+    return ahead if inside else None
 
 
 def stranger(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.errors import ScenarioError
@@ -13,8 +13,11 @@ from odscen.scenario.placing.region import place_of
 from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.movement_names import find_movements
 from odscen.sumo.realize.light_views import scenario_lights
+from odscen.sumo.realize.routes_file import HeldActor
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
 
@@ -41,12 +44,16 @@ class StoryPlan:
     places
         By node.
     signals
-        SUMO's light and the letter in its states, by light and movement of the document.
+        SUMO's light and the letter in its states, by light and movement of the document; -1 for
+        the whole light, which has no movement.
+    held
+        Road users that rules let appear.
     """
 
     rules: tuple[StoryRule, ...]
     places: dict[str, StoryPlace] = field(default_factory=dict)
     signals: dict[tuple[str, str], tuple[str, int]] = field(default_factory=dict)
+    held: Mapping[str, HeldActor] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """One rule a line; the same plan gives the same text."""
@@ -57,6 +64,8 @@ class StoryPlan:
         signals = [[*key, *value] for key, value in self.signals.items()]
         places = {name: list(place) for name, place in self.places.items()}
         head = {"format": FORMAT, "version": VERSION, "places": places, "signals": signals}
+        if self.held:
+            head["held"] = {name: asdict(one) for name, one in self.held.items()}
         lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
         body = ",\n    ".join(rules)
         return "{\n" + ",\n".join(lines) + f',\n  "rules": [\n    {body}\n  ]\n}}\n'
@@ -77,10 +86,16 @@ class StoryPlan:
                 tuple(StoryRule.model_validate_json(json.dumps(rule)) for rule in data["rules"]),
                 {name: StoryPlace(*place) for name, place in data["places"].items()},
                 {(light, name): (tl, link) for light, name, tl, link in data["signals"]},
+                {
+                    name: HeldActor(tuple(one["edges"]), one["attributes"], one["person"])
+                    for name, one in data.get("held", {}).items()
+                },
             )
 
 
-def story_plan(scenario: Scenario, sumo_map: SumoMap) -> StoryPlan:
+def story_plan(
+    scenario: Scenario, sumo_map: SumoMap, held: Mapping[str, HeldActor] | None = None
+) -> StoryPlan:
     """Look up what the rules of a scenario name.
 
     Raises
@@ -88,14 +103,14 @@ def story_plan(scenario: Scenario, sumo_map: SumoMap) -> StoryPlan:
     ScenarioError
         If a node or a movement is not on the map.
     """
-    plan = StoryPlan(scenario.rules)
+    plan = StoryPlan(scenario.rules, held=held or {})
     for index, rule in enumerate(scenario.rules):
         for where, _, part in rule_parts(rule, f"rules[{index}]"):
             for name, place in places_of(part):
                 if isinstance(place, str):
                     plan.places[place] = _place(place, sumo_map, f"{where}.{name}")
-            light, movement = getattr(part, "light", None), getattr(part, "movement", None)
-            if light is not None and movement is not None:
+            light, movement = getattr(part, "light", None), getattr(part, "movement", None) or ""
+            if light is not None:
                 plan.signals[light, movement] = _signal(light, movement, sumo_map, where)
     return plan
 
@@ -121,6 +136,8 @@ def _signal(light: str, movement: str, sumo_map: SumoMap, where: str) -> tuple[s
     if found is None:
         msg = f"the map has no traffic light {light!r}"
         raise ScenarioError(msg, element=where)
+    if not movement:
+        return sumo_map.lights[lights.index(found)].id, -1
     links = find_movements(movement, found.movements)
     if not links:
         msg = f"light {light!r} has no movement {movement!r}"

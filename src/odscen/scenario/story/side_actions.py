@@ -1,0 +1,163 @@
+"""Actions that move a vehicle sideways: to another lane, in front of another, beside its lane."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from odscen.scenario.story.acting_actor import CannotAct
+from odscen.scenario.story.side_motion import SideLaw, beside, line_length
+from odscen.scenario.story.speed_laws import SpeedLaw
+
+if TYPE_CHECKING:
+    from odscen.scenario.document.actions_document import CuttingIn, LaneChange, LateralMove
+    from odscen.scenario.story.acting_actor import ActingActor
+    from odscen.scenario.story.road_view import ActorView, Point
+
+FASTEST = 70.0
+"""m/s; a cut-in that needs more is not possible."""
+
+
+def change_lane(part: LaneChange, one: ActingActor) -> float:
+    """Begin a lane change.
+
+    Raises
+    ------
+    CannotAct
+        If there is no such lane.
+    """
+    if part.to is not None:
+        line = one.view.lane_line_to(one.actor.id, part.to)
+        missing = "none of the lanes beside it leads to the place"
+    else:
+        by = part.by or 0
+        line = one.view.lane_line(one.actor.id, by)
+        missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
+    if line is None:
+        raise CannotAct(missing)
+    _beside_lane(line, 0.0, part.over, one)
+    return one.instant + part.over
+
+
+def move_aside(part: LateralMove, one: ActingActor) -> float:
+    """Begin to move to an offset.
+
+    Raises
+    ------
+    CannotAct
+        If the actor is on no lane.
+    """
+    line = one.view.lane_line(one.actor.id, 0)
+    if line is None and one.channel.side is not None:
+        line = one.channel.line  # it is beside the lane that it was led along until now
+    if line is None:
+        msg = "it is on no lane"
+        raise CannotAct(msg)
+    _beside_lane(line, part.to, part.over, one)
+    return one.instant + part.over
+
+
+def cut_in(part: CuttingIn, one: ActingActor) -> float:
+    """Begin to change into the lane of another.
+
+    Raises
+    ------
+    CannotAct
+        If that is not on a lane of the road, or the gap cannot be reached in time.
+    """
+    other = _other(part, one)
+    line = one.view.lane_line(part.to, 0)
+    if line is None:
+        msg = f"{part.to!r} is on no lane"
+        raise CannotAct(msg)
+    _beside_lane(line, 0.0, part.over, one)
+    end = one.instant + part.over
+    _reach_gap(part, one, other, end)
+    return end
+
+
+def cut_in_further(part: CuttingIn, one: ActingActor, end: float) -> float:
+    """Choose the speed of this step by the gap that is left, until it is half over.
+
+    Then the actor is in the other lane, and the other one may brake for it.
+
+    Raises
+    ------
+    CannotAct
+        If the lane ends, or the gap cannot be reached in time.
+    """
+    lane_lasts(part, one, end)
+    if end - one.instant > part.over / 2.0:
+        _reach_gap(part, one, _other(part, one), end)
+    return end
+
+
+def after_cut_in(part: CuttingIn, one: ActingActor) -> None:
+    """Let SUMO drive on."""
+    if part.gap is not None:
+        one.channel.release_speed(one.instant)
+    leave_line(part, one)
+
+
+def lane_lasts(_: object, one: ActingActor, end: float) -> float:
+    """Look whether the lane goes on.
+
+    Raises
+    ------
+    CannotAct
+        If it ends in this step.
+    """
+    channel = one.channel
+    metres = channel.metres(one.instant, one.instant + one.step)
+    if channel.along + metres > line_length(channel.line or ()):
+        msg = "the lane ends before it is there"
+        raise CannotAct(msg)
+    return end
+
+
+def leave_line(_: object, one: ActingActor) -> None:
+    """Leave the line with this step."""
+    one.channel.leaves = True
+
+
+def _other(part: CuttingIn, one: ActingActor) -> ActorView:
+    other = one.view.actor(part.to)
+    if other is None or other.person:
+        msg = f"{part.to!r} does not drive on the road"
+        raise CannotAct(msg)
+    return other
+
+
+def _beside_lane(line: tuple[Point, ...], left: float, over: float, one: ActingActor) -> None:
+    """Move the front to ``left`` metres of a line."""
+    place = beside(line, _front(one))
+    side = SideLaw(one.instant, place.left, left, over)
+    one.channel.take_line(line, place.along, side, one.owner, one.instant)
+    one.channel.keeps_lane = True
+
+
+def _front(one: ActingActor) -> Point:
+    actor = one.actor
+    ahead = actor.length / 2.0 + one.channel.metres(one.view.time, one.instant)
+    return actor.x + ahead * math.cos(actor.hdg), actor.y + ahead * math.sin(actor.hdg)
+
+
+def _reach_gap(part: CuttingIn, one: ActingActor, other: ActorView, end: float) -> None:
+    """Take the speed that ends with the gap, if the other one keeps its own.
+
+    g + (v + v1)/2 T - u T = gap,   g the gap now, v and u the speeds, T the seconds left
+    """
+    if part.gap is None:
+        return
+    line = one.channel.line or ()
+    half, left = other.length / 2.0, end - one.instant
+    front = other.x + half * math.cos(other.hdg), other.y + half * math.sin(other.hdg)
+    theirs = beside(line, front).along + other.speed * (one.instant - one.view.time)
+    mine = beside(line, _front(one)).along
+    gap = mine - one.actor.length - theirs
+    v, u = one.speed, other.speed
+    v1 = 2.0 * ((part.gap - gap) / left + u) - v
+    if not 0.0 <= v1 <= FASTEST:
+        msg = f"it would have to reach {v1:.1f} m/s for a gap of {part.gap:g} m in time"
+        raise CannotAct(msg)
+    one.channel.take_speed(SpeedLaw(one.instant, v, v1, left), one.owner)

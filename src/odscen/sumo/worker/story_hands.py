@@ -1,0 +1,129 @@
+"""What rules want of SUMO that is no motion: who appears, signals, and goals."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.frames import angle_deg_from_hdg
+from odscen.results.records.run_records import Event, EventKind
+from odscen.scenario.story.asked_actions import WantedActor
+from odscen.sumo.worker.moved_actors import DARK, SavedWalk
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.results.records.run_records import PlannedActor
+    from odscen.scenario.story.asked_actions import Wanted, WantedSignal
+    from odscen.sumo.realize.rules.story_files import StoryPlan
+    from odscen.sumo.worker.moved_actors import MovedActors
+    from odscen.sumo.worker.recorder import Recorder
+
+
+class StoryHands:
+    """Does it, and does again what a saved state does not hold.
+
+    Attributes
+    ----------
+    lost
+        What could not be done since it was last emptied.
+    """
+
+    def __init__(
+        self,
+        plan: StoryPlan,
+        actors: Mapping[str, PlannedActor],
+        *,
+        net_offset: tuple[float, float],
+    ) -> None:
+        self.lost: list[Event] = []
+        self._plan = plan
+        self._actors = actors
+        self._offset = net_offset
+        self._added: set[str] = set()
+        self._dark: dict[str, str] = {}
+        self._goals: dict[str, str] = {}
+
+    def begin(self, road: MovedActors) -> None:
+        """Begin with a simulation; a saved state forgets that a light is off."""
+        for light in self._dark:
+            road.run_program(light, DARK)
+
+    def held(self, name: str) -> bool:
+        """Whether an actor has not appeared yet."""
+        return name in self._plan.held and name not in self._added
+
+    def obey(self, road: MovedActors, asked: Sequence[Wanted], time: float) -> None:
+        """Do what rules have asked for in this step."""
+        for one in asked:
+            if isinstance(one, WantedActor):
+                self._appear(road, one, time)
+            else:
+                self._switch(road, one, time)
+
+    def arrivals(self, road: MovedActors, recorder: Recorder, time: float) -> None:
+        """Let those arrive who have come to the goal that a rule has given them."""
+        for name, place in list(self._goals.items()):
+            known = self._plan.places[place]
+            if road.vehicle(name) is None:
+                del self._goals[name]
+                continue
+            edge, pos, _ = road.road_place(name)
+            if edge == known.edge and pos >= known.pos + self._actors[name].length / 2.0:
+                del self._goals[name]
+                road.arrive(name)
+                recorder.arrive(time, name)
+
+    def new_goal(self, road: MovedActors, name: str, place: str, time: float) -> SavedWalk | None:
+        """Lead an actor to a node; of a person, the walk there."""
+        known = self._plan.places[place]
+        actor = self._actors[name]
+        if known.edge is None:
+            self._lose(name, time, f"{place!r} is not on SUMO's network")
+        elif actor.person:
+            return SavedWalk((known.edge,), known.pos)
+        elif road.lead_to(name, known.edge, through=True):
+            self._goals[name] = place
+        else:
+            self._lose(name, time, f"no route leads from here to {place!r}")
+        return None
+
+    def state(self) -> dict[str, Any]:
+        """What has to be remembered, for JSON."""
+        return {"added": sorted(self._added), "dark": self._dark, "goals": self._goals}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Inverse of :meth:`state`."""
+        self._added, self._dark = set(state["added"]), dict(state["dark"])
+        self._goals = dict(state["goals"])
+
+    def _appear(self, road: MovedActors, one: WantedActor, time: float) -> None:
+        held = self._plan.held.get(one.actor)
+        if held is None or one.actor in self._added:
+            self._lose(one.actor, time, "it cannot appear: it has no route, or it was there")
+            return
+        self._added.add(one.actor)
+        if not road.insert(one.actor, held, one.speed):
+            self._lose(one.actor, time, "SUMO does not let it appear")
+        elif one.at is not None:
+            x, y, hdg = one.at
+            half = self._actors[one.actor].length / 2.0
+            x += half * math.cos(hdg) + self._offset[0]
+            y += half * math.sin(hdg) + self._offset[1]
+            put = road.put_person if held.person else road.put_vehicle
+            put(one.actor, x, y, float(angle_deg_from_hdg(hdg)))
+
+    def _switch(self, road: MovedActors, one: WantedSignal, time: float) -> None:
+        light, link = self._plan.signals[one.light, one.movement or ""]
+        if one.shows == DARK:
+            if light not in self._dark:
+                self._dark[light] = road.program(light)
+                road.run_program(light, DARK)
+            return
+        if light in self._dark:
+            road.run_program(light, self._dark.pop(light))
+        if one.movement is not None and not road.jump_to_green(light, link):
+            self._lose(one.light, time, f"movement {one.movement!r} has green in no stage")
+
+    def _lose(self, name: str, time: float, why: str) -> None:
+        self.lost.append(Event(time, EventKind.RULE_FAILED, name, detail=why))
