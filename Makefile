@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
-QC := build/qc/ready
+QC := build/qc/checkers
 # The page in the browser, and what it is built from; Node comes from PyPI, into .venv.
 PAGE := src/odscen/web/static/index.html
 PAGE_SOURCES := $(shell find frontend/src frontend/public -type f) \
@@ -100,7 +100,7 @@ check-maps: $(QC)
 # ASAM's own checks and schemas; they need NumPy 1, hence an environment of their own.
 $(QC):
 	$(PYTHON) -m venv build/qc
-	build/qc/bin/pip install --quiet --disable-pip-version-check 'asam-qc-opendrive>=1.0,<2'
+	build/qc/bin/pip install --quiet --disable-pip-version-check 'asam-qc-opendrive>=1.0,<2' 'asam-qc-openscenarioxml>=1.0,<2'
 	touch $@
 
 $(READY): pyproject.toml

@@ -11,10 +11,12 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import NotFoundError, WorkspaceError, in_file
-from odscen.interchange import graphml_export, sumo_export
+from odscen.base.errors import InputError, NotFoundError, WorkspaceError, in_file
+from odscen.interchange import graphml_export, openscenario_export, sumo_export
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from odscen.interchange.exporter import ExportFiles
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
@@ -24,12 +26,20 @@ EXPORTERS = {
     for one in (
         sumo_export.EXPORTER,
         graphml_export.EXPORTER,
+        openscenario_export.EXPORTER,
     )
 }
 """Every format by its name."""
 
 
-def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: str) -> list[Path]:
+def export(
+    workspace: Workspace,
+    scenario: Scenario | Path,
+    out: Path,
+    *,
+    to: str,
+    options: Mapping[str, str] | None = None,
+) -> list[Path]:
     """Write a scenario in another format.
 
     Parameters
@@ -41,7 +51,9 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
     out
         Folder for the files; made if need be.
     to
-        Name of the format, one of :data:`EXPORTERS`: ``sumo``, ``graphml``.
+        Name of the format, one of :data:`EXPORTERS`: ``sumo``, ``graphml``, ``openscenario``.
+    options
+        What the format lets one choose: of ``openscenario`` the ``version``.
 
     Returns
     -------
@@ -52,6 +64,8 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
     ------
     NotFoundError
         If there is no such format.
+    InputError
+        If the format has no such option, or not with that value.
     ScenarioError
         If the scenario has errors that the format cannot do with.
     WorkspaceError
@@ -66,12 +80,24 @@ def export(workspace: Workspace, scenario: Scenario | Path, out: Path, *, to: st
         what = "format"
         raise NotFoundError(what, to, list(EXPORTERS))
     exporter, document = EXPORTERS[to], given_scenario(scenario)
+    for option in options or {}:
+        if option not in exporter.options:
+            msg = f"the format {to} has no {option}"
+            raise InputError(msg)
     if exporter.checked:
         with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
     loaded = map_of(workspace, document)
     name, net = scenario_name(scenario), loaded.entry.checked("net")
-    source = ExportSource(name, document, loaded.sumo, net, workspace.assets())
+    source = ExportSource(
+        name=name,
+        scenario=document,
+        sumo_map=loaded.sumo,
+        map_file=loaded.entry.checked("xodr"),
+        net=net,
+        assets=workspace.assets(),
+        options=dict(options or {}),
+    )
     return _write(exporter.files(source), out)
 
 

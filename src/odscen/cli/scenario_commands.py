@@ -183,14 +183,22 @@ def export(
         ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.", metavar="DIR")],
+    version: Annotated[
+        str | None,
+        typer.Option(help="Of OpenSCENARIO: 1.0 to 1.3. (default: 1.2)", metavar="VERSION"),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a scenario in another format."""
+    """Write a scenario in another format.
+
+    What a format cannot say is listed in a file NAME.export.json beside it.
+    """
     from odscen.app.export import export as write
     from odscen.workspace.store import Workspace
 
-    files = write(Workspace.open(workspace), scenario, out, to=to)
+    options = {} if version is None else {"version": version}
+    files = write(Workspace.open(workspace), scenario, out, to=to, options=options)
     for file in files:
         log(f"Wrote {file}")
     if as_json:

@@ -7,7 +7,7 @@ called.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -30,17 +30,23 @@ class ExportSource:
         The document.
     sumo_map
         Lane graph, pedestrian graph and SUMO network of its map, with the table between them.
+    map_file
+        The map, as it was added.
     net
         The map's SUMO network file.
     assets
         Size of models and parameters of weather.
+    options
+        What the format lets one choose, by name.
     """
 
     name: str
     scenario: Scenario
     sumo_map: SumoMap
+    map_file: Path
     net: Path
     assets: Assets
+    options: Mapping[str, str] = field(default_factory=dict)
 
 
 ExportFiles = Mapping[str, "str | Path"]
@@ -61,9 +67,12 @@ class Exporter:
         Makes the files.
     checked
         Whether the scenario must be free of errors.
+    options
+        Names of what can be chosen.
     """
 
     name: str
     label: str
     files: Callable[[ExportSource], ExportFiles]
     checked: bool = True
+    options: tuple[str, ...] = ()

@@ -83,14 +83,19 @@ def weather_effect(parameters: Mapping[str, float]) -> WeatherEffect:
     loss = RAIN_SPEED_LOSS + (HEAVY_SPEED_LOSS - RAIN_SPEED_LOSS) * rain if rain > 0 else 0.0
     sight_speed = math.inf
     if haze > 0:
-        sight = CLEAR * (DENSE / CLEAR) ** haze + max(0.0, parameters.get("fog_distance", 0.0))
-        sight_speed = stopping_speed(sight, grip=grip)
+        sight_speed = stopping_speed(visibility(parameters), grip=grip)
     return WeatherEffect(
         speed=1.0 - loss,
         grip=grip,
         headway=1.0 / (1.0 - HEAVY_CAPACITY_LOSS * rain),
         sight_speed=sight_speed,
     )
+
+
+def visibility(parameters: Mapping[str, float]) -> float:
+    """Metres one sees, as :func:`weather_effect` has it."""
+    haze = max(_share(parameters, "fog_density"), _share(parameters, "dust_storm"))
+    return CLEAR * math.pow(DENSE / CLEAR, haze) + max(0.0, parameters.get("fog_distance", 0.0))
 
 
 def stopping_speed(sight: float, *, grip: float = 1.0) -> float:

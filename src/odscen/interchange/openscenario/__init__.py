@@ -1,0 +1,1 @@
+"""OpenSCENARIO XML, versions 1.0 to 1.3."""

@@ -1,0 +1,113 @@
+"""Places of a scenario as positions of OpenSCENARIO, and bodies with their reference point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.interchange.openscenario.dialect import xml
+from odscen.lanegraph.query import is_walk_node_id, node_index, walk_node_index
+
+if TYPE_CHECKING:
+    from lxml.etree import _Element
+
+    from odscen.base.categories import Body
+    from odscen.interchange.exporter import ExportSource
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.conditions_document import RulePlace
+    from odscen.scenario.document.scenario_document import Actor
+
+REAR_AXLE: Final = 0.28
+"""Metres from the centre of a vehicle back to its rear axle, as a share of its length."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place on the ground: metres in the OpenDRIVE frame, radians counter-clockwise from x."""
+
+    x: float
+    y: float
+    z: float
+    hdg: float | None
+
+    def back(self, metres: float) -> Spot:
+        """Return the spot so many metres behind."""
+        if self.hdg is None:
+            return self
+        dx, dy = metres * math.cos(self.hdg), metres * math.sin(self.hdg)
+        return Spot(self.x - dx, self.y - dy, self.z, self.hdg)
+
+    def left(self, metres: float) -> Spot:
+        """Return the spot so many metres to the left."""
+        hdg = self.hdg or 0.0
+        dx, dy = -metres * math.sin(hdg), metres * math.cos(hdg)
+        return Spot(self.x + dx, self.y + dy, self.z, self.hdg)
+
+    def element(self) -> _Element:
+        """``Position`` in world coordinates."""
+        return xml("Position", xml("WorldPosition", x=self.x, y=self.y, z=self.z, h=self.hdg))
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Nodes of a map, and the bodies of a scenario's actors."""
+
+    source: ExportSource
+
+    @property
+    def graph(self) -> MapGraph:
+        """Lane graph and pedestrian graph."""
+        return self.source.sumo_map.graph
+
+    def spot(self, place: RulePlace) -> Spot:
+        """Where a place is; of x and y the height and heading are those of the nearest node."""
+        if not isinstance(place, str):
+            lanes = self.graph.lanes
+            near = int(((lanes.x - place[0]) ** 2 + (lanes.y - place[1]) ** 2).argmin())
+            return Spot(*place, float(lanes.z[near]), None)
+        if is_walk_node_id(place):
+            walks, node = self.graph.walks, walk_node_index(self.graph, place)
+            return Spot(float(walks.x[node]), float(walks.y[node]), float(walks.z[node]), None)
+        lanes, node = self.graph.lanes, node_index(self.graph, place)
+        values = (lanes.x[node], lanes.y[node], lanes.z[node], lanes.hdg[node])
+        return Spot(*map(float, values))
+
+    def start(self, actor: Actor) -> Spot:
+        """Where the reference point of an actor is at first."""
+        if is_walk_node_id(actor.spawn):
+            walks, node = self.graph.walks, walk_node_index(self.graph, actor.spawn)
+            here = self.spot(actor.spawn)
+            centre = Spot(here.x, here.y, here.z, float(walks.hdg[node]))
+        else:
+            centre = self.spot(actor.spawn)
+        return centre.left(actor.lateral_offset).back(self.centre_ahead(actor))
+
+    def body(self, actor: Actor) -> Body:
+        """Size of an actor."""
+        known = None if actor.model is None else self.source.assets.dimensions(actor.model)
+        return known or DEFAULT_BODY[actor.category]
+
+    def centre_ahead(self, actor: Actor) -> float:
+        """Metres from the reference point, the rear axle, ahead to the centre of the body."""
+        if actor.category is Category.PEDESTRIAN:
+            return 0.0
+        return REAR_AXLE * self.body(actor).length
+
+    def lane_position(self, node: str) -> _Element:
+        """``Position`` of a lane node by road, lane and s; of others in world coordinates."""
+        if is_walk_node_id(node):
+            return self.spot(node).element()
+        lanes, index = self.graph.lanes, node_index(self.graph, node)
+        key = lanes.lanes.keys[int(lanes.lane[index])]
+        return xml(
+            "Position",
+            xml(
+                "LanePosition",
+                roadId=key.road,
+                laneId=key.lane,
+                s=float(lanes.s[index]),
+                offset=0.0,
+            ),
+        )

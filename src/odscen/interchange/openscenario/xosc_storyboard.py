@@ -1,0 +1,172 @@
+"""Rules as the storyboard: what is at first, an event for each item of a rule, and the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from odscen.interchange.openscenario.dialect import xml
+from odscen.interchange.openscenario.xosc_actions import (
+    Actions,
+    acquire,
+    appear,
+    private,
+    speed_action,
+)
+from odscen.interchange.openscenario.xosc_triggers import CannotSayError, Triggers
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from lxml.etree import _Element
+
+    from odscen.interchange.openscenario.dialect import Dialect, Notes
+    from odscen.interchange.openscenario.xosc_places import Places
+    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.scenario_document import Actor, Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Makes the storyboard of a scenario."""
+
+    scenario: Scenario
+    places: Places
+    dialect: Dialect
+    notes: Notes
+    environment: _Element | None
+
+    def storyboard(self) -> _Element:
+        """``Storyboard``."""
+        actors = {actor.id: actor for actor in self.scenario.actors}
+        groups = [
+            group for actor in self.scenario.actors if (group := self._later(actor)) is not None
+        ]
+        groups += self._rules(actors)
+        duration = self.scenario.simulation.duration
+        triggers = Triggers(self.places, self.dialect, self.notes, {})
+        if not groups:  # a story needs one
+            nobody = xml("Actors", selectTriggeringEntities=False)
+            groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]
+        act = xml("Act", *groups, xml("StartTrigger", triggers.at_time(0.0, "begin")), name="rules")
+        return xml(
+            "Storyboard",
+            xml("Init", xml("Actions", *self._init(self.scenario.actors))),
+            xml("Story", xml("ParameterDeclarations"), act, name=self.scenario.name),
+            xml("StopTrigger", triggers.at_time(duration, "end of the run")),
+        )
+
+    def _init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
+        if self.environment is not None:
+            yield xml("GlobalAction", xml("EnvironmentAction", self.environment))
+        for actor in actors:
+            if actor.depart > 0 or self._appears(actor.id):
+                continue
+            actions = [
+                private(xml("TeleportAction", self.places.start(actor).element())),
+                speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
+            ]
+            if actor.goal is not None:
+                actions.append(acquire(self.places, actor.goal))
+            yield xml("Private", *actions, entityRef=actor.id)
+
+    def _appears(self, actor: str) -> bool:
+        return any(
+            rule.actor == actor and part.kind == "appear"
+            for rule in self.scenario.rules
+            for item in rule.then
+            for part in item.parts
+        )
+
+    def _later(self, actor: Actor) -> _Element | None:
+        """Maneuver group of an actor that departs later."""
+        if actor.depart <= 0 or self._appears(actor.id):
+            return None
+        triggers = Triggers(self.places, self.dialect, self.notes, {})
+        actions = [
+            appear(actor, self.places.start(actor)),
+            speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
+        ]
+        if actor.goal is not None:
+            actions.append(acquire(self.places, actor.goal))
+        trigger = xml("StartTrigger", triggers.at_time(actor.depart, f"{actor.id} departs"))
+        name = f"{actor.id} departs"
+        return self._group(name, actor.id, [self._event(name, actions, trigger, 1)])
+
+    def _rules(self, actors: dict[str, Actor]) -> list[_Element]:
+        """Maneuver groups of rules; those that cannot be said are left out, and whom they free."""
+        left: dict[str, StoryRule] = {rule.id: rule for rule in self.scenario.rules}
+        while True:
+            events = {name: _names(rule) for name, rule in left.items()}
+            found, refused = [], {}
+            for index, rule in enumerate(self.scenario.rules):
+                if rule.id not in left:
+                    continue
+                try:
+                    found.append(self._rule(rule, f"rules[{index}]", events, actors))
+                except CannotSayError as error:
+                    refused[rule.id] = (f"rules[{index}]", str(error))
+            if not refused:
+                return found
+            for name, words in refused.items():
+                self.notes.left_out.append(words)
+                del left[name]
+
+    def _rule(
+        self,
+        rule: StoryRule,
+        where: str,
+        events: dict[str, tuple[str, str]],
+        actors: dict[str, Actor],
+    ) -> _Element:
+        if rule.actor not in actors:
+            msg = f"rule {rule.id!r} is of {rule.actor!r}, a vehicle of a flow"
+            raise CannotSayError(msg)
+        triggers = Triggers(self.places, self.dialect, self.notes, events)
+        makes = Actions(self.places, self.dialect, self.notes, actors)
+        made = []
+        for index, item in enumerate(rule.then):
+            actions = [
+                action
+                for part in item.parts
+                for action in makes.actions(
+                    part.kind, getattr(part, part.kind), rule.actor, f"{where}.then[{index}]"
+                )
+            ]
+            name = _event_name(rule, index)
+            trigger = (
+                triggers.trigger(rule.when, rule.actor, where)
+                if index == 0
+                else triggers.after(_event_name(rule, index - 1))
+            )
+            made.append(self._event(name, actions, trigger, rule.times))
+        return self._group(rule.id, rule.actor, made)
+
+    def _event(
+        self, name: str, actions: Sequence[_Element], trigger: _Element, times: int
+    ) -> _Element:
+        named = [
+            xml("Action", action, name=f"{name}.{number}")
+            for number, action in enumerate(actions, start=1)
+        ]
+        return xml(
+            "Event", *named, trigger, name=name, priority="parallel", maximumExecutionCount=times
+        )
+
+    def _group(self, name: str, actor: str, events: Sequence[_Element]) -> _Element:
+        return xml(
+            "ManeuverGroup",
+            xml("Actors", xml("EntityRef", entityRef=actor), selectTriggeringEntities=False),
+            xml("Maneuver", *events, name=name),
+            name=name,
+            maximumExecutionCount=1,
+        )
+
+
+def _names(rule: StoryRule) -> tuple[str, str]:
+    """Names of the first and the last event of a rule."""
+    return _event_name(rule, 0), _event_name(rule, len(rule.then) - 1)
+
+
+def _event_name(rule: StoryRule, index: int) -> str:
+    return f"{rule.id}.then[{index}]"
