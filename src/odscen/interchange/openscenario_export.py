@@ -9,7 +9,7 @@ from odscen.interchange.exporter import Exporter
 
 if TYPE_CHECKING:
     from odscen.interchange.exporter import ExportFiles, ExportSource
-    from odscen.interchange.openscenario.dialect import Notes
+    from odscen.interchange.openscenario.dialect import ExportNotes
 
 _DATE = "2026-01-01T00:00:00"
 """Of the file's header: the same scenario gives the same file on any day."""
@@ -26,13 +26,13 @@ def openscenario_files(source: ExportSource) -> ExportFiles:
     """
     from lxml import etree
 
-    from odscen.interchange.openscenario.dialect import Dialect, Notes, xml
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes, xml
     from odscen.interchange.openscenario.xosc_entities import entity
     from odscen.interchange.openscenario.xosc_places import Places
     from odscen.interchange.openscenario.xosc_storyboard import Story
     from odscen.interchange.openscenario.xosc_weather import environment
 
-    dialect, notes = Dialect.of(source.options.get("version", LATEST)), Notes()
+    dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
     scenario, places = source.scenario, Places(source)
     _note_traffic(source, notes)
     header = xml(
@@ -69,7 +69,7 @@ def _parameters(source: ExportSource) -> dict[str, float]:
     return {**(source.assets.weather(given.preset) or {}), **given.parameters}
 
 
-def _note_traffic(source: ExportSource, notes: Notes) -> None:
+def _note_traffic(source: ExportSource, notes: ExportNotes) -> None:
     """Say what only SUMO knows: drivers, traffic, signals and measures do not travel."""
     scenario = source.scenario
     given = {

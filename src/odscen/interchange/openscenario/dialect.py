@@ -41,7 +41,7 @@ def _written(value: object) -> str:
 
 
 @dataclass(slots=True)
-class Notes:
+class ExportNotes:
     """What could not be written as it is in odscen; each with its place in the document."""
 
     approximated: list[tuple[str, str]] = field(default_factory=list)

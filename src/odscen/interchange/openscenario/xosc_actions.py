@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario.dialect import xml
-from odscen.interchange.openscenario.xosc_places import Spot
+from odscen.interchange.openscenario.xosc_places import GroundPose
 from odscen.interchange.openscenario.xosc_triggers import CannotSayError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario.dialect import Dialect, Notes
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
     from odscen.interchange.openscenario.xosc_places import Places
     from odscen.scenario.document.scenario_document import Actor
 
@@ -31,7 +31,7 @@ class Actions:
 
     places: Places
     dialect: Dialect
-    notes: Notes
+    notes: ExportNotes
     actors: Mapping[str, Actor]
 
     def actions(self, kind: str, part: Any, actor: str, where: str) -> list[_Element]:
@@ -49,7 +49,7 @@ class Actions:
         return make(self, part, actor, where)
 
     def trajectory(
-        self, name: str, spots: Sequence[Spot], times: Sequence[float], *, timed: bool
+        self, name: str, spots: Sequence[GroundPose], times: Sequence[float], *, timed: bool
     ) -> _Element:
         """``RoutingAction`` that leads along points; times are relative to its begin."""
         vertices = [
@@ -202,7 +202,7 @@ def _walk(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     ]
 
 
-def _timed(spots: Sequence[Spot], speed: float) -> tuple[list[Spot], list[float]]:
+def _timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose], list[float]]:
     steps = [math.hypot(b.x - a.x, b.y - a.y) / speed for a, b in itertools.pairwise(spots)]
     times = [0.0, *itertools.accumulate(steps)]
     if len(spots) == 1:  # a line has two points at least
@@ -224,7 +224,7 @@ def _path(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
 def _replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     back = made.places.centre_ahead(made.actors[actor])
     level = made.places.start(made.actors[actor]).z
-    spots = [Spot(x, y, level, hdg).back(back) for _, x, y, hdg in part.rows]
+    spots = [GroundPose(x, y, level, hdg).back(back) for _, x, y, hdg in part.rows]
     times = [row[0] for row in part.rows]
     return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
 
@@ -249,7 +249,7 @@ def _vanish(_made: Actions, _part: Any, actor: str, _where: str) -> list[_Elemen
     return [xml("GlobalAction", xml("EntityAction", xml("DeleteEntityAction"), entityRef=actor))]
 
 
-def appear(actor: Actor, at: Spot) -> _Element:
+def appear(actor: Actor, at: GroundPose) -> _Element:
     """``GlobalAction`` that adds an entity."""
     added = xml("AddEntityAction", at.element())
     return xml("GlobalAction", xml("EntityAction", added, entityRef=actor.id))
@@ -259,7 +259,9 @@ def _appear(made: Actions, part: Any, actor: str, _where: str) -> list[_Element]
     own = made.actors[actor]
     spot = made.places.start(own)
     if part.at is not None:
-        spot = Spot(part.at[0], part.at[1], spot.z, part.at[2]).back(made.places.centre_ahead(own))
+        spot = GroundPose(part.at[0], part.at[1], spot.z, part.at[2]).back(
+            made.places.centre_ahead(own)
+        )
     speed = own.initial_speed if part.speed is None else part.speed
     return [appear(own, spot), speed_action(speed or 0.0, "step", "time", 0.0)]
 

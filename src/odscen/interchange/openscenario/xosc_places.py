@@ -24,7 +24,7 @@ REAR_AXLE: Final = 0.28
 
 
 @dataclass(frozen=True, slots=True)
-class Spot:
+class GroundPose:
     """A place on the ground: metres in the OpenDRIVE frame, radians counter-clockwise from x."""
 
     x: float
@@ -32,18 +32,18 @@ class Spot:
     z: float
     hdg: float | None
 
-    def back(self, metres: float) -> Spot:
+    def back(self, metres: float) -> GroundPose:
         """Return the spot so many metres behind."""
         if self.hdg is None:
             return self
         dx, dy = metres * math.cos(self.hdg), metres * math.sin(self.hdg)
-        return Spot(self.x - dx, self.y - dy, self.z, self.hdg)
+        return GroundPose(self.x - dx, self.y - dy, self.z, self.hdg)
 
-    def left(self, metres: float) -> Spot:
+    def left(self, metres: float) -> GroundPose:
         """Return the spot so many metres to the left."""
         hdg = self.hdg or 0.0
         dx, dy = -metres * math.sin(hdg), metres * math.cos(hdg)
-        return Spot(self.x + dx, self.y + dy, self.z, self.hdg)
+        return GroundPose(self.x + dx, self.y + dy, self.z, self.hdg)
 
     def element(self) -> _Element:
         """``Position`` in world coordinates."""
@@ -61,25 +61,27 @@ class Places:
         """Lane graph and pedestrian graph."""
         return self.source.sumo_map.graph
 
-    def spot(self, place: RulePlace) -> Spot:
+    def spot(self, place: RulePlace) -> GroundPose:
         """Where a place is; of x and y the height and heading are those of the nearest node."""
         if not isinstance(place, str):
             lanes = self.graph.lanes
             near = int(((lanes.x - place[0]) ** 2 + (lanes.y - place[1]) ** 2).argmin())
-            return Spot(*place, float(lanes.z[near]), None)
+            return GroundPose(*place, float(lanes.z[near]), None)
         if is_walk_node_id(place):
             walks, node = self.graph.walks, walk_node_index(self.graph, place)
-            return Spot(float(walks.x[node]), float(walks.y[node]), float(walks.z[node]), None)
+            return GroundPose(
+                float(walks.x[node]), float(walks.y[node]), float(walks.z[node]), None
+            )
         lanes, node = self.graph.lanes, node_index(self.graph, place)
         values = (lanes.x[node], lanes.y[node], lanes.z[node], lanes.hdg[node])
-        return Spot(*map(float, values))
+        return GroundPose(*map(float, values))
 
-    def start(self, actor: Actor) -> Spot:
+    def start(self, actor: Actor) -> GroundPose:
         """Where the reference point of an actor is at first."""
         if is_walk_node_id(actor.spawn):
             walks, node = self.graph.walks, walk_node_index(self.graph, actor.spawn)
             here = self.spot(actor.spawn)
-            centre = Spot(here.x, here.y, here.z, float(walks.hdg[node]))
+            centre = GroundPose(here.x, here.y, here.z, float(walks.hdg[node]))
         else:
             centre = self.spot(actor.spawn)
         return centre.left(actor.lateral_offset).back(self.centre_ahead(actor))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario.dialect import Dialect, Notes
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
     from odscen.interchange.openscenario.xosc_places import Places
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Actor, Scenario
@@ -33,7 +33,7 @@ class Story:
     scenario: Scenario
     places: Places
     dialect: Dialect
-    notes: Notes
+    notes: ExportNotes
     environment: _Element | None
 
     def storyboard(self) -> _Element:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
-    from odscen.interchange.openscenario.dialect import Dialect, Notes
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
     from odscen.interchange.openscenario.xosc_places import Places
     from odscen.scenario.document.conditions_document import Condition
 
@@ -50,7 +50,7 @@ class Triggers:
 
     places: Places
     dialect: Dialect
-    notes: Notes
+    notes: ExportNotes
     events: Mapping[str, tuple[str, str]]
 
     def trigger(self, condition: Condition, actor: str, where: str) -> _Element:
