@@ -26,6 +26,8 @@ from odscen.results.by_place.facilities import (
     movement_facilities,
     passage_sums,
 )
+from odscen.results.by_place.lane_groups import LaneGroups, lane_groups
+from odscen.results.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
 from odscen.results.by_place.traffic_sums import intervals
@@ -66,6 +68,8 @@ class Run:
     steps: pl.DataFrame
     trips: pl.DataFrame
     stretches: pl.DataFrame
+    backs: pl.DataFrame
+    groups: LaneGroups
 
     def loops(self, edge: str) -> int:
         """Vehicles that induction loops counted on all lanes of an edge."""
@@ -116,13 +120,20 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     ]
     around = f'<entryExitDetector id="around" period="{UNTIL:g}" file="around.xml">'
     loops += [around, *ends, "</entryExitDetector>"]
+    loops += [
+        f'<laneAreaDetector id="{last}" lanes="{first} {last}" pos="0" endPos="-0.01"'
+        f' friendlyPos="true" period="{STEP:g}" file="queues.xml" speedThreshold="{QUEUED}"'
+        f' timeThreshold="0" jamThreshold="{GAP:g}"/>'
+        for arm in ARMS
+        for first, last in zip(lanes[f"{arm}.0.f"], lanes[f"{arm}.1.f"], strict=True)
+    ]
     (folder / "loops.add.xml").write_text("\n".join(["<additional>", *loops, "</additional>"]))
     subprocess.run(
         [
             BIN / "sumo", "-n", f"{MAP}.net.xml", "-r", "routes.rou.xml",
             "-a", "measures.add.xml,loops.add.xml", "--tripinfo-output", "trips.xml",
             "--emission-output", "steps.csv", "--fcd-output", "fcd.parquet",
-            "--fcd-output.attributes", "id,speed,lane", "--end", str(UNTIL), "--seed", "3",
+            "--fcd-output.attributes", "id,x,y,speed,lane", "--end", str(UNTIL), "--seed", "3",
             "--step-length", str(STEP), "--precision", "6", "--no-step-log", "--no-warnings",
         ],
         cwd=folder,
@@ -148,7 +159,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         kinds, *passage_sums(passed, kinds, clock), highway_density(table, places, facts, None)
     )
     figures = traffic_figures(table, places, end=UNTIL, queues=queues, facilities=facilities)
-    return Run(folder, figures, steps, trips, stretches)
+    groups = lane_groups(places, facts)
+    backs = queue_backs(rows, groups, facts)
+    assert backs is not None
+    return Run(folder, figures, steps, trips, stretches, backs, groups)
 
 
 def facts_of(folder: Path) -> NetFacts:
@@ -288,3 +302,40 @@ def test_figures_of_the_run_are_ratios_of_its_trips(run):
     assert found["buffer_index"] == pytest.approx(share)
     assert found["throughput"] == pytest.approx(NUMBER / UNTIL * 3600.0)
     assert found["co2_per_km"] * found["vehicle_km"] == pytest.approx(1000.0 * found["co2_total"])
+
+
+def test_queues_in_metres_are_those_of_detectors_along_the_lanes(run):
+    """SUMO's E2 detectors: jams from the first front to the last rear; ours from the stop line."""
+    root = etree.parse(run.folder / "queues.xml").getroot()
+    jams = pl.DataFrame(
+        [
+            (one.get("id"), float(one.get("begin")), float(one.get("maxJamLengthInMeters")))
+            for one in root
+        ],
+        schema=("source", "time", "jam"),
+        orient="row",
+    ).filter(col("jam") > 0.0)
+    alone = run.groups.ways.join(run.groups.groups.filter(col("lanes") == 1), on="lane_group")
+    pairs = alone.select("lane_group", "source").unique().rows()
+    assert len(pairs) == len(ARMS)
+    table = queue_sums(run.backs, run.groups, WHOLE, step=STEP)
+    checked = 0
+    for group, source in pairs:
+        ours = run.backs.filter(col("lane_group") == group)
+        theirs = jams.filter(col("source") == source)
+        longest = theirs["jam"].max()
+        if longest < 10.0:  # one vehicle that has not come to its stop
+            continue
+        checked += 1
+        row = table.row(by_predicate=col("lane_group") == group, named=True)
+        assert row["queue_metres_max"] - TO_LINE == pytest.approx(longest, rel=0.01)
+        both = ours.join(theirs, on="time")
+        # While the first drive off, a jam begins behind them, and the queue is still at the line.
+        assert (both["metres"] - both["jam"]).median() == pytest.approx(TO_LINE, abs=0.1)
+        assert both.height > 0.8 * theirs.height, "a jam far from the line is no queue of ours"
+    assert checked >= 3
+
+
+WHOLE = pl.DataFrame({"begin": [0.0], "end": [UNTIL]})
+TO_LINE = 1.0
+"""Metres before the stop line at which SUMO's vehicles stop."""

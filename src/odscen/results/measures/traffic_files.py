@@ -29,7 +29,7 @@ _DIGITS = 4
 
 
 def write_tables(figures: TrafficFigures, folder: Path) -> None:
-    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and ``movements.csv``."""
+    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and so on."""
     folder.mkdir(exist_ok=True)
     for name in TABLES:
         table: pl.DataFrame = getattr(figures, name)
@@ -46,10 +46,11 @@ def read_tables(folder: Path) -> TrafficFigures | None:
     """
     import polars as pl
 
-    if not all((folder / f"{name}.csv").is_file() for name in TABLES):
+    there = [name for name in TABLES if (folder / f"{name}.csv").is_file()]
+    if not {*TABLES} - {"lane_groups"} <= {*there}:  # which earlier versions have not written
         return None
     found = {}
-    for name in TABLES:
+    for name in there:
         file = folder / f"{name}.csv"
         with tables(str(file)):
             names = pl.scan_csv(file).collect_schema().names()
@@ -73,7 +74,7 @@ def places_from_json(text: str, table: TableName) -> pl.DataFrame:
     what = "figures of a run"
     data = read_document(text, form=FIGURES_FORMAT, version=VERSION, what=what)
     with documents(what, pl.exceptions.PolarsError):
-        rows = data[table]
+        rows = data.get(table, ()) if table == "lane_groups" else data[table]
         return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
 
 

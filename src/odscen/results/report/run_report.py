@@ -24,6 +24,7 @@ from odscen.results.report.report_corridor import corridor_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
+from odscen.results.report.report_groups import group_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_measures import measure_section
@@ -123,6 +124,7 @@ def render_report(
         key_figure_section({**given, **counts}, traces),
         measure_section(plan.measures, int(counts["stranded"] or 0)),
         service_section(figures) if figures else None,
+        group_section(figures.lane_groups) if figures else None,
         _map_section(traces, plan, actors, events, drawing, incidents, every),
         incident_section(incidents),
         *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),

@@ -26,12 +26,13 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.traffic import TableName
 
-PlaceKind = Literal["network", "segment", "junction", "movement"]
+PlaceKind = Literal["network", "segment", "junction", "movement", "lane_group"]
 _TABLES: dict[PlaceKind, TableName] = {
     "network": "network",
     "segment": "segments",
     "junction": "junctions",
     "movement": "movements",
+    "lane_group": "lane_groups",
 }
 
 
@@ -238,7 +239,7 @@ class Run:
         Parameters
         ----------
         place
-            ``network``, ``segment``, ``junction`` or ``movement`` (``r1>j10>r2``).
+            ``network``, ``segment``, ``junction``, ``movement`` (``r1>j10>r2``) or ``lane_group``.
         over_time
             One row for each place and interval of time, instead of one for each place.
 

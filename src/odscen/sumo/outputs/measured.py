@@ -12,6 +12,7 @@ from odscen.results.by_place.facilities import (
     movement_facilities,
     passage_sums,
 )
+from odscen.results.by_place.group_figures import group_sums
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import traffic_figures
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.measures.summary import ActorOutcome
+    from odscen.results.records.light_programs import LightProgram
 
 
 def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures | None:
@@ -91,12 +93,26 @@ def _facilities(
         return None
     movements = movement_facilities(places, facts)
     passed = None if rows is None else vehicle_passages(rows, places, facts)
+    groups = group_of = None
+    if rows is not None and passed is not None:
+        programs, states = _lights(run)
+        groups, group_of = group_sums(
+            rows, passed, places, facts, clock, programs=programs, states=states
+        )
     by_junction, by_movement = (
         (None, None) if passed is None else passage_sums(passed, movements, clock)
     )
     heavy = None if rows is None else heavy_share(rows, facts, clock)
     density = highway_density(lanes, places, facts, heavy)
-    return FacilityData(movements, by_junction, by_movement, density)
+    return FacilityData(movements, by_junction, by_movement, density, groups, group_of)
+
+
+def _lights(run: Path) -> tuple[tuple[LightProgram, ...], pl.DataFrame | None]:
+    """Programs of lights and what they showed; none if the map has no lights."""
+    states, file = read_light_states(run), run / layout.LIGHTS_FILE
+    if states is None or not file.is_file():
+        return (), None
+    return programs_from_json(file.read_text(encoding="utf-8", errors="replace")), states
 
 
 def read_run_data(
@@ -134,11 +150,9 @@ def read_signal_use(run: Path, *, end: float, meso: bool = False) -> pl.DataFram
     """
     import polars as pl
 
-    states = read_light_states(run)
-    file = run / layout.LIGHTS_FILE
-    if states is None or not file.is_file():
+    programs, states = _lights(run)
+    if states is None:
         return None
-    programs = programs_from_json(file.read_text(encoding="utf-8", errors="replace"))
     files = trajectory_files(run)
     rows = pl.scan_parquet(files) if files and not meso else None
     places = run / layout.LANE_PLACES_FILE
