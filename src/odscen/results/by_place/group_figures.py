@@ -39,7 +39,7 @@ _TEXT = ("lane_group", "junction")
 
 
 def no_groups() -> pl.DataFrame:
-    """The table of :func:`group_figures` without rows."""
+    """The table of lane groups without rows."""
     import polars as pl
 
     names = (*_TEXT, "begin", "end", *GROUP_SUMS, *WORST, *GROUP_FIXED)

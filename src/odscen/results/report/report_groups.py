@@ -43,8 +43,8 @@ def group_section(groups: pl.DataFrame) -> Markup | None:
         class_="places",
     )
     explained = (
-        "a lane group is what the Highway Capacity Manual analyses as one: the lanes of an approach "
-        "that share a movement. v/c is demand over capacity, at traffic lights; above 1 the level "
+        "a lane group is what the Highway Capacity Manual analyses as one: the lanes of an "
+        "approach that share a movement. v/c is demand over capacity, at traffic lights; above 1 the level "
         "of service is F. A queue reaches from the stop line to the rear of its last vehicle. "
         "Over storage: the share of the time in which it is longer than the lanes of the group; "
         "spillback: in which it reaches the junction behind, or the edge of the map. The 95th "
@@ -56,10 +56,8 @@ def group_section(groups: pl.DataFrame) -> Markup | None:
 def _row(row: dict[str, object]) -> Markup:
     def cell(name: str, digits: int, *, factor: float = 1.0, unit: str = "") -> Markup:
         value = row[name]
-        known = isinstance(value, int | float)
-        return element(
-            "td", f"{number(value * factor, digits)}{unit}" if known else "-", class_="n"
-        )
+        words = f"{number(value * factor, digits)}{unit}" if isinstance(value, int | float) else "-"
+        return element("td", words, class_="n")
 
     return element(
         "tr",

@@ -92,7 +92,7 @@ def _facts(net: Path, routes: Path) -> NetFacts:
                 "limit": pl.Float64,
             },
             orient="row",
-        ),  # fmt: skip
+        ),
         follows=_follows(known),
         shapes={lane.get("id", ""): _points(lane.get("shape", "")) for _, lane in lanes},
         links=pl.DataFrame(
@@ -104,7 +104,7 @@ def _facts(net: Path, routes: Path) -> NetFacts:
                 "yields_to": pl.List(pl.String),
             },
             orient="row",
-        ),  # fmt: skip
+        ),
         drivers=_drivers(routes),
     )
 
