@@ -4138,6 +4138,12 @@ export interface components {
              */
             simulation: components["schemas"]["Simulation"];
             /**
+             * @default {
+             *       "warm_up": 0
+             *     }
+             */
+            study: components["schemas"]["Study"];
+            /**
              * Rules
              * @default []
              */
@@ -5077,6 +5083,22 @@ export interface components {
              * @default 1
              */
             times: number;
+        };
+        /**
+         * Study
+         * @description What of a run is analysed.
+         *
+         *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
+         *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
+         */
+        Study: {
+            /**
+             * Warm Up
+             * @default 0
+             */
+            warm_up: number;
+            /** Interval */
+            interval: number | null;
         };
         /**
          * SummaryCounts
@@ -7019,6 +7041,25 @@ export interface components {
             times?: number;
         };
         /**
+         * Study
+         * @description What of a run is analysed.
+         *
+         *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
+         *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
+         */
+        "Study-File": {
+            /**
+             * Warm Up
+             * @default 0
+             */
+            warm_up?: number;
+            /**
+             * Interval
+             * @default null
+             */
+            interval?: number | null;
+        };
+        /**
          * Touching
          * @description The body of an actor touches that of another one, or of any that a rule names.
          */
@@ -7363,6 +7404,13 @@ export interface components {
              *     }
              */
             simulation?: components["schemas"]["Simulation-File"];
+            /**
+             * @default {
+             *       "warm_up": 0,
+             *       "interval": null
+             *     }
+             */
+            study?: components["schemas"]["Study-File"];
             /**
              * Rules
              * @default []

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from odscen.base.durations import clock, parse_duration
-from odscen.base.errors import InputError
 from odscen.base.shown import visible
 from odscen.cli.console import (
+    IntervalOption,
     JsonOption,
     SeedsOption,
+    WarmUpOption,
     WorkspaceOption,
+    duration,
     log,
     print_json,
     print_table,
@@ -48,13 +50,6 @@ def _hint(folder: Path) -> Iterator[None]:
         raise
 
 
-def _duration(text: str) -> float:
-    try:
-        return parse_duration(text)
-    except InputError as error:
-        raise typer.BadParameter(str(error)) from error
-
-
 def run(
     scenarios: Annotated[
         list[Path],
@@ -78,7 +73,7 @@ def run(
     until: Annotated[
         float | None,
         typer.Option(
-            parser=_duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
+            parser=duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
         ),
     ] = None,
     step_length: Annotated[
@@ -136,6 +131,8 @@ def run(
             "for what this leaves out.",
         ),
     ] = False,
+    warm_up: WarmUpOption = None,
+    interval: IntervalOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -170,6 +167,8 @@ def run(
         slice_length=slice_length,
         time_limit=time_limit,
         expectations=tuple(parse_expectation(text) for text in expect or ()),
+        warm_up=warm_up,
+        interval=interval,
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)

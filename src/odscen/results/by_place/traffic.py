@@ -40,6 +40,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, get_args
 
+from odscen.results.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
 from odscen.results.by_place.facility_levels import (
     CONTROL,
     place_level,
@@ -58,7 +59,6 @@ from odscen.results.by_place.group_figures import (
 from odscen.results.by_place.traffic_sums import (
     INTERVAL,
     SUMS,
-    intervals,
     junction_sums,
     movement_sums,
     network_sums,
@@ -140,6 +140,7 @@ def traffic_figures(
     end: float,
     queues: pl.DataFrame | None = None,
     facilities: FacilityData | None = None,
+    times: AnalysisTimes = WHOLE_RUN,
 ) -> TrafficFigures:
     """Figures of one run.
 
@@ -154,21 +155,31 @@ def traffic_figures(
     facilities
         Kinds of facilities, control delay and density; without them levels of service are by
         the delay of the lane data, and no road is a highway.
+    times
+        What is analysed; queues and facilities are of the same intervals.
+
+    Raises
+    ------
+    InputError
+        If an interval of the lane data lies in two of those.
     """
-    clock = intervals(lanes, end)
-    lanes = summable(lanes)
+    clock = times.clock(lanes, end=end)
+    lanes = summable(on_clock(lanes, clock))
     segments = segment_sums(lanes, clock, places)
     junctions = _with_queues(junction_sums(lanes, clock, places), queues)
     movements = movement_sums(lanes, clock, places)
     found = facilities
     groups = None if found is None else found.groups
     of = None if found is None else found.group_of
+    tables = {
+        "network": network_sums(lanes, clock, places),
+        "segments": with_density(segments, found),
+        "junctions": with_control(junctions, found, "junction"),
+        "movements": with_groups(with_control(movements, found, "movement"), groups, of),
+        "lane_groups": no_groups() if groups is None else groups,
+    }
     return TrafficFigures(
-        network=_with_rates(network_sums(lanes, clock, places)),
-        segments=_with_rates(with_density(segments, found)),
-        junctions=_with_rates(with_control(junctions, found, "junction")),
-        movements=_with_rates(with_groups(with_control(movements, found, "movement"), groups, of)),
-        lane_groups=_with_rates(no_groups() if groups is None else groups),
+        **{name: _with_rates(times.analysed(table)) for name, table in tables.items()}
     )
 
 

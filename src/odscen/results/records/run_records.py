@@ -125,6 +125,11 @@ class Plan:
         Of the scenario, by begin.
     closed
         What they close, by begin: who would pass there must find another route.
+    warm_up, interval
+        What of the run is analysed, s, see
+        :class:`~odscen.results.by_place.analysis_times.AnalysisTimes`.
+    clock
+        Time of day at its start, s after midnight; 0 if the scenario has none.
     """
 
     scenario: str
@@ -138,6 +143,9 @@ class Plan:
     trajectories: bool = True
     measures: tuple[PlannedMeasure, ...] = ()
     closed: tuple[ClosedPeriod, ...] = ()
+    warm_up: float = 0.0
+    interval: float | None = None
+    clock: float = 0.0
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
@@ -156,6 +164,8 @@ class Plan:
         if self.measures:
             head["measures"] = [asdict(one) for one in self.measures]
             head["closed"] = [asdict(one) for one in self.closed]
+        said = {"warm_up": self.warm_up, "interval": self.interval, "clock": self.clock}
+        head |= {name: value for name, value in said.items() if value}
         return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
 
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.results.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
 from odscen.results.by_place.control_delay import vehicle_passages
 from odscen.results.by_place.facilities import (
     FacilityData,
@@ -16,7 +17,6 @@ from odscen.results.by_place.group_figures import group_sums
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.traffic import traffic_figures
-from odscen.results.by_place.traffic_sums import intervals
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.signal_use import signal_use, write_signal_use
 from odscen.results.measures.traffic_files import figures_json, write_tables
@@ -43,7 +43,9 @@ if TYPE_CHECKING:
     from odscen.results.records.light_programs import LightProgram
 
 
-def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures | None:
+def read_figures(
+    run: Path, *, end: float, meso: bool = False, times: AnalysisTimes = WHOLE_RUN
+) -> TrafficFigures | None:
     """Figures by place and time of a run that lasted ``end`` seconds.
 
     Parameters
@@ -51,6 +53,8 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     meso
         Whether it was mesoscopic: no vehicle is stopped in its trajectories, so that there are no
         queues.
+    times
+        What is analysed of it.
 
     Returns
     -------
@@ -59,7 +63,7 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     Raises
     ------
     InputError
-        If the places of lanes cannot be read.
+        If the places of lanes cannot be read, or times do not fit what was measured.
     """
     import polars as pl
 
@@ -70,13 +74,14 @@ def read_figures(run: Path, *, end: float, meso: bool = False) -> TrafficFigures
     places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
     files = trajectory_files(run)
     rows = pl.scan_parquet(files) if files and not meso else None
-    clock = intervals(lanes, end)
+    clock = times.clock(lanes, end=end)
     return traffic_figures(
         lanes,
         places,
         end=end,
         queues=None if rows is None else queue_lengths(rows, places, clock),
-        facilities=_facilities(run, lanes, places, rows, clock),
+        facilities=_facilities(run, on_clock(lanes, clock), places, rows, clock),
+        times=times,
     )
 
 
@@ -116,24 +121,37 @@ def _lights(run: Path) -> tuple[tuple[LightProgram, ...], pl.DataFrame | None]:
 
 
 def read_run_data(
-    run: Path, outcomes: Sequence[ActorOutcome], *, end: float, meso: bool = False
+    run: Path,
+    outcomes: Sequence[ActorOutcome],
+    *,
+    end: float,
+    meso: bool = False,
+    times: AnalysisTimes = WHOLE_RUN,
 ) -> RunData:
     """Read all that the figures of a run of ``end`` seconds are computed from.
+
+    With a warm-up, these are the road users who were to depart after it, and what lanes, conflicts
+    and stops had from then on; signals are of the whole run.
 
     Raises
     ------
     InputError
-        If the places of lanes cannot be read.
+        If the places of lanes cannot be read, or times do not fit what was measured.
     """
+    first = times.warm_up
     return RunData(
-        outcomes=outcomes,
-        traffic=read_figures(run, end=end, meso=meso),
-        trips=read_trips(run),
-        conflicts=read_conflicts(run),
+        outcomes=[one for one in outcomes if one.depart >= first],
+        traffic=read_figures(run, end=end, meso=meso, times=times),
+        trips=_since(read_trips(run), "depart", first),
+        conflicts=_since(read_conflicts(run), "begin", first),
         end=end,
         signals=read_signal_use(run, end=end, meso=meso),
         visits=read_visits(run),
     )
+
+
+def _since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFrame | None:
+    return table if table is None or not first else table.filter(table[column] >= first)
 
 
 def read_signal_use(run: Path, *, end: float, meso: bool = False) -> pl.DataFrame | None:

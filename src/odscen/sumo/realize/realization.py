@@ -137,6 +137,7 @@ def realize(
         scenario = scenario.model_copy(update={"seed": settings.seed})
     scenario = redrawn(scenario, settings.redraw)
     recording, (until, step_length) = settings.recorded, settings.times(scenario)
+    analysis = settings.analysis(scenario)
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
@@ -160,6 +161,9 @@ def realize(
         trajectories=recording.trajectories,
         measures=actions.measures,
         closed=actions.closed,
+        warm_up=analysis.warm_up,
+        interval=analysis.interval,
+        clock=scenario.demand.clock,
     )
     if settings.meso:
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
@@ -224,7 +228,8 @@ def _run_files(
         lateral_resolution=own.lateral_resolution,
         pedestrians=own.pedestrians,
     )
-    interval = interval_of(plan.until, plan.slice_length)
+    analysed = [one for one in (plan.warm_up, plan.interval) if one]
+    interval = interval_of(plan.until, plan.slice_length, analysed=analysed)
     files = {
         CONFIG_FILE: sumo_config(sumocfg),
         MEASURES_FILE: measures_xml(

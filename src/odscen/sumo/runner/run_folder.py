@@ -11,9 +11,10 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.version import __version__
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.by_place.traffic import TABLES
 from odscen.results.measures.expectations import evaluate
-from odscen.results.measures.figure import SummaryPart
+from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE
@@ -150,9 +151,11 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
         meso = bool(prepared.about.get("meso"))
-        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso)
+        times = AnalysisTimes(plan.warm_up, plan.interval)
+        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso, times=times)
         write_figures(folder, data)
-        summary["actors"] = figure_values(data, part=SummaryPart.ACTORS)
+        summary |= times.to_dict()
+        summary["actors"] = figure_values(RunData(outcomes), part=SummaryPart.ACTORS)
         summary["figures"] = rounded(figure_values(data))
         summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
