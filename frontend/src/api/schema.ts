@@ -1736,6 +1736,18 @@ export interface components {
             name?: string | null;
         };
         /**
+         * Cordon
+         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
+         */
+        Cordon: {
+            /** Id */
+            id: string;
+            /** Entries */
+            entries: string[];
+            /** Exits */
+            exits: string[];
+        };
+        /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
@@ -1958,6 +1970,16 @@ export interface components {
              * @default []
              */
             background: components["schemas"]["Background"][];
+        };
+        /**
+         * Detector
+         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
+         */
+        Detector: {
+            /** Id */
+            id: string;
+            /** Nodes */
+            nodes: string[];
         };
         /**
          * DetectorInfo
@@ -4139,7 +4161,10 @@ export interface components {
             simulation: components["schemas"]["Simulation"];
             /**
              * @default {
-             *       "warm_up": 0
+             *       "warm_up": 0,
+             *       "detectors": [],
+             *       "sections": [],
+             *       "cordons": []
              *     }
              */
             study: components["schemas"]["Study"];
@@ -5086,7 +5111,7 @@ export interface components {
         };
         /**
          * Study
-         * @description What of a run is analysed.
+         * @description What of a run is analysed, and where it is measured besides.
          *
          *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
          *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
@@ -5099,6 +5124,21 @@ export interface components {
             warm_up: number;
             /** Interval */
             interval: number | null;
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors: components["schemas"]["Detector"][];
+            /**
+             * Sections
+             * @default []
+             */
+            sections: components["schemas"]["TravelTimeSection"][];
+            /**
+             * Cordons
+             * @default []
+             */
+            cordons: components["schemas"]["Cordon"][];
         };
         /**
          * SummaryCounts
@@ -5224,6 +5264,18 @@ export interface components {
              * @default false
              */
             bay: boolean;
+        };
+        /**
+         * TravelTimeSection
+         * @description Measures the time from one line to another, of the vehicles that cross both.
+         */
+        TravelTimeSection: {
+            /** Id */
+            id: string;
+            /** Begin */
+            begin: string[];
+            /** End */
+            end: string[];
         };
         /**
          * Uniform
@@ -5951,6 +6003,18 @@ export interface components {
             value: number;
         };
         /**
+         * Cordon
+         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
+         */
+        "Cordon-File": {
+            /** Id */
+            id: string;
+            /** Entries */
+            entries: string[];
+            /** Exits */
+            exits: string[];
+        };
+        /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
@@ -6061,6 +6125,16 @@ export interface components {
              * @default []
              */
             background?: components["schemas"]["Background-File"][];
+        };
+        /**
+         * Detector
+         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
+         */
+        "Detector-File": {
+            /** Id */
+            id: string;
+            /** Nodes */
+            nodes: string[];
         };
         /**
          * DistanceBounded
@@ -7042,7 +7116,7 @@ export interface components {
         };
         /**
          * Study
-         * @description What of a run is analysed.
+         * @description What of a run is analysed, and where it is measured besides.
          *
          *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
          *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
@@ -7058,6 +7132,21 @@ export interface components {
              * @default null
              */
             interval?: number | null;
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors?: components["schemas"]["Detector-File"][];
+            /**
+             * Sections
+             * @default []
+             */
+            sections?: components["schemas"]["TravelTimeSection-File"][];
+            /**
+             * Cordons
+             * @default []
+             */
+            cordons?: components["schemas"]["Cordon-File"][];
         };
         /**
          * Touching
@@ -7172,6 +7261,18 @@ export interface components {
              * @default false
              */
             bay?: boolean;
+        };
+        /**
+         * TravelTimeSection
+         * @description Measures the time from one line to another, of the vehicles that cross both.
+         */
+        "TravelTimeSection-File": {
+            /** Id */
+            id: string;
+            /** Begin */
+            begin: string[];
+            /** End */
+            end: string[];
         };
         /**
          * Uniform
@@ -7407,7 +7508,10 @@ export interface components {
             /**
              * @default {
              *       "warm_up": 0,
-             *       "interval": null
+             *       "interval": null,
+             *       "detectors": [],
+             *       "sections": [],
+             *       "cordons": []
              *     }
              */
             study?: components["schemas"]["Study-File"];

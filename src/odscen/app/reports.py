@@ -18,7 +18,7 @@ from odscen.results.by_place.traffic import TABLES, over_run
 from odscen.results.measures.registry import figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.traffic_files import read_tables
+from odscen.results.measures.traffic_files import read_stations, read_tables
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Plan, events_from_json, rounded
@@ -91,7 +91,9 @@ def write_report(
     """
     with in_file(str(folder)), tables(str(folder)):
         figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
-        page = _page(folder, summary, loaded, corridor, figures)
+        own = folder / layout.FIGURES_FOLDER
+        stations = read_stations(own) if data is None else data.stations
+        page = _page(folder, summary, loaded, corridor, figures, stations)
     return write_text(out or folder / layout.REPORT_FILE, page)
 
 
@@ -101,6 +103,7 @@ def _page(
     loaded: LoadedMap | None,
     corridor: Corridor | None,
     figures: TrafficFigures | None,
+    stations: pl.DataFrame | None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
@@ -126,6 +129,7 @@ def _page(
         conflicts=read_conflicts(folder),
         lights=_lights(folder),
         visits=read_visits(folder),
+        stations=stations,
     )
 
 
@@ -250,6 +254,8 @@ def interval_rows(
     folder = _folder_of(workspace, run)
     summary, data = _analysed(folder, _completed(folder), warm_up=warm_up, interval=interval)
     found = {name: summary.get(name) for name in ("warm_up", "interval", "figures")}
+    if data.stations is not None:
+        found["stations"] = [rounded(row) for row in data.stations.to_dicts()]
     if data.traffic is None:
         return found
     rows = {name: getattr(data.traffic, name).to_dicts() for name in TABLES}

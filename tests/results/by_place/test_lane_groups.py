@@ -23,10 +23,11 @@ from odscen.results.records.light_programs import LightProgram, ShownGroup
 LEFT, THROUGH = "r1>j1>r3", "r1>j1>r2"
 # The road (100 m) widens into a bay for the left turn (l, 40 m) beside the lane through (t, 40 m).
 PLACES = LanePlaces.of(
-    lanes=[],
+    lanes=[("t", 40.0, True, "r1", 1.0, True), ("bike", 40.0, False, "r1", 1.0, True)],
     ways=[
         (lane, "j1", "in", None, None, None) for lane in ("road", "l", "t")
-    ] + [(":l", "j1", "in", "l", ":l", LEFT), (":t", "j1", "in", "t", ":t", THROUGH)],
+    ] + [(":l", "j1", "in", "l", ":l", LEFT), (":t", "j1", "in", "t", ":t", THROUGH),
+         (":b", "j1", "in", "bike", ":b", THROUGH)],
     segments=[],
     junctions=[("j1", "signal", 20.0)],
     movements=[(LEFT, "j1", "signal", 20.0), (THROUGH, "j1", "signal", 20.0)],
@@ -75,6 +76,7 @@ def test_a_bay_is_a_lane_group_with_its_own_length_as_storage() -> None:
     found = GROUPS.groups.sort("lane_group").rows(named=True)
     assert [one["lane_group"] for one in found] == [THROUGH, LEFT]
     assert [(one["storage"], one["room"]) for one in found] == [(40.0, 140.0)] * 2
+    assert [one["lanes"] for one in found] == [1, 1], "a cycle lane is none of them"
 
 
 def test_a_queue_is_measured_from_the_stop_line_to_its_last_rear_over_all_lanes() -> None:

@@ -29,10 +29,12 @@ from odscen.results.by_place.facilities import (
 from odscen.results.by_place.lane_groups import LaneGroups, lane_groups
 from odscen.results.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
 from odscen.results.by_place.queues import queue_lengths
+from odscen.results.by_place.station_figures import station_figures
 from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
 from odscen.results.by_place.traffic_sums import intervals
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
+from odscen.results.records.planned_stations import PlannedStation, StationKind
 from odscen.sumo.folder import layout
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.net_facts import read_net_facts
@@ -70,6 +72,7 @@ class Run:
     stretches: pl.DataFrame
     backs: pl.DataFrame
     groups: LaneGroups
+    stations: pl.DataFrame
 
     def loops(self, edge: str) -> int:
         """Vehicles that induction loops counted on all lanes of an edge."""
@@ -162,7 +165,23 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     groups = lane_groups(places, facts)
     backs = queue_backs(rows, groups, facts)
     assert backs is not None
-    return Run(folder, figures, steps, trips, stretches, backs, groups)
+    stations = station_figures(rows, planned(lanes), facts, WHOLE)
+    assert stations is not None
+    return Run(folder, figures, steps, trips, stretches, backs, groups, stations)
+
+
+def planned(lanes: dict[str, dict[str, float]]) -> list[PlannedStation]:
+    """Stations where SUMO's detectors are."""
+    last = {lane: length for own in lanes.values() for lane, length in own.items()}
+    found = [
+        PlannedStation(f"loop {lane}", "detector", ((lane, last[lane] - LOOP),))
+        for arm in ARMS
+        for lane in lanes[f"{arm}.1.f"]
+    ]
+    entries = tuple((lane, 5.0) for arm in ARMS for lane in lanes[f"{arm}.0.f"])
+    exits = tuple((lane, last[lane] - 15.0) for arm in ARMS for lane in lanes[f"{arm}.0.b"])
+    kinds: tuple[StationKind, ...] = ("section", "cordon")
+    return found + [PlannedStation(kind, kind, entries, exits) for kind in kinds]
 
 
 def facts_of(folder: Path) -> NetFacts:
@@ -317,7 +336,7 @@ def test_queues_in_metres_are_those_of_detectors_along_the_lanes(run):
     ).filter(col("jam") > 0.0)
     alone = run.groups.ways.join(run.groups.groups.filter(col("lanes") == 1), on="lane_group")
     pairs = alone.select("lane_group", "source").unique().rows()
-    assert len(pairs) == len(ARMS)
+    assert len(pairs) == 2 * len(ARMS)
     table = queue_sums(run.backs, run.groups, WHOLE, step=STEP)
     checked = 0
     for group, source in pairs:
@@ -333,9 +352,35 @@ def test_queues_in_metres_are_those_of_detectors_along_the_lanes(run):
         # While the first drive off, a jam begins behind them, and the queue is still at the line.
         assert (both["metres"] - both["jam"]).median() == pytest.approx(TO_LINE, abs=0.1)
         assert both.height > 0.8 * theirs.height, "a jam far from the line is no queue of ours"
-    assert checked >= 3
+    assert checked >= 6
 
 
 WHOLE = pl.DataFrame({"begin": [0.0], "end": [UNTIL]})
 TO_LINE = 1.0
 """Metres before the stop line at which SUMO's vehicles stop."""
+
+
+def test_detectors_of_a_study_count_what_induction_loops_do(run):
+    """SUMO's E1 detectors: vehicles, their mean speed, and occupancy in per cent."""
+    loops = {
+        one.get("id"): one
+        for one in etree.parse(run.folder / "loops.xml").getroot()
+        if int(one.get("nVehContrib")) > 0
+    }
+    ours = run.stations.filter((col("kind") == "detector") & (col("vehicles") > 0))
+    assert ours["vehicles"].sum() == NUMBER
+    for row in ours.iter_rows(named=True):
+        theirs = loops[row["station"].removeprefix("loop ")]
+        assert row["vehicles"] == int(theirs.get("nVehContrib"))
+        assert row["flow"] == pytest.approx(row["vehicles"] * 3600.0 / UNTIL)
+        assert row["speed"] == pytest.approx(float(theirs.get("speed")), rel=0.01)
+        assert 100.0 * row["occupancy"] == pytest.approx(float(theirs.get("occupancy")), rel=0.01)
+
+
+def test_sections_and_cordons_of_a_study_measure_what_entry_exit_detectors_do(run):
+    """SUMO's E3 detector with the same lines."""
+    (found,) = etree.parse(run.folder / "around.xml").getroot()
+    section, cordon = run.stations.filter(col("kind") != "detector").rows(named=True)
+    assert section["vehicles"] == cordon["vehicles"] == cordon["left"] == NUMBER
+    assert cordon["balance"] == 0
+    assert section["travel_time"] == pytest.approx(float(found.get("meanTravelTime")), rel=0.01)

@@ -51,7 +51,11 @@ def lane_groups(places: LanePlaces, facts: NetFacts) -> LaneGroups:
     import polars as pl
 
     text = pl.String
-    inner = places.ways.filter(pl.col("via") == pl.col("lane")).sort("junction", "via")
+    # Cycle lanes at the stop line carry none of the vehicles that capacity is of.
+    narrow = places.lanes.filter(~pl.col("motor"))["lane"].unique().implode()
+    inner = places.ways.filter(
+        (pl.col("via") == pl.col("lane")) & ~pl.col("source").is_in(narrow)
+    ).sort("junction", "via")
     named = _named(inner.select("junction", "source", "movement").rows())
     ways = inner.with_columns(
         lane_group=pl.Series([named[one] for one in inner["source"]], dtype=text)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 FIGURES_FORMAT = "odscen-figures"
 VERSION = 1
+STATIONS_TABLE = "stations.csv"
+"""Name of the table of stations in the folder of figures."""
 _DIGITS = 4
 
 
@@ -59,6 +61,33 @@ def read_tables(folder: Path) -> TrafficFigures | None:
                 raise InputError(msg, file=str(file))
             found[name] = with_missing(pl.read_csv(file, schema=_schema(names)))
     return TrafficFigures(**found)
+
+
+def write_stations(stations: pl.DataFrame, folder: Path) -> None:
+    """Write what the stations of the study counted, ``stations.csv``."""
+    folder.mkdir(exist_ok=True)
+    _short(stations).write_csv(folder / STATIONS_TABLE)
+
+
+def read_stations(folder: Path) -> pl.DataFrame | None:
+    """Inverse of :func:`write_stations`; ``None`` if the run has none.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read.
+    """
+    import polars as pl
+
+    file = folder / STATIONS_TABLE
+    if not file.is_file():
+        return None
+    with tables(str(file)):
+        names = pl.scan_csv(file).collect_schema().names()
+        text = {"station", "kind"}
+        return pl.read_csv(
+            file, schema={name: pl.String if name in text else pl.Float64 for name in names}
+        )
 
 
 def places_from_json(text: str, table: TableName) -> pl.DataFrame:

@@ -1,4 +1,4 @@
-"""Lane groups in the report: v/c, and queues in metres against the room that there is."""
+"""Lane groups and stations in the report: v/c, queues in metres, and what was counted."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.base.markup import Markup, element, number
 from odscen.results.by_place.traffic import over_run
 from odscen.results.report.page_templates import html_table, report_section
+from odscen.results.report.report_words import stretch
 
 if TYPE_CHECKING:
     import polars as pl
@@ -73,3 +74,47 @@ def _row(row: dict[str, object]) -> Markup:
         cell("overflow", 1, factor=100.0, unit=" %"),
         cell("spillback", 1, factor=100.0, unit=" %"),
     )
+
+
+MOST_STATIONS = 200
+"""Rows at most; the file has all."""
+_STATION_COLUMNS = (
+    ("vehicles", "Vehicles", 0, 1.0),
+    ("flow", "veh/h", 0, 1.0),
+    ("speed", "Speed, km/h", 1, 3.6),
+    ("occupancy", "Occupancy, %", 1, 100.0),
+    ("travel_time", "Travel time, s", 1, 1.0),
+    ("travel_time_p95", "95th percentile, s", 1, 1.0),
+    ("left", "Left", 0, 1.0),
+    ("balance", "Balance", 0, 1.0),
+)
+
+
+def station_section(stations: pl.DataFrame) -> Markup | None:
+    """Table of stations by interval, see :mod:`odscen.results.by_place.station_figures`."""
+    if stations.is_empty():
+        return None
+    rows = []
+    for row in stations.head(MOST_STATIONS).iter_rows(named=True):
+        cells = [
+            element("th", row["station"], scope="row"),
+            element("td", row["kind"]),
+            element("td", stretch(row["begin"], row["end"])),
+        ]
+        for name, _, digits, factor in _STATION_COLUMNS:
+            value = row[name]
+            words = "-" if value is None else number(value * factor, digits)
+            cells.append(element("td", words, class_="n"))
+        rows.append(element("tr", *cells))
+    heads = ["Station", "Kind", "Time", *(words for _, words, _, _ in _STATION_COLUMNS)]
+    explained = (
+        "detectors count who crosses them; sections the time of those that completed them in the "
+        "interval; cordons who came in, who left, and the balance of both since the start of the "
+        "run."
+    )
+    if stations.height > MOST_STATIONS:
+        explained += (
+            f" The first {MOST_STATIONS} of {stations.height:,} rows; figures/stations.csv has all."
+        )
+    table = html_table(heads, rows, label="Stations by interval", class_="places")
+    return report_section("Stations", table, explained=explained, ident="stations")

@@ -25,7 +25,7 @@ from odscen.results.report.report_corridor import corridor_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
-from odscen.results.report.report_groups import group_section
+from odscen.results.report.report_groups import group_section, station_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_measures import measure_section
@@ -72,6 +72,7 @@ def render_report(
     conflicts: pl.DataFrame | None = None,
     lights: LightsOfRun | None = None,
     visits: pl.DataFrame | None = None,
+    stations: pl.DataFrame | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -104,6 +105,8 @@ def render_report(
         Programs of traffic lights and what they showed, if the map has any.
     visits
         Visits of stops, if the scenario has lines of public transport.
+    stations
+        What the stations of the study counted, if it has any.
 
     Returns
     -------
@@ -127,6 +130,7 @@ def render_report(
             measure_section(plan.measures, int(counts["stranded"] or 0)),
             service_section(figures) if figures else None,
             group_section(figures.lane_groups) if figures else None,
+            station_section(stations) if stations is not None else None,
             _map_section(traces, plan, actors, events, drawing, incidents, every),
             incident_section(incidents),
             *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),

@@ -16,11 +16,13 @@ from odscen.results.by_place.facilities import (
 from odscen.results.by_place.group_figures import group_sums
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.by_place.queues import queue_lengths
+from odscen.results.by_place.station_figures import station_figures
 from odscen.results.by_place.traffic import traffic_figures
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.signal_use import signal_use, write_signal_use
-from odscen.results.measures.traffic_files import figures_json, write_tables
+from odscen.results.measures.traffic_files import figures_json, write_stations, write_tables
 from odscen.results.records.light_programs import programs_from_json
+from odscen.results.records.run_records import Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import (
     read_conflicts,
@@ -147,7 +149,25 @@ def read_run_data(
         end=end,
         signals=read_signal_use(run, end=end, meso=meso),
         visits=read_visits(run),
+        stations=None if meso else _stations(run, end=end, times=times),
     )
+
+
+def _stations(run: Path, *, end: float, times: AnalysisTimes) -> pl.DataFrame | None:
+    """What the stations of the study counted; ``None`` if there are none, or no trajectories."""
+    import polars as pl
+
+    file = run / layout.PLAN_FILE
+    files, lanes = trajectory_files(run), read_lanes(run)
+    if not (file.is_file() and files) or lanes is None:
+        return None
+    stations = Plan.from_json(file.read_text(encoding="utf-8", errors="replace")).stations
+    facts = read_net_facts(run) if stations else None
+    if facts is None:
+        return None
+    clock = times.clock(lanes, end=end)
+    found = station_figures(pl.scan_parquet(files), stations, facts, clock)
+    return None if found is None else times.analysed(found)
 
 
 def _since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFrame | None:
@@ -186,6 +206,8 @@ def write_figures(run: Path, data: RunData) -> None:
     """Write ``figures.json`` and the tables of a run; neither if nothing was measured on lanes."""
     if data.signals is not None:
         write_signal_use(data.signals, run / layout.FIGURES_FOLDER)
+    if data.stations is not None:
+        write_stations(data.stations, run / layout.FIGURES_FOLDER)
     if data.traffic is None:
         return
     text = figures_json(data, data.traffic)

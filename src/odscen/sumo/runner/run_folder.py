@@ -19,6 +19,7 @@ from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE
 from odscen.results.measures.summary import actors_from_json
+from odscen.results.measures.traffic_files import STATIONS_TABLE
 from odscen.results.measures.usability import failed_run, run_usability
 from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
@@ -227,6 +228,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "stop_visit_parts": layout.VISITS_FOLDER,
         "lights": layout.LIGHTS_FILE,
         "signal_figures": f"{layout.FIGURES_FOLDER}/{SIGNALS_TABLE}",
+        "station_figures": f"{layout.FIGURES_FOLDER}/{STATIONS_TABLE}",
         "lane_places": layout.LANE_PLACES_FILE,
         "figures": layout.FIGURES_FILE,
         **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},
