@@ -58,6 +58,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
     teleport_after: 300,
     pedestrians: "striping",
   },
+  study: { warm_up: 0, interval: null, detectors: [], sections: [], cordons: [] },
   rules: [],
   parameters: {},
   formulas: {},

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.reports import renew_report
+from odscen.app.reports import interval_rows, renew_report
 from odscen.app.runs import run
+from odscen.app.scenarios import read_scenario
 from odscen.base.checksums import SUMS_FILE
 from odscen.base.errors import DamagedError, InputError
 from odscen.regression.compare import read_runs
@@ -28,9 +29,9 @@ USED = {
     "plan.json": False,
     "actors.json": True,
     "events.json": False,
-    "signals.json": False,
+    "signals.json": True,
     "trajectories.parquet": True,
-    "signal_states.parquet": False,
+    "signal_states.parquet": True,
     "lane_places.json": True,
     "figures/segments.csv": True,
 }
@@ -82,3 +83,41 @@ def _refusals(workspace: Workspace, folder: Path, name: str) -> dict[str, list[I
                 found.append(error)
     file.write_bytes(whole)
     return said
+
+
+def test_a_warm_up_is_left_out_of_the_figures_and_can_be_chosen_anew_for_a_finished_run(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    settings = RunSettings(until=100.0, warm_up=25.0, interval=25.0)
+    done = run(workspace, sampled, settings=settings, out=tmp_path)
+    found = done.figures_by("network", over_time=True)
+    assert found.select("begin", "end").rows() == [(25.0, 50.0), (50.0, 75.0), (75.0, 100.0)]
+    assert (done.summary["warm_up"], done.summary["interval"]) == (25.0, 25.0)
+    plain = run(workspace, sampled, settings=RunSettings(until=100.0), out=tmp_path / "plain")
+    assert not {"warm_up", "interval"} & plain.summary.keys()
+    assert done.counts == plain.counts, "the same traffic"
+    assert (done.folder / "trajectories.parquet").read_bytes() == (
+        plain.folder / "trajectories.parquet"
+    ).read_bytes()
+    rows = interval_rows(workspace, done, warm_up=0.0, interval=50.0)
+    assert [(row["begin"], row["end"]) for row in rows["network"]] == [(0.0, 50.0), (50.0, 100.0)]
+    assert rows["figures"]["vehicle_km"] == pytest.approx(plain.figure("vehicle_km"))
+    assert rows["figures"]["vehicle_km"] > done.figure("vehicle_km")
+    report = renew_report(workspace, done, interval=50.0, warm_up=0.0, out=tmp_path / "new.html")
+    assert report.is_file()
+    with pytest.raises(InputError, match="must be multiples of 5 s"):
+        interval_rows(workspace, done, interval=7.0)
+
+
+def test_charts_of_a_run_with_a_clock_have_times_of_day(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    scenario = read_scenario(sampled)
+    demand = scenario.demand.model_copy(update={"clock": 23.99 * 3600.0})
+    late = scenario.model_copy(update={"demand": demand})
+    done = run(workspace, late, settings=RunSettings(until=120.0), out=tmp_path)
+    assert done.report is not None
+    text = done.report.read_text()
+    assert "time of day" in text
+    assert ">0:00<" in text, "after midnight the day begins anew"
+    assert "time since the start" not in text

@@ -1761,6 +1761,18 @@ export interface components {
             name?: string | null;
         };
         /**
+         * Cordon
+         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
+         */
+        Cordon: {
+            /** Id */
+            id: string;
+            /** Entries */
+            entries: string[];
+            /** Exits */
+            exits: string[];
+        };
+        /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
@@ -2000,6 +2012,16 @@ export interface components {
              * @default []
              */
             background: components["schemas"]["Background"][];
+        };
+        /**
+         * Detector
+         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
+         */
+        Detector: {
+            /** Id */
+            id: string;
+            /** Nodes */
+            nodes: string[];
         };
         /**
          * DetectorInfo
@@ -4243,6 +4265,15 @@ export interface components {
              */
             simulation: components["schemas"]["Simulation"];
             /**
+             * @default {
+             *       "warm_up": 0,
+             *       "detectors": [],
+             *       "sections": [],
+             *       "cordons": []
+             *     }
+             */
+            study: components["schemas"]["Study"];
+            /**
              * Rules
              * @default []
              */
@@ -5203,6 +5234,37 @@ export interface components {
             times: number;
         };
         /**
+         * Study
+         * @description What of a run is analysed, and where it is measured besides.
+         *
+         *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
+         *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
+         */
+        Study: {
+            /**
+             * Warm Up
+             * @default 0
+             */
+            warm_up: number;
+            /** Interval */
+            interval: number | null;
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors: components["schemas"]["Detector"][];
+            /**
+             * Sections
+             * @default []
+             */
+            sections: components["schemas"]["TravelTimeSection"][];
+            /**
+             * Cordons
+             * @default []
+             */
+            cordons: components["schemas"]["Cordon"][];
+        };
+        /**
          * SummaryCounts
          * @description Actors by outcome, see ``docs/runs.md``; a failed run has ``planned`` only.
          */
@@ -5326,6 +5388,18 @@ export interface components {
              * @default false
              */
             bay: boolean;
+        };
+        /**
+         * TravelTimeSection
+         * @description Measures the time from one line to another, of the vehicles that cross both.
+         */
+        TravelTimeSection: {
+            /** Id */
+            id: string;
+            /** Begin */
+            begin: string[];
+            /** End */
+            end: string[];
         };
         /**
          * Uniform
@@ -6110,6 +6184,18 @@ export interface components {
             value: number;
         };
         /**
+         * Cordon
+         * @description Counts the vehicles that enter and leave an area, at all the lines around it.
+         */
+        "Cordon-File": {
+            /** Id */
+            id: string;
+            /** Entries */
+            entries: string[];
+            /** Exits */
+            exits: string[];
+        };
+        /**
          * Counts
          * @description Vehicles that were counted: rows of place, begin and end of the slice, and number.
          *
@@ -6240,6 +6326,16 @@ export interface components {
              * @default []
              */
             background?: components["schemas"]["Background-File"][];
+        };
+        /**
+         * Detector
+         * @description Counts vehicles, their speed, and the share of the time in which one is on it.
+         */
+        "Detector-File": {
+            /** Id */
+            id: string;
+            /** Nodes */
+            nodes: string[];
         };
         /**
          * DistanceBounded
@@ -7313,6 +7409,40 @@ export interface components {
             times?: number;
         };
         /**
+         * Study
+         * @description What of a run is analysed, and where it is measured besides.
+         *
+         *     ``warm_up`` are seconds from the start that all figures leave out. ``interval`` is what figures
+         *     over time are given for, 900 s for those of an hour by quarters; ``None`` leaves it to odscen.
+         */
+        "Study-File": {
+            /**
+             * Warm Up
+             * @default 0
+             */
+            warm_up?: number;
+            /**
+             * Interval
+             * @default null
+             */
+            interval?: number | null;
+            /**
+             * Detectors
+             * @default []
+             */
+            detectors?: components["schemas"]["Detector-File"][];
+            /**
+             * Sections
+             * @default []
+             */
+            sections?: components["schemas"]["TravelTimeSection-File"][];
+            /**
+             * Cordons
+             * @default []
+             */
+            cordons?: components["schemas"]["Cordon-File"][];
+        };
+        /**
          * Touching
          * @description The body of an actor touches that of another one, or of any that a rule names.
          */
@@ -7425,6 +7555,18 @@ export interface components {
              * @default false
              */
             bay?: boolean;
+        };
+        /**
+         * TravelTimeSection
+         * @description Measures the time from one line to another, of the vehicles that cross both.
+         */
+        "TravelTimeSection-File": {
+            /** Id */
+            id: string;
+            /** Begin */
+            begin: string[];
+            /** End */
+            end: string[];
         };
         /**
          * Uniform
@@ -7693,6 +7835,16 @@ export interface components {
              *     }
              */
             simulation?: components["schemas"]["Simulation-File"];
+            /**
+             * @default {
+             *       "warm_up": 0,
+             *       "interval": null,
+             *       "detectors": [],
+             *       "sections": [],
+             *       "cordons": []
+             *     }
+             */
+            study?: components["schemas"]["Study-File"];
             /**
              * Rules
              * @default []

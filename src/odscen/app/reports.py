@@ -12,14 +12,16 @@ from odscen.app.maps import load_map
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.stored_files import tables
 from odscen.base.text_files import write_text
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.by_place.corridors import busiest_corridor, corridor_along, path_between
-from odscen.results.by_place.traffic import over_run
+from odscen.results.by_place.traffic import TABLES, over_run
+from odscen.results.measures.registry import figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.results.measures.summary import actors_from_json
-from odscen.results.measures.traffic_files import read_tables
+from odscen.results.measures.traffic_files import read_stations, read_tables
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.outcomes import RunStatus
-from odscen.results.records.run_records import Plan, events_from_json
+from odscen.results.records.run_records import Plan, events_from_json, rounded
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
@@ -34,6 +36,7 @@ from odscen.sumo.folder.recorded import (
 from odscen.sumo.folder.run_status import unfinished
 from odscen.sumo.folder.run_sums import damaged_in, seal_again, whole_summary
 from odscen.sumo.outputs.corridor_traces import corridor_traces
+from odscen.sumo.outputs.measured import read_run_data
 from odscen.sumo.runner.long_runs import run_lock
 
 if TYPE_CHECKING:
@@ -43,6 +46,8 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.results.by_place.corridors import Corridor
+    from odscen.results.by_place.traffic import TrafficFigures
+    from odscen.results.measures.figure import RunData
     from odscen.workspace.store import Workspace
 
 REPORT_ROWS = 2_000_000
@@ -56,6 +61,7 @@ def write_report(
     loaded: LoadedMap | None = None,
     corridor: Corridor | None = None,
     out: Path | None = None,
+    data: RunData | None = None,
 ) -> Path:
     """Write the report of a run from the files in its folder.
 
@@ -70,6 +76,8 @@ def write_report(
         To follow vehicles along; the busiest if not given.
     out
         File to write; ``report.html`` in the run folder if not given.
+    data
+        Figures of other times than those of the run, which ``summary`` then names.
 
     Returns
     -------
@@ -82,7 +90,10 @@ def write_report(
         If a file of the run is missing or torn.
     """
     with in_file(str(folder)), tables(str(folder)):
-        page = _page(folder, summary, loaded, corridor)
+        figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
+        own = folder / layout.FIGURES_FOLDER
+        stations = read_stations(own) if data is None else data.stations
+        page = _page(folder, summary, loaded, corridor, figures, stations)
     return write_text(out or folder / layout.REPORT_FILE, page)
 
 
@@ -91,12 +102,13 @@ def _page(
     summary: Mapping[str, Any],
     loaded: LoadedMap | None,
     corridor: Corridor | None,
+    figures: TrafficFigures | None,
+    stations: pl.DataFrame | None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
 
     recorded = read_trajectories(folder, most=REPORT_ROWS)
-    figures = read_tables(folder / layout.FIGURES_FOLDER)
     sumo_map = None if loaded is None else loaded.sumo
     if corridor is None and figures is not None and sumo_map is not None:
         corridor = busiest_corridor(over_run(figures.movements), sumo_map.graph)
@@ -117,6 +129,7 @@ def _page(
         conflicts=read_conflicts(folder),
         lights=_lights(folder),
         visits=read_visits(folder),
+        stations=stations,
     )
 
 
@@ -137,6 +150,8 @@ def renew_report(
     corridor: Sequence[str] = (),
     ends: tuple[str, str] | None = None,
     out: Path | None = None,
+    warm_up: float | None = None,
+    interval: float | None = None,
 ) -> Path:
     """Write the report of a finished run anew.
 
@@ -153,6 +168,8 @@ def renew_report(
         neither is given.
     out
         File to write; the run's ``report.html`` if not given.
+    warm_up, interval
+        What of the run is analysed, and over which intervals, s; as it was run if not given.
 
     Returns
     -------
@@ -164,17 +181,12 @@ def renew_report(
     NotFoundError
         If there is no such run.
     InputError
-        If it has not completed, its map is not in the workspace, or one cannot drive so.
+        If it has not completed, its map is not in the workspace, one cannot drive so, or times do
+        not fit what was measured.
     DamagedError
         If a file of the run is not as it was written; that of the report is reported only.
     """
-    if isinstance(run, Run):
-        run = run.folder
-    folder = run if run.is_dir() else workspace.runs / run
-    if not folder.is_dir():
-        names = [path.name for path in workspace.runs.glob("*")]
-        msg = "run"
-        raise NotFoundError(msg, str(run), names)
+    folder = _folder_of(workspace, run)
     own = out is None and not unfinished(folder)
     with run_lock(folder) if own else nullcontext():
         summary = _completed(folder)
@@ -182,10 +194,72 @@ def renew_report(
         graph = loaded.sumo.graph
         segments = path_between(graph, *ends) if ends is not None else corridor
         along = corridor_along(graph, segments) if segments else None
-        report = write_report(folder, summary, loaded=loaded, corridor=along, out=out)
+        data = None
+        if (warm_up, interval) != (None, None):
+            summary, data = _analysed(folder, summary, warm_up=warm_up, interval=interval)
+        report = write_report(folder, summary, loaded=loaded, corridor=along, out=out, data=data)
         if out is None:
             seal_again(folder, layout.REPORT_FILE)
     return report
+
+
+def _folder_of(workspace: Workspace, run: Run | Path) -> Path:
+    if isinstance(run, Run):
+        return run.folder
+    folder = run if run.is_dir() else workspace.runs / run
+    if not folder.is_dir():
+        names = [path.name for path in workspace.runs.glob("*")]
+        msg = "run"
+        raise NotFoundError(msg, str(run), names)
+    return folder
+
+
+def _analysed(
+    folder: Path, summary: Mapping[str, Any], *, warm_up: float | None, interval: float | None
+) -> tuple[dict[str, Any], RunData]:
+    """Summary with the figures of other times, and what they were computed from."""
+    own = AnalysisTimes.of_summary(summary)
+    times = AnalysisTimes(
+        own.warm_up if warm_up is None else warm_up, own.interval if interval is None else interval
+    )
+    text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8", errors="replace")
+    end, meso = float(summary["sim_seconds"]), bool(summary.get("meso"))
+    with in_file(str(folder)), tables(str(folder)):
+        data = read_run_data(folder, actors_from_json(text), end=end, meso=meso, times=times)
+    kept = {name: value for name, value in summary.items() if name not in ("warm_up", "interval")}
+    return {**kept, **times.to_dict(), "figures": rounded(figure_values(data))}, data
+
+
+def interval_rows(
+    workspace: Workspace,
+    run: Run | Path,
+    *,
+    warm_up: float | None = None,
+    interval: float | None = None,
+) -> dict[str, Any]:
+    """Figures of a finished run, and of each place and interval, as values that JSON can hold.
+
+    Parameters
+    ----------
+    warm_up, interval
+        As of :func:`renew_report`.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such run.
+    InputError
+        If it has not completed, or times do not fit what was measured.
+    """
+    folder = _folder_of(workspace, run)
+    summary, data = _analysed(folder, _completed(folder), warm_up=warm_up, interval=interval)
+    found = {name: summary.get(name) for name in ("warm_up", "interval", "figures")}
+    if data.stations is not None:
+        found["stations"] = [rounded(row) for row in data.stations.to_dicts()]
+    if data.traffic is None:
+        return found
+    rows = {name: getattr(data.traffic, name).to_dicts() for name in TABLES}
+    return {**found, **{name: [rounded(row) for row in table] for name, table in rows.items()}}
 
 
 def _completed(folder: Path) -> dict[str, Any]:

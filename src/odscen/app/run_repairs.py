@@ -18,6 +18,7 @@ from odscen.app.reports import write_report
 from odscen.base.checksums import SUMS_FILE, file_digest, read_sums, write_sums
 from odscen.base.errors import DamagedFile, InputError, OdscenError
 from odscen.base.folder_locks import is_locked
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import Plan
 from odscen.sumo.folder import layout
@@ -174,7 +175,8 @@ def _figures_again(run: Path) -> str:
     summary = read_summary(run)
     outcomes = actors_from_json((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))
     end, meso = float(summary["sim_seconds"]), bool(summary.get("meso"))
-    write_figures(run, read_run_data(run, outcomes, end=end, meso=meso))
+    times = AnalysisTimes.of_summary(summary)
+    write_figures(run, read_run_data(run, outcomes, end=end, meso=meso, times=times))
     return "computed the figures anew"
 
 

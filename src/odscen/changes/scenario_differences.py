@@ -29,6 +29,9 @@ _SINGULAR = {
     "lines": "line",
     "stops": "stop",
     "measures": "measure",
+    "detectors": "detector",
+    "sections": "travel-time section",
+    "cordons": "cordon",
 }
 
 

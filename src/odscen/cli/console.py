@@ -12,7 +12,8 @@ from typing import Annotated, Any
 
 import typer
 
-from odscen.base.errors import OdscenError
+from odscen.base.durations import parse_duration
+from odscen.base.errors import InputError, OdscenError
 from odscen.base.shown import visible
 
 WorkspaceOption = Annotated[
@@ -69,6 +70,41 @@ def _seeds(text: str) -> tuple[int, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def duration(text: str) -> float:
+    """Read a length of time from the command line.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is none.
+    """
+    try:
+        return parse_duration(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _from_the_start(text: str) -> float:
+    return 0.0 if text.strip() in ("0", "none") else duration(text)
+
+
+WarmUpOption = Annotated[
+    float | None,
+    typer.Option(
+        parser=_from_the_start,
+        metavar="TIME",
+        help="Leave this much from the start out of all figures: 10min. (default: the scenario's)",
+    ),
+]
+IntervalOption = Annotated[
+    float | None,
+    typer.Option(
+        parser=duration,
+        metavar="TIME",
+        help="Give figures over time for intervals of this length: 5min, 15min, 1h. "
+        "(default: the scenario's)",
+    ),
+]
 SeedsOption = Annotated[
     Any,
     typer.Option(

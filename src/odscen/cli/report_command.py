@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json
+from odscen.cli.console import (
+    IntervalOption,
+    JsonOption,
+    WarmUpOption,
+    WorkspaceOption,
+    log,
+    print_json,
+)
 
 
 def report(
@@ -29,11 +36,16 @@ def report(
         Path | None,
         typer.Option(help="File to write. (default: report.html of the run)", dir_okay=False),
     ] = None,
+    warm_up: WarmUpOption = None,
+    interval: IntervalOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the report of a finished run anew, with a corridor of your choice."""
-    from odscen.app.reports import renew_report
+    """Write the report of a finished run anew, with a corridor or intervals of your choice.
+
+    --json prints the figures too, and those of each interval and place.
+    """
+    from odscen.app.reports import interval_rows, renew_report
     from odscen.workspace.store import Workspace
 
     if (first is None) != (last is None):
@@ -43,14 +55,18 @@ def report(
         msg = "give either --corridor, or --from and --to"
         raise typer.BadParameter(msg)
     segments = [name.strip() for name in (corridor or "").split(",") if name.strip()]
+    store = Workspace.open(workspace)
     written = renew_report(
-        Workspace.open(workspace),
+        store,
         run,
         corridor=segments,
         ends=None if first is None or last is None else (first, last),
         out=out,
+        warm_up=warm_up,
+        interval=interval,
     )
     if as_json:
-        print_json({"report": str(written)})
+        rows = interval_rows(store, run, warm_up=warm_up, interval=interval)
+        print_json({"report": str(written), **rows})
     else:
         log(f"Report: {written}")

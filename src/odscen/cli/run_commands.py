@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from odscen.base.durations import clock, parse_duration
-from odscen.base.errors import InputError
 from odscen.base.shown import visible
 from odscen.cli.console import (
+    IntervalOption,
     JsonOption,
     SeedsOption,
+    WarmUpOption,
     WorkspaceOption,
+    duration,
     log,
     print_json,
     print_table,
@@ -29,9 +31,10 @@ if TYPE_CHECKING:
 
     from odscen.scenario.sampling.redrawn_traffic import Redraw
     from odscen.sumo.folder.finished_run import Run
-    from odscen.sumo.realize.run_settings import SliceLength
+    from odscen.sumo.realize.run_settings import RunSettings, SliceLength
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress
+    from odscen.workspace.store import Workspace
 
 
 @contextmanager
@@ -46,13 +49,6 @@ def _hint(folder: Path) -> Iterator[None]:
         for name in sorted(set(interrupted(folder)) - before):
             log(f"{name} is interrupted; to resume it: odscen resume {folder / name}")
         raise
-
-
-def _duration(text: str) -> float:
-    try:
-        return parse_duration(text)
-    except InputError as error:
-        raise typer.BadParameter(str(error)) from error
 
 
 def run(
@@ -78,7 +74,7 @@ def run(
     until: Annotated[
         float | None,
         typer.Option(
-            parser=_duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
+            parser=duration, metavar="TIME", help="Simulated time, at most: 600, 90min, 24h."
         ),
     ] = None,
     step_length: Annotated[
@@ -136,6 +132,22 @@ def run(
             "for what this leaves out.",
         ),
     ] = False,
+    warm_up: WarmUpOption = None,
+    interval: IntervalOption = None,
+    until_confident: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE",
+            help='Take more seeds until the 95 % interval of a figure is so narrow: "5 %" of its '
+            "mean to either side. Exit code 1 if --most-seeds are too few.",
+        ),
+    ] = None,
+    confident_of: Annotated[
+        str, typer.Option(metavar="FIGURE", help="The figure of --until-confident.")
+    ] = "mean_delay",
+    most_seeds: Annotated[
+        int, typer.Option(min=2, help="Seeds of --until-confident, at most.")
+    ] = 50,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -170,9 +182,19 @@ def run(
         slice_length=slice_length,
         time_limit=time_limit,
         expectations=tuple(parse_expectation(text) for text in expect or ()),
+        warm_up=warm_up,
+        interval=interval,
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)
+    if until_confident is not None:
+        if seed is not None:
+            raise typer.BadParameter("it takes several seeds, not --seed", param_hint="--seed")
+        _run_until_confident(
+            store, paths, settings=settings, seeds=seeds, out=out, processes=jobs,
+            share=until_confident, figure=confident_of, most=most_seeds, as_json=as_json,
+        )  # fmt: skip
+        return
     with _hint(out or store.runs), progress("running") as step:
         results = runs.run_many(
             store,
@@ -188,6 +210,48 @@ def run(
     if seeds is not None:
         _warn_of_seeds(results, len(seeds))
     raise typer.Exit(max(result.exit_code for result in results))
+
+
+def _run_until_confident(
+    store: Workspace,
+    paths: Sequence[Path],
+    *,
+    settings: RunSettings,
+    seeds: Sequence[int] | None,
+    out: Path | None,
+    processes: int,
+    share: str,
+    figure: str,
+    most: int,
+    as_json: bool,
+) -> None:
+    """Run each scenario with as many seeds as its interval needs, and print all of it."""
+    from odscen.app.confident_runs import FEWEST, parse_share, run_until_confident
+
+    wanted = parse_share(share)
+    results: list[Run] = []
+    intervals = []
+    for path in paths:
+        runs, found = run_until_confident(
+            store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
+            seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds, processes=processes,
+            tell=log,
+        )  # fmt: skip
+        results += runs
+        intervals.append(found)
+    if as_json:
+        print_json(
+            {
+                "runs": [run.to_dict() for run in results],
+                "confidence": [found.to_dict() for found in intervals],
+            }
+        )
+    else:
+        show_results(results, as_json=False, several=True)
+        for found in intervals:
+            typer.echo(visible(f"{found.scenario}: {found.words}"))
+    code = max(result.exit_code for result in results)
+    raise typer.Exit(max(code, 0 if all(found.enough for found in intervals) else 1))
 
 
 def _warn_of_seeds(results: Sequence[Run], seeds: int) -> None:

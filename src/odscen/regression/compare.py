@@ -7,9 +7,10 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from odscen.app.confident_runs import FIGURE, confidence_of
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError, in_file
-from odscen.regression.measure import measure
+from odscen.regression.measure import FigureKey, measure
 from odscen.results.measures.comparison import CONFIDENCE, compare_figure
 from odscen.results.measures.registry import SEGMENT_FIGURES
 from odscen.results.measures.traffic_files import read_tables
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from odscen.regression.measure import FigureKey, Measured
+    from odscen.regression.measure import Measured
     from odscen.results.measures.comparison import Difference, Finding
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.workspace.store import Workspace
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 FORMAT = "odscen-comparison"
 VERSION = 1
 
+WANTED = 0.05
+"""Half the width of an interval, as a share of the mean, that a comparison asks of its seeds."""
 MOST = 8
 """Places that are named, at most."""
 
@@ -312,6 +315,11 @@ def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
         notes.append("the seeds differ, so runs are not paired; pairs show smaller differences")
     elif len(a.runs) == 1:
         notes.append("one run each: intervals need at least two seeds a side")
+    for name, side in (("A", a), ("B", b)):
+        values = [figures.get(FigureKey("run", "", FIGURE)) for figures in side.runs.values()]
+        found = confidence_of(values, share=WANTED)
+        if found.seeds > 1 and found.mean and not found.enough:
+            notes.append(f"{name}: {found.words}")
     if not (a.places and b.places):
         notes.append("a run has not measured traffic on lanes, so places are left out")
     return tuple(notes)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import in_file
 from odscen.base.stored_files import tables
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.registry import ACTOR_FIGURES, COUNTS, SEGMENT_FIGURES, figure_of
 from odscen.results.measures.summary import actors_from_json
@@ -100,7 +101,8 @@ def measure(folder: Path, summary: Mapping[str, Any]) -> Measured:
                     FigureKey("actor", actor.id, figure.name): figure.compute(actor)
                     for figure in ACTOR_FIGURES
                 }
-        figures = read_figures(folder, end=summary["sim_seconds"])
+        times = AnalysisTimes.of_summary(summary)
+        figures = read_figures(folder, end=summary["sim_seconds"], times=times)
         for key, value in place_figures(figures) if figures is not None else ():
             if value is not None:
                 found[key] = round(float(value), DIGITS)

@@ -159,3 +159,29 @@ def test_levels_of_a_freeway_are_those_of_exhibit_12_15() -> None:
     miles = [11.0, 11.1, 18.1, 26.1, 35.1, 45.1]
     found = pl.DataFrame({"density": [one / 1.609344 for one in miles]})
     assert found.select(highway_level(col("density"))).to_series().to_list() == [*"ABCDEF"]
+
+
+def _level(density: float) -> str:
+    """Level of a freeway by passenger cars per mile and lane."""
+    found = pl.DataFrame({"density": [density / 1.609344]})
+    return str(found.select(highway_level(col("density"))).item())
+
+
+def test_the_freeway_of_hcms_first_example_has_its_density_and_level() -> None:
+    """HCM 2000, chapter 23, example problem 1: 2,000 veh/h, PHF 0.92, 5 % trucks, rolling.
+
+    Flow rate 1,169 pc/h/ln, speed 68 mi/h, density 17 pc/mi/ln, level B. Bounds are the same today.
+    """
+    heavy = 1.0 / (1.0 + 0.05 * (2.5 - 1.0))
+    flow = 2000.0 / (0.92 * 2 * heavy)
+    assert flow == pytest.approx(1169.0, abs=1.0)
+    assert flow / 68.2 == pytest.approx(17.0, abs=0.5)
+    assert _level(flow / 68.2) == "B"
+
+
+def test_hcms_service_flow_rates_at_their_speeds_are_the_bounds_of_our_levels() -> None:
+    """HCM 2000, Exhibit 23-2, 70 mi/h: greatest flow rates (pc/h/ln) of A to E and their speeds."""
+    rates = ((770, 70.0), (1260, 70.0), (1735, 66.7), (2115, 60.4), (2400, 53.3))
+    for (flow, speed), level, following in zip(rates, "ABCDE", "BCDEF", strict=True):
+        assert _level(0.99 * flow / speed) == level
+        assert _level(1.01 * flow / speed) == following

@@ -173,7 +173,7 @@ def test_a_run_without_traffic_has_a_network_and_no_places():
     nobody = pl.DataFrame([lane("up")]).clear()
     figures = traffic_figures(nobody, PLACES, end=60.0)
     assert figures.network.height == 1
-    assert [getattr(figures, name).height for name in TABLES[1:]] == [0, 0, 0]
+    assert [getattr(figures, name).height for name in TABLES[1:]] == [0, 0, 0, 0]
     data = json.loads(figures_json(RunData(traffic=figures), figures))
     assert data["run"]["vehicle_km"] == data["run"]["throughput"] == 0.0
     assert data["run"]["co2_per_km"] is data["run"]["travel_time_index"] is None
@@ -229,7 +229,7 @@ def test_files_say_the_same_and_their_units(tmp_path):
     for name in TABLES:
         table = pl.read_csv(tmp_path / "figures" / f"{name}.csv")
         assert table.height == getattr(figures, name).height
-        words = {"segment", "junction", "movement", "control", "facility", "level"}
+        words = {"segment", "junction", "movement", "control", "facility", "level", "lane_group"}
         assert set(table.columns) - words <= set(COLUMN_UNITS)
     data = json.loads(figures_json(RunData(traffic=figures), figures))
     assert data["segments"][0]["co2"] == 5.0

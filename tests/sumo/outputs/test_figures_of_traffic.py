@@ -26,11 +26,15 @@ from odscen.results.by_place.facilities import (
     movement_facilities,
     passage_sums,
 )
+from odscen.results.by_place.lane_groups import LaneGroups, lane_groups
+from odscen.results.by_place.queue_metres import GAP, QUEUED, queue_backs, queue_sums
 from odscen.results.by_place.queues import queue_lengths
+from odscen.results.by_place.station_figures import station_figures
 from odscen.results.by_place.traffic import TrafficFigures, over_run, traffic_figures
 from odscen.results.by_place.traffic_sums import intervals
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.registry import figure_values
+from odscen.results.records.planned_stations import PlannedStation, StationKind
 from odscen.sumo.folder import layout
 from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.net_facts import read_net_facts
@@ -66,6 +70,9 @@ class Run:
     steps: pl.DataFrame
     trips: pl.DataFrame
     stretches: pl.DataFrame
+    backs: pl.DataFrame
+    groups: LaneGroups
+    stations: pl.DataFrame
 
     def loops(self, edge: str) -> int:
         """Vehicles that induction loops counted on all lanes of an edge."""
@@ -116,13 +123,20 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     ]
     around = f'<entryExitDetector id="around" period="{UNTIL:g}" file="around.xml">'
     loops += [around, *ends, "</entryExitDetector>"]
+    loops += [
+        f'<laneAreaDetector id="{last}" lanes="{first} {last}" pos="0" endPos="-0.01"'
+        f' friendlyPos="true" period="{STEP:g}" file="queues.xml" speedThreshold="{QUEUED}"'
+        f' timeThreshold="0" jamThreshold="{GAP:g}"/>'
+        for arm in ARMS
+        for first, last in zip(lanes[f"{arm}.0.f"], lanes[f"{arm}.1.f"], strict=True)
+    ]
     (folder / "loops.add.xml").write_text("\n".join(["<additional>", *loops, "</additional>"]))
     subprocess.run(
         [
             BIN / "sumo", "-n", f"{MAP}.net.xml", "-r", "routes.rou.xml",
             "-a", "measures.add.xml,loops.add.xml", "--tripinfo-output", "trips.xml",
             "--emission-output", "steps.csv", "--fcd-output", "fcd.parquet",
-            "--fcd-output.attributes", "id,speed,lane", "--end", str(UNTIL), "--seed", "3",
+            "--fcd-output.attributes", "id,x,y,speed,lane", "--end", str(UNTIL), "--seed", "3",
             "--step-length", str(STEP), "--precision", "6", "--no-step-log", "--no-warnings",
         ],
         cwd=folder,
@@ -148,7 +162,26 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         kinds, *passage_sums(passed, kinds, clock), highway_density(table, places, facts, None)
     )
     figures = traffic_figures(table, places, end=UNTIL, queues=queues, facilities=facilities)
-    return Run(folder, figures, steps, trips, stretches)
+    groups = lane_groups(places, facts)
+    backs = queue_backs(rows, groups, facts)
+    assert backs is not None
+    stations = station_figures(rows, planned(lanes), facts, WHOLE)
+    assert stations is not None
+    return Run(folder, figures, steps, trips, stretches, backs, groups, stations)
+
+
+def planned(lanes: dict[str, dict[str, float]]) -> list[PlannedStation]:
+    """Stations where SUMO's detectors are."""
+    last = {lane: length for own in lanes.values() for lane, length in own.items()}
+    found = [
+        PlannedStation(f"loop {lane}", "detector", ((lane, last[lane] - LOOP),))
+        for arm in ARMS
+        for lane in lanes[f"{arm}.1.f"]
+    ]
+    entries = tuple((lane, 5.0) for arm in ARMS for lane in lanes[f"{arm}.0.f"])
+    exits = tuple((lane, last[lane] - 15.0) for arm in ARMS for lane in lanes[f"{arm}.0.b"])
+    kinds: tuple[StationKind, ...] = ("section", "cordon")
+    return found + [PlannedStation(kind, kind, entries, exits) for kind in kinds]
 
 
 def facts_of(folder: Path) -> NetFacts:
@@ -288,3 +321,66 @@ def test_figures_of_the_run_are_ratios_of_its_trips(run):
     assert found["buffer_index"] == pytest.approx(share)
     assert found["throughput"] == pytest.approx(NUMBER / UNTIL * 3600.0)
     assert found["co2_per_km"] * found["vehicle_km"] == pytest.approx(1000.0 * found["co2_total"])
+
+
+def test_queues_in_metres_are_those_of_detectors_along_the_lanes(run):
+    """SUMO's E2 detectors: jams from the first front to the last rear; ours from the stop line."""
+    root = etree.parse(run.folder / "queues.xml").getroot()
+    jams = pl.DataFrame(
+        [
+            (one.get("id"), float(one.get("begin")), float(one.get("maxJamLengthInMeters")))
+            for one in root
+        ],
+        schema=("source", "time", "jam"),
+        orient="row",
+    ).filter(col("jam") > 0.0)
+    alone = run.groups.ways.join(run.groups.groups.filter(col("lanes") == 1), on="lane_group")
+    pairs = alone.select("lane_group", "source").unique().rows()
+    assert len(pairs) == 2 * len(ARMS)
+    table = queue_sums(run.backs, run.groups, WHOLE, step=STEP)
+    checked = 0
+    for group, source in pairs:
+        ours = run.backs.filter(col("lane_group") == group)
+        theirs = jams.filter(col("source") == source)
+        longest = theirs["jam"].max()
+        if longest < 10.0:  # one vehicle that has not come to its stop
+            continue
+        checked += 1
+        row = table.row(by_predicate=col("lane_group") == group, named=True)
+        assert row["queue_metres_max"] - TO_LINE == pytest.approx(longest, rel=0.01)
+        both = ours.join(theirs, on="time")
+        # While the first drive off, a jam begins behind them, and the queue is still at the line.
+        assert (both["metres"] - both["jam"]).median() == pytest.approx(TO_LINE, abs=0.1)
+        assert both.height > 0.8 * theirs.height, "a jam far from the line is no queue of ours"
+    assert checked >= 6
+
+
+WHOLE = pl.DataFrame({"begin": [0.0], "end": [UNTIL]})
+TO_LINE = 1.0
+"""Metres before the stop line at which SUMO's vehicles stop."""
+
+
+def test_detectors_of_a_study_count_what_induction_loops_do(run):
+    """SUMO's E1 detectors: vehicles, their mean speed, and occupancy in per cent."""
+    loops = {
+        one.get("id"): one
+        for one in etree.parse(run.folder / "loops.xml").getroot()
+        if int(one.get("nVehContrib")) > 0
+    }
+    ours = run.stations.filter((col("kind") == "detector") & (col("vehicles") > 0))
+    assert ours["vehicles"].sum() == NUMBER
+    for row in ours.iter_rows(named=True):
+        theirs = loops[row["station"].removeprefix("loop ")]
+        assert row["vehicles"] == int(theirs.get("nVehContrib"))
+        assert row["flow"] == pytest.approx(row["vehicles"] * 3600.0 / UNTIL)
+        assert row["speed"] == pytest.approx(float(theirs.get("speed")), rel=0.01)
+        assert 100.0 * row["occupancy"] == pytest.approx(float(theirs.get("occupancy")), rel=0.01)
+
+
+def test_sections_and_cordons_of_a_study_measure_what_entry_exit_detectors_do(run):
+    """SUMO's E3 detector with the same lines."""
+    (found,) = etree.parse(run.folder / "around.xml").getroot()
+    section, cordon = run.stations.filter(col("kind") != "detector").rows(named=True)
+    assert section["vehicles"] == cordon["vehicles"] == cordon["left"] == NUMBER
+    assert cordon["balance"] == 0
+    assert section["travel_time"] == pytest.approx(float(found.get("meanTravelTime")), rel=0.01)

@@ -105,8 +105,8 @@ def lost_time(
     -------
     One row per vehicle and stretch in order of time: ``id``, ``number`` of the stretch,
     ``junction`` and ``movement`` (null on roads), ``ahead`` (junction ahead, on roads),
-    ``approach``, ``begin`` and ``last`` (s), and seconds lost: ``behind``, ``on_the_way``,
-    ``before``, and ``inside``.
+    ``approach``, ``lane`` (of junctions the first inside, of roads the last), ``begin`` and
+    ``last`` (s), and seconds lost: ``behind``, ``on_the_way``, ``before``, and ``inside``.
     ``None`` if lane or speed were not recorded.
     """
     import polars as pl
@@ -131,10 +131,11 @@ def lost_time(
     found = _stretch_sums(rows, period).collect()
     return (
         found.join(known.select("vehicle", "id"), on="vehicle")
-        .join(lanes.select("junction", "movement", first="place"), on="first")
-        .join(lanes.select("ahead", "approach", final="place"), on="final")
+        .join(lanes.select("junction", "movement", first="place", via="lane"), on="first")
+        .join(lanes.select("ahead", "approach", final="place", exit="lane"), on="final")
+        .with_columns(lane=pl.when(pl.col("junction").is_null()).then("exit").otherwise("via"))
         .sort("number")
-        .select("id", "number", "junction", "movement", "ahead", "approach", *_MEASURED)
+        .select("id", "number", "junction", "movement", "ahead", "approach", "lane", *_MEASURED)
     )
 
 
@@ -218,8 +219,9 @@ def passages(stretches: pl.DataFrame, *, end: float, period: float) -> pl.DataFr
 
     Returns
     -------
-    ``id``, ``junction``, ``movement`` (null for those that had not entered), ``approach``, ``time``
-    (s, when it entered, or the end) and ``control_delay`` (s).
+    ``id``, ``junction``, ``movement`` (null for those that had not entered), ``approach``,
+    ``lane`` (the first inside; of those the last before), ``time`` (s, when it entered, or the
+    end), ``before`` (s lost until then) and ``control_delay`` (s).
     """
     import polars as pl
 
@@ -229,8 +231,9 @@ def passages(stretches: pl.DataFrame, *, end: float, period: float) -> pl.DataFr
         following=col("behind").shift(-1).over("id").fill_null(0.0),
     )
     entered = around.filter(col("junction").is_not_null()).select(
-        "id", "junction", "movement", "approach",
+        "id", "junction", "movement", "approach", "lane",
         time="begin",
+        before="previous",
         control_delay=col("previous") + col("inside") + col("following"),
     )  # fmt: skip
     final = (col("number") == col("number").max().over("id")) & (col("last") > end - 2 * period)
@@ -243,6 +246,8 @@ def passages(stretches: pl.DataFrame, *, end: float, period: float) -> pl.DataFr
         "id",
         pl.lit(None, pl.String).alias("movement"),
         "approach",
+        "lane",
+        "before",
         junction="ahead",
         time="last",
         control_delay="before",

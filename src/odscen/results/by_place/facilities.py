@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import polars as pl
 
+    from odscen.base.arrays import FloatArray
     from odscen.results.by_place.lane_places import LanePlaces
 
 STOP, ALL_WAY = "s", "w"
@@ -48,12 +51,24 @@ class FacilityData:
         Control delay, from :func:`passage_sums`; ``None`` without trajectories.
     density
         From :func:`highway_density`.
+    groups, group_of
+        From :func:`odscen.results.by_place.group_figures.group_sums`; ``None`` without
+        trajectories.
     """
 
     movements: pl.DataFrame
     by_junction: pl.DataFrame | None
     by_movement: pl.DataFrame | None
     density: pl.DataFrame
+    groups: pl.DataFrame | None = None
+    group_of: pl.DataFrame | None = None
+
+
+def no_links() -> pl.DataFrame:
+    """Table of :attr:`NetFacts.follows` without rows."""
+    import polars as pl
+
+    return pl.DataFrame(schema={"lane": pl.String, "following": pl.String})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,19 +78,26 @@ class NetFacts:
     Attributes
     ----------
     limits
-        ``lane``, its ``edge``, and its speed ``limit``, m/s.
+        ``lane``, its ``edge``, its ``length`` (m), and its speed ``limit``, m/s.
     links
         One row for each connection through a junction: ``via`` (its first lane inside), its
-        ``state`` (SUMO's letter), whether it ``gives_way`` to other vehicles, and whether it leads
-        ``onto_ring`` or comes ``from_ring``, a roundabout.
+        ``state`` (SUMO's letter), whether it ``gives_way`` to other vehicles, whether it leads
+        ``onto_ring`` or comes ``from_ring``, a roundabout, and ``yields_to``: the ``via`` of those
+        that it gives way to.
     drivers
-        ``id``, ``factor`` on limits, ``max_speed`` (m/s), whether a vehicle is ``heavy``, and
-        whether it ``serves`` stops.
+        ``id``, ``factor`` on limits, ``max_speed`` (m/s), ``length`` (m), whether a vehicle is
+        ``heavy``, and whether it ``serves`` stops.
+    follows
+        ``lane`` and ``following``: lanes, those in junctions included, by which one drives on.
+    shapes
+        Points of the centre line of each lane, ``(K, 2)``, metres, SUMO's frame.
     """
 
     limits: pl.DataFrame
     links: pl.DataFrame
     drivers: pl.DataFrame
+    follows: pl.DataFrame = field(default_factory=no_links)
+    shapes: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def movement_facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:

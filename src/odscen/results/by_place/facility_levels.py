@@ -5,6 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from odscen.results.by_place.facilities import Facility, junction_facilities
+from odscen.results.by_place.group_figures import (
+    GROUP_RATES,
+    GROUP_SUMS,
+    GROUP_WORST,
+    over_capacity,
+)
 from odscen.results.by_place.level_of_service import (
     FEWEST,
     highway_level,
@@ -29,11 +35,14 @@ def with_missing(table: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     types = {"facility": pl.String, "passages": pl.Int64}
+    types |= {"lane_group": pl.String, "demand": pl.Int64}
     names: tuple[str, ...] = ()
     if "segment" in table.columns:
         names = ("facility", "lane_density", "car_seconds", "lane_metres")
     elif "junction" in table.columns:
         names = ("facility", "control_delay", *CONTROL)
+        if "movement" in table.columns:
+            names += ("lane_group", *GROUP_SUMS, *GROUP_WORST, *GROUP_RATES)
     return table.with_columns(
         pl.lit(None, types.get(name, pl.Float64)).alias(name)
         for name in names
@@ -95,8 +104,12 @@ def with_density(sums: pl.DataFrame, found: FacilityData | None) -> pl.DataFrame
     )
 
 
-def place_level() -> pl.Expr:
-    """Level of a junction or movement; F where vehicles are stopped and none gets in."""
+def place_level(*, capacity: bool = False) -> pl.Expr:
+    """Level of a junction or movement; F where vehicles are stopped and none gets in.
+
+    With ``capacity`` also where v/c is above 1: of movements, for HCM grades whole junctions by
+    delay alone.
+    """
     import polars as pl
 
     col = pl.col
@@ -106,7 +119,8 @@ def place_level() -> pl.Expr:
     ungraded = col("facility").is_in(_UNGRADED).fill_null(value=False)
     enough = (number >= FEWEST) & ~ungraded
     level = pl.when(enough).then(junction_level(delay, col("control")))
-    return pl.when(blocked).then(pl.lit("F")).otherwise(level)
+    failed = blocked | over_capacity() if capacity else blocked
+    return pl.when(failed).then(pl.lit("F")).otherwise(level)
 
 
 def segment_level(free_seconds: pl.Expr) -> pl.Expr:

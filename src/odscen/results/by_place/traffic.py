@@ -37,9 +37,10 @@ service in :mod:`odscen.results.by_place.level_of_service`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, get_args
 
+from odscen.results.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
 from odscen.results.by_place.facility_levels import (
     CONTROL,
     place_level,
@@ -47,10 +48,17 @@ from odscen.results.by_place.facility_levels import (
     with_control,
     with_density,
 )
+from odscen.results.by_place.group_figures import (
+    GROUP_FIXED,
+    GROUP_SUMS,
+    GROUP_WORST,
+    group_rates,
+    no_groups,
+    with_groups,
+)
 from odscen.results.by_place.traffic_sums import (
     INTERVAL,
     SUMS,
-    intervals,
     junction_sums,
     movement_sums,
     network_sums,
@@ -64,21 +72,24 @@ if TYPE_CHECKING:
     from odscen.results.by_place.facilities import FacilityData
     from odscen.results.by_place.lane_places import LanePlaces
 
-TableName = Literal["network", "segments", "junctions", "movements"]
+TableName = Literal["network", "segments", "junctions", "movements", "lane_groups"]
 TABLES: tuple[TableName, ...] = get_args(TableName)
 
-_KEYS = ("segment", "movement", "junction", "control", "facility")
+_KEYS = ("segment", "movement", "lane_group", "junction", "control", "facility")
 _QUEUES = ("queue_max", "queue_p95")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrafficFigures:
-    """Four tables: one row for each place and interval of time, sorted by place and begin.
+    """Five tables: one row for each place and interval of time, sorted by place and begin.
 
     A place that no vehicle came to is in no table; a place has a row for every interval, also
     without vehicles. Columns of all tables:
 
     - ``begin``, ``end``: s.
+
+    Of all but lane groups:
+
     - ``vehicles``: that came into the place or started there; of the network: that were under way.
     - ``flow`` (veh/h), ``density`` (veh/km), ``speed`` (m/s; null without vehicles).
     - ``delay``, ``waiting``: s per vehicle; null if no vehicle passed.
@@ -105,13 +116,21 @@ class TrafficFigures:
         ``throughput`` (the same as ``vehicles``).
     movements
         Also ``movement`` (``r1>j10>r2``), ``junction``, ``control``, ``facility``,
-        ``control_delay``, ``passages``, ``level``.
+        ``control_delay``, ``passages``, ``level``; and ``lane_group`` with its ``demand``,
+        ``capacity``, ``vc`` and queues.
+    lane_groups
+        ``lane_group``, ``junction``; ``demand`` and ``capacity`` (vehicles), ``vc``;
+        ``queue_metres`` (mean), ``queue_metres_p95``, ``queue_metres_max`` (m, from the stop line
+        to the back of the queue), ``overflow`` and ``spillback`` (shares of time); ``lanes``,
+        ``storage`` (m), ``saturation_flow`` (veh/h and lane) and ``headways`` it was measured
+        from. Without trajectories it has no rows.
     """
 
     network: pl.DataFrame
     segments: pl.DataFrame
     junctions: pl.DataFrame
     movements: pl.DataFrame
+    lane_groups: pl.DataFrame = field(default_factory=no_groups)
 
 
 def traffic_figures(
@@ -121,6 +140,7 @@ def traffic_figures(
     end: float,
     queues: pl.DataFrame | None = None,
     facilities: FacilityData | None = None,
+    times: AnalysisTimes = WHOLE_RUN,
 ) -> TrafficFigures:
     """Figures of one run.
 
@@ -135,35 +155,47 @@ def traffic_figures(
     facilities
         Kinds of facilities, control delay and density; without them levels of service are by
         the delay of the lane data, and no road is a highway.
+    times
+        What is analysed; queues and facilities are of the same intervals.
+
+    Raises
+    ------
+    InputError
+        If an interval of the lane data lies in two of those.
     """
-    clock = intervals(lanes, end)
-    lanes = summable(lanes)
+    clock = times.clock(lanes, end=end)
+    lanes = summable(on_clock(lanes, clock))
     segments = segment_sums(lanes, clock, places)
     junctions = _with_queues(junction_sums(lanes, clock, places), queues)
     movements = movement_sums(lanes, clock, places)
     found = facilities
+    groups = None if found is None else found.groups
+    of = None if found is None else found.group_of
+    tables = {
+        "network": network_sums(lanes, clock, places),
+        "segments": with_density(segments, found),
+        "junctions": with_control(junctions, found, "junction"),
+        "movements": with_groups(with_control(movements, found, "movement"), groups, of),
+        "lane_groups": no_groups() if groups is None else groups,
+    }
     return TrafficFigures(
-        network=_with_rates(network_sums(lanes, clock, places)),
-        segments=_with_rates(with_density(segments, found)),
-        junctions=_with_rates(with_control(junctions, found, "junction")),
-        movements=_with_rates(with_control(movements, found, "movement")),
+        **{name: _with_rates(times.analysed(table)) for name, table in tables.items()}
     )
 
 
 def over_run(table: pl.DataFrame) -> pl.DataFrame:
-    """One of the four tables with one row for each place, over all intervals."""
+    """One of the tables with one row for each place, over all intervals."""
     import polars as pl
 
     keys = [key for key in _KEYS if key in table.columns]
-    summed = (*SUMS, "departed", "arrived", *CONTROL, "car_seconds")
+    summed = (*SUMS, "departed", "arrived", *CONTROL, "car_seconds", *GROUP_SUMS)
     sums = [name for name in summed if name in table.columns]
     added = [
         pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
     ]
-    whole = [pl.col("begin").min(), pl.col("end").max(), pl.col("length").first(), *added]
-    whole += [pl.col(name).max() for name in _QUEUES if name in table.columns]
-    if "lane_metres" in table.columns:
-        whole.append(pl.col("lane_metres").max())
+    whole = [pl.col("begin").min(), pl.col("end").max(), *added]
+    greatest = ("length", *_QUEUES, *GROUP_WORST, *GROUP_FIXED, "lane_metres")
+    whole += [pl.col(name).max() for name in greatest if name in table.columns]
     found = (
         table.group_by(keys, maintain_order=True).agg(whole)
         if keys
@@ -177,6 +209,9 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     col = pl.col
+    first = [*(key for key in _KEYS if key in sums.columns), *INTERVAL]
+    if "saturation_flow" in sums.columns:
+        return sums.with_columns(group_rates()).select(*first, pl.exclude(first))
     seconds = col("end") - col("begin")
     per_vehicle = pl.when(col("vehicles") > 0)
     hours_km = seconds / 3600.0 * col("length")
@@ -195,9 +230,10 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
                 col("control_seconds") / col("passages")
             )
         )
-        rates = rates.with_columns(level=place_level())
-        if "movement" not in sums.columns:
-            rates = rates.with_columns(throughput="vehicles")
+        if "movement" in sums.columns:
+            rates = rates.with_columns(group_rates()).with_columns(level=place_level(capacity=True))
+        else:
+            rates = rates.with_columns(level=place_level(), throughput="vehicles")
     elif "segment" in sums.columns:
         metres = col("length") * 1000.0
         free_seconds = col("seconds") - col("time_loss")
@@ -208,7 +244,6 @@ def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
         ).with_columns(level=segment_level(free_seconds))
     else:
         rates = rates.with_columns(running=col("seconds") / seconds)
-    first = [*(key for key in _KEYS if key in sums.columns), *INTERVAL]
     return rates.select(*first, pl.exclude(first))
 
 

@@ -105,6 +105,9 @@ class RunData:
     visits
         One row per visit of a stop, from :func:`odscen.sumo.folder.recorded.read_visits`; ``None``
         if the scenario has no lines of public transport.
+    stations
+        From :func:`odscen.results.by_place.station_figures.station_figures`; ``None`` if the study
+        has none, or trajectories were not recorded.
     """
 
     outcomes: Sequence[ActorOutcome] = ()
@@ -114,6 +117,7 @@ class RunData:
     end: float | None = None
     signals: pl.DataFrame | None = None
     visits: pl.DataFrame | None = None
+    stations: pl.DataFrame | None = None
 
     @cached_property
     def vehicles(self) -> Sequence[ActorOutcome]:

@@ -66,6 +66,54 @@ COLUMNS = (
         "95th percentile queue: what it does not exceed 95 % of the time. Over the run: of the "
         "worst interval",
     ),
+    _column(
+        "demand",
+        "veh",
+        "lane group (movement: of its lane group): would have come to the stop line in the "
+        "interval without control delay, from trajectories; those still queued at the end too",
+        whole=True,
+    ),
+    _column(
+        "capacity",
+        "veh",
+        "at lights: what the greens shown let through, by the saturation flow of its lanes, "
+        "permitted turns by the gaps of those they give way to. Null without lights",
+    ),
+    _column("vc", "", "demand / capacity; null in intervals below 300 s"),
+    _column(
+        "queue_metres",
+        "m",
+        "lane group: mean distance from the stop line to the back of the queue, over all of the "
+        "interval; movement: of its lane group",
+    ),
+    _column("queue_metres_p95", "m", "what it does not exceed 95 % of the time, as `queue_p95`"),
+    _column("queue_metres_max", "m", "its maximum"),
+    _column(
+        "overflow", "", "share of the time in which the queue is longer than its lanes (`storage`)"
+    ),
+    _column(
+        "spillback",
+        "",
+        "share of the time in which it reaches the junction behind (less than 7.5 m are free), or "
+        "the edge of the map",
+    ),
+    _column("queue_metre_seconds", "m*s", f"length of the queue over time; {_SUM}"),
+    _column("overflow_seconds", "s", _SUM),
+    _column("spillback_seconds", "s", _SUM),
+    _column("lanes", "", "lane group: lanes at the stop line", whole=True),
+    _column(
+        "storage",
+        "m",
+        "lane group: from the stop line back to where its longest lane becomes part of another, "
+        "or to the junction behind",
+    ),
+    _column(
+        "saturation_flow",
+        "veh/h",
+        "lane group at lights: of each lane, from headways of the run; HCM's 1,900 if there are "
+        "too few",
+    ),
+    _column("headways", "", "lane group: saturation headways that were measured", whole=True),
     _column("throughput", "veh", "of a junction: the same as `vehicles`", whole=True),
     _column("co2", "g", f"carbon dioxide, {_HERE}"),
     _column("co", "g", "carbon monoxide, likewise"),

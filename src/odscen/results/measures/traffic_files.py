@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 
 FIGURES_FORMAT = "odscen-figures"
 VERSION = 1
+STATIONS_TABLE = "stations.csv"
+"""Name of the table of stations in the folder of figures."""
 _DIGITS = 4
 
 
 def write_tables(figures: TrafficFigures, folder: Path) -> None:
-    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and ``movements.csv``."""
+    """Write ``network.csv``, ``segments.csv``, ``junctions.csv`` and so on."""
     folder.mkdir(exist_ok=True)
     for name in TABLES:
         table: pl.DataFrame = getattr(figures, name)
@@ -46,10 +48,11 @@ def read_tables(folder: Path) -> TrafficFigures | None:
     """
     import polars as pl
 
-    if not all((folder / f"{name}.csv").is_file() for name in TABLES):
+    there = [name for name in TABLES if (folder / f"{name}.csv").is_file()]
+    if not {*TABLES} - {"lane_groups"} <= {*there}:  # which earlier versions have not written
         return None
     found = {}
-    for name in TABLES:
+    for name in there:
         file = folder / f"{name}.csv"
         with tables(str(file)):
             names = pl.scan_csv(file).collect_schema().names()
@@ -58,6 +61,33 @@ def read_tables(folder: Path) -> TrafficFigures | None:
                 raise InputError(msg, file=str(file))
             found[name] = with_missing(pl.read_csv(file, schema=_schema(names)))
     return TrafficFigures(**found)
+
+
+def write_stations(stations: pl.DataFrame, folder: Path) -> None:
+    """Write what the stations of the study counted, ``stations.csv``."""
+    folder.mkdir(exist_ok=True)
+    _short(stations).write_csv(folder / STATIONS_TABLE)
+
+
+def read_stations(folder: Path) -> pl.DataFrame | None:
+    """Inverse of :func:`write_stations`; ``None`` if the run has none.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read.
+    """
+    import polars as pl
+
+    file = folder / STATIONS_TABLE
+    if not file.is_file():
+        return None
+    with tables(str(file)):
+        names = pl.scan_csv(file).collect_schema().names()
+        text = {"station", "kind"}
+        return pl.read_csv(
+            file, schema={name: pl.String if name in text else pl.Float64 for name in names}
+        )
 
 
 def places_from_json(text: str, table: TableName) -> pl.DataFrame:
@@ -73,7 +103,7 @@ def places_from_json(text: str, table: TableName) -> pl.DataFrame:
     what = "figures of a run"
     data = read_document(text, form=FIGURES_FORMAT, version=VERSION, what=what)
     with documents(what, pl.exceptions.PolarsError):
-        rows = data[table]
+        rows = data.get(table, ()) if table == "lane_groups" else data[table]
         return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
 
 

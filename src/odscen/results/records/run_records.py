@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import orjson
 
 from odscen.base.stored_files import documents, read_document, typed_rows
+from odscen.results.records.planned_stations import PlannedStation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -125,6 +126,12 @@ class Plan:
         Of the scenario, by begin.
     closed
         What they close, by begin: who would pass there must find another route.
+    warm_up, interval
+        What of the run is analysed, s.
+    clock
+        Time of day at its start, s after midnight; 0 if the scenario has none.
+    stations
+        Of its study.
     """
 
     scenario: str
@@ -138,6 +145,10 @@ class Plan:
     trajectories: bool = True
     measures: tuple[PlannedMeasure, ...] = ()
     closed: tuple[ClosedPeriod, ...] = ()
+    warm_up: float = 0.0
+    interval: float | None = None
+    clock: float = 0.0
+    stations: tuple[PlannedStation, ...] = ()
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
@@ -156,6 +167,13 @@ class Plan:
         if self.measures:
             head["measures"] = [asdict(one) for one in self.measures]
             head["closed"] = [asdict(one) for one in self.closed]
+        said: dict[str, Any] = {
+            "warm_up": self.warm_up,
+            "interval": self.interval,
+            "clock": self.clock,
+        }
+        said["stations"] = [asdict(one) for one in self.stations]
+        head |= {name: value for name, value in said.items() if value}
         return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
 
     @classmethod
@@ -175,6 +193,7 @@ class Plan:
             data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
             data["measures"] = _nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
             data["closed"] = _nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
+            data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
             return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
 
 

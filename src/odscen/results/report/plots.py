@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.base.durations import clock
 from odscen.base.markup import Markup, element, join, number
+from odscen.results.report.report_words import has_clock, time_words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -95,7 +95,9 @@ def value_axis(top: float, name: str, *, tight: bool = False) -> Axis:
 
 
 def time_axis(end: float) -> Axis:
-    """Axis of the seconds from 0 to ``end``, labelled in the unit that gives small numbers."""
+    """Axis of the seconds from 0 to ``end``: times of day, or in the unit of small numbers."""
+    if has_clock():
+        return clock_axis(0.0, end)
     unit = TimeUnit.for_span(end)
     span = end / unit.seconds
     steps = _HOURS if unit.seconds == 3600.0 else _SIXTIETHS
@@ -106,12 +108,13 @@ def time_axis(end: float) -> Axis:
 
 
 def clock_axis(begin: float, end: float) -> Axis:
-    """Axis of a stretch of the run, labelled ``17:15``: hours and minutes since the start."""
-    step = next(60.0 * step for step in (1, 2, 5, 10, 15, 30, 60) if end - begin <= step * 540.0)
+    """Axis of a stretch of the run, labelled ``17:15``: of day, or since the start."""
+    steps = (1, 2, 5, 10, 15, 30, 60, 120, 180, 360)
+    step = next((60.0 * one for one in steps if end - begin <= one * 540.0), 43_200.0)
     first = np.ceil(begin / step - 1e-9) * step
     values = np.arange(first, end + 1e-6, step).tolist()
-    name = "time since the start, h:min"
-    return Axis(begin, end, [(value, clock(value)) for value in values], name)
+    name = "time of day" if has_clock() else "time since the start, h:min"
+    return Axis(begin, end, [(value, time_words(value)) for value in values], name)
 
 
 def line_chart(

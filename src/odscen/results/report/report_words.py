@@ -2,10 +2,42 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from odscen.base.durations import clock
 from odscen.base.markup import number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_DAY = 86_400.0
+
+_START: ContextVar[float] = ContextVar("start of the run, seconds after midnight", default=0.0)
+
+
+@contextmanager
+def starting_at(clock_time: float) -> Iterator[None]:
+    """Write times of the run inside as times of day; of a run that starts at 0 they are both."""
+    token = _START.set(clock_time)
+    try:
+        yield
+    finally:
+        _START.reset(token)
+
+
+def has_clock() -> bool:
+    """Whether times are those of a day."""
+    return _START.get() > 0.0
+
+
+def time_words(seconds: float) -> str:
+    """``"7:15"``: time of day, or hours and minutes since the start of the run."""
+    start = _START.get()
+    return clock((seconds + start) % _DAY if start else seconds)
 
 
 def duration(seconds: float | None) -> str:
@@ -20,8 +52,8 @@ def duration(seconds: float | None) -> str:
 
 
 def stretch(begin: float, end: float) -> str:
-    """``"17:15 to 17:30 h"`` since the start, or ``"4:10 to 4:20 min"`` if it takes seconds."""
+    """``"17:15 to 17:30 h"``, of day if the run has a clock, or ``"4:10 to 4:20 min"``."""
     if begin % 60.0 == end % 60.0 == 0.0:
-        return f"{clock(begin)} to {clock(end)} h"
+        return f"{time_words(begin)} to {time_words(end)} h"
     one, other = (f"{int(t // 60)}:{int(t % 60):02d}" for t in (begin, end))
     return f"{one} to {other} min"

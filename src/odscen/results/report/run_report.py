@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from odscen.base.durations import clock
 from odscen.base.markup import Markup, element, join, number
 from odscen.results.measures.curves import presence
 from odscen.results.measures.figure import RunData, SummaryPart
@@ -24,6 +25,7 @@ from odscen.results.report.report_corridor import corridor_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
+from odscen.results.report.report_groups import group_section, station_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_measures import measure_section
@@ -36,7 +38,7 @@ from odscen.results.report.report_tables import (
 )
 from odscen.results.report.report_transit import transit_section
 from odscen.results.report.report_walking import walking_section
-from odscen.results.report.report_words import duration
+from odscen.results.report.report_words import duration, starting_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,6 +72,7 @@ def render_report(
     conflicts: pl.DataFrame | None = None,
     lights: LightsOfRun | None = None,
     visits: pl.DataFrame | None = None,
+    stations: pl.DataFrame | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -102,6 +105,8 @@ def render_report(
         Programs of traffic lights and what they showed, if the map has any.
     visits
         Visits of stops, if the scenario has lines of public transport.
+    stations
+        What the stations of the study counted, if it has any.
 
     Returns
     -------
@@ -117,28 +122,33 @@ def render_report(
     run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end)
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
-    body = [
-        _head(title, plan, summary, usability, _in_a_sentence(counts)),
-        brief_section({**given, **counts}, usability, figures, shapes),
-        key_figure_section({**given, **counts}, traces),
-        measure_section(plan.measures, int(counts["stranded"] or 0)),
-        service_section(figures) if figures else None,
-        _map_section(traces, plan, actors, events, drawing, incidents, every),
-        incident_section(incidents),
-        *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
-        corridor_section(corridor) if corridor is not None else None,
-        signal_section(lights, given, drawing=drawing) if lights is not None else None,
-        transit_section(visits, given) if visits is not None else None,
-        _speed_section(traces, end),
-        _progress_section(actors, end),
-        conflict_section(conflicts) if conflicts is not None else None,
-        walking_section(given, actors, traces, end=end),
-        emission_section(figures) if figures else None,
-        expectation_table(summary.get("expectations") or ()),
-        event_list(events, actors, problems=[str(text) for text in summary.get("problems") or ()]),
-        actor_table(actors, travel(traces)),
-        _foot(summary),
-    ]
+    with starting_at(plan.clock):
+        body = [
+            _head(title, plan, summary, usability, _in_a_sentence(counts)),
+            brief_section({**given, **counts}, usability, figures, shapes),
+            key_figure_section({**given, **counts}, traces),
+            measure_section(plan.measures, int(counts["stranded"] or 0)),
+            service_section(figures) if figures else None,
+            group_section(figures.lane_groups) if figures else None,
+            station_section(stations) if stations is not None else None,
+            _map_section(traces, plan, actors, events, drawing, incidents, every),
+            incident_section(incidents),
+            *((flow_section(figures.network), diagram_section(figures.network)) if figures else ()),
+            corridor_section(corridor) if corridor is not None else None,
+            signal_section(lights, given, drawing=drawing) if lights is not None else None,
+            transit_section(visits, given) if visits is not None else None,
+            _speed_section(traces, end),
+            _progress_section(actors, end),
+            conflict_section(conflicts) if conflicts is not None else None,
+            walking_section(given, actors, traces, end=end),
+            emission_section(figures) if figures else None,
+            expectation_table(summary.get("expectations") or ()),
+            event_list(
+                events, actors, problems=[str(text) for text in summary.get("problems") or ()]
+            ),
+            actor_table(actors, travel(traces)),
+            _foot(summary),
+        ]
     return html_page(f"{title} - run report", join([part for part in body if part]))
 
 
@@ -205,7 +215,9 @@ def _head(
         ("Map", summary.get("map")),
         ("Weather", summary.get("environment")),
         ("Seed", plan.seed),
+        ("Starts at", clock(plan.clock) if plan.clock else None),
         ("Simulated", duration(summary.get("sim_seconds"))),
+        ("Warm-up left out", duration(summary.get("warm_up"))),
         ("Computed in", duration(summary.get("wall_seconds"))),
     ]
     shown = [

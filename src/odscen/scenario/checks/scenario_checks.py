@@ -17,6 +17,7 @@ from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.checks.start_overlaps import start_overlaps
+from odscen.scenario.checks.study_checks import study_problems
 from odscen.scenario.checks.transit_checks import transit_problems
 from odscen.scenario.document.problems import Problem, error, warning
 from odscen.scenario.placing.region import Region
@@ -73,6 +74,7 @@ def check(
         clock, until = scenario.demand.clock, scenario.simulation.duration
         found += signal_problems(scenario.signals, lights, clock=clock, until=until)
     found += measure_problems(scenario, region, lights)
+    found += study_problems(scenario, graph)
     found += rule_problems(scenario, region, lights)
     found += shared_nodes(scenario)
     found += start_overlaps(scenario, region, assets)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 OPTIONAL = (
-    "drivers", "demand", "transit", "signals", "measures", "rules", "parameters", "formulas",
+    "drivers", "demand", "transit", "signals", "measures", "study", "rules", "parameters",
+    "formulas",
 )  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
@@ -73,9 +74,9 @@ def dumps(scenario: Scenario) -> str:
     """Write a scenario document as JSON: fields in fixed order, one actor, flow or row per line.
 
     Fields of actors, flows, rules, drivers and demand that have their default value are left out,
-    and so are signals that are all the map's, and measures if there are none. Numbers that are
-    computed from parameters are written as their formulas. The same scenario gives the same text,
-    and :func:`loads` gives the same scenario back.
+    and so are signals that are all the map's, and measures and a study if there are none.
+    Numbers that are computed from parameters are written as their formulas. The same scenario gives
+    the same text, and :func:`loads` gives the same scenario back.
     """
     data = scenario.model_dump(mode="json", exclude={"actors", "flows", *OPTIONAL})
     for key in type(scenario).model_fields:
@@ -151,7 +152,7 @@ def _layout(key: str, value: object) -> str:
             for name, one in value.items()
         )
         return "{\n" + ",\n".join(fields) + "\n  }"
-    if key in ("demand", "transit") and isinstance(value, dict):
+    if key in ("demand", "transit", "study") and isinstance(value, dict):
         fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key == "signals" and isinstance(value, dict) and _has_programs(value):

@@ -19,6 +19,7 @@ from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.parameters_document import Parameter, ParameterName
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
+from odscen.scenario.document.study_document import Study
 from odscen.scenario.document.transit_document import Transit
 
 if TYPE_CHECKING:
@@ -294,6 +295,8 @@ class Scenario(Part):
         Closures, roadworks, incidents, limits, permissions and signal outages, each with its times.
     simulation
         Duration and step length, s.
+    study
+        Warm-up and interval of the figures, s.
     rules
         What actors do, and when.
     parameters
@@ -321,6 +324,7 @@ class Scenario(Part):
     signals: Signals = Signals()
     measures: tuple[Measure, ...] = ()
     simulation: Simulation = Simulation()
+    study: Study = Study()
     rules: tuple[StoryRule, ...] = ()
     parameters: dict[ParameterName, Parameter] = Field(default_factory=dict, max_length=200)
     formulas: dict[str, str] = Field(default_factory=dict)

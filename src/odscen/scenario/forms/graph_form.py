@@ -53,7 +53,7 @@ GOAL = "goal"
 
 _JSON = (
     "roi", "environment", "drivers", "demand", "transit", "signals", "measures", "simulation",
-    "rules", "parameters", "formulas",
+    "study", "rules", "parameters", "formulas",
 )  # fmt: skip
 """Graph attributes that hold JSON."""
 

@@ -10,7 +10,7 @@ from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.results.by_place.lane_places import LanePlaces
 from odscen.results.measures.registry import names_of, run_figure
 from odscen.results.measures.summary import ActorOutcome, actors_from_json
-from odscen.results.measures.traffic_files import places_from_json, read_tables
+from odscen.results.measures.traffic_files import places_from_json, read_stations, read_tables
 from odscen.results.records.body_centres import body_centres
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Event, Plan, events_from_json
@@ -26,12 +26,13 @@ if TYPE_CHECKING:
 
     from odscen.results.by_place.traffic import TableName
 
-PlaceKind = Literal["network", "segment", "junction", "movement"]
+PlaceKind = Literal["network", "segment", "junction", "movement", "lane_group"]
 _TABLES: dict[PlaceKind, TableName] = {
     "network": "network",
     "segment": "segments",
     "junction": "junctions",
     "movement": "movements",
+    "lane_group": "lane_groups",
 }
 
 
@@ -238,7 +239,7 @@ class Run:
         Parameters
         ----------
         place
-            ``network``, ``segment``, ``junction`` or ``movement`` (``r1>j10>r2``).
+            ``network``, ``segment``, ``junction``, ``movement`` (``r1>j10>r2``) or ``lane_group``.
         over_time
             One row for each place and interval of time, instead of one for each place.
 
@@ -273,6 +274,27 @@ class Run:
             raise InputError(msg, file=str(self.folder))
         table: pl.DataFrame = getattr(tables, name)
         return table
+
+    def stations(self) -> pl.DataFrame:
+        """What the detectors, sections and cordons of the scenario's study counted.
+
+        Returns
+        -------
+        polars.DataFrame
+            One row for each station and interval: ``station``, ``kind``, ``begin``, ``end`` (s),
+            ``vehicles``, ``flow`` (veh/h), ``speed`` (m/s), ``occupancy``, ``travel_time``,
+            ``travel_time_p95`` (s), ``left``, ``balance``; null where a kind does not have it.
+
+        Raises
+        ------
+        InputError
+            If the study has none, or no trajectories were recorded.
+        """
+        found = read_stations(self.folder / layout.FIGURES_FOLDER)
+        if found is None:
+            msg = "the run has no stations: its study has none, or no trajectories were recorded"
+            raise InputError(msg, file=str(self.folder))
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Return the summary with the folder and absolute paths of its files."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.base.errors import InputError
 from odscen.base.xml_reading import read_xml
 from odscen.convert.verify.net_reader import read_net
-from odscen.results.by_place.facilities import NetFacts
+from odscen.results.by_place.facilities import NetFacts, no_links
 from odscen.sumo.folder import layout
 from odscen.sumo.outputs.xml_rows import elements
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.verify.net_reader import NetFile
 
 HEAVY = ("truck", "trailer", "bus", "coach", "fire", "tram")
@@ -53,13 +56,19 @@ def _facts(net: Path, routes: Path) -> NetFacts:
 
     content = net.read_bytes()
     root = read_xml(content, huge=True)
+    lanes = [(edge, lane) for edge in root.iterfind("edge") for lane in edge.iterfind("lane")]
     limits = [
-        (lane.get("id"), edge.get("id"), float(lane.get("speed", "13.89")))
-        for edge in root.iterfind("edge")
-        for lane in edge.iterfind("lane")
+        (
+            lane.get("id"),
+            edge.get("id"),
+            float(lane.get("length", "0")),
+            float(lane.get("speed", "13.89")),
+        )
+        for edge, lane in lanes
     ]
     ring = {name for one in root.iterfind("roundabout") for name in one.get("edges", "").split()}
-    yields = _giving_way(read_net(content))
+    known = read_net(content)
+    yields = _giving_way(known)
     links = {
         via: (
             via,
@@ -67,6 +76,7 @@ def _facts(net: Path, routes: Path) -> NetFacts:
             via in yields,
             one.get("to") in ring,
             one.get("from") in ring,
+            yields.get(via, []),
         )
         for one in root.iterfind("connection")
         if (via := one.get("via"))
@@ -75,50 +85,83 @@ def _facts(net: Path, routes: Path) -> NetFacts:
     return NetFacts(
         limits=pl.DataFrame(
             limits,
-            schema={"lane": pl.String, "edge": pl.String, "limit": pl.Float64},
+            schema={
+                "lane": pl.String,
+                "edge": pl.String,
+                "length": pl.Float64,
+                "limit": pl.Float64,
+            },
             orient="row",
         ),
+        follows=_follows(known),
+        shapes={lane.get("id", ""): _points(lane.get("shape", "")) for _, lane in lanes},
         links=pl.DataFrame(
             list(links.values()),
-            schema={"via": pl.String, "state": pl.String, **flags},
+            schema={
+                "via": pl.String,
+                "state": pl.String,
+                **flags,
+                "yields_to": pl.List(pl.String),
+            },
             orient="row",
         ),
         drivers=_drivers(routes),
     )
 
 
-def _giving_way(net: NetFile) -> set[str]:
-    """First lanes inside of connections that give way to other vehicles; of people do not count."""
-    found = set()
+def _follows(net: NetFile) -> pl.DataFrame:
+    """Lane and lane behind it, over the lanes inside junctions."""
+    import polars as pl
+
+    rows = dict.fromkeys((link.source, link.via or link.target) for link in net.links)
+    return pl.DataFrame(list(rows), schema=no_links().schema, orient="row")
+
+
+def _points(shape: str) -> FloatArray:
+    points = [[float(part) for part in point.split(",")[:2]] for point in shape.split()]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def _giving_way(net: NetFile) -> dict[str, list[str]]:
+    """First lanes inside of connections that give way to other vehicles, and theirs.
+
+    Giving way to people does not count.
+    """
+    found = {}
     rows = net.request_rows()
     for junction in net.junctions:
         links = rows[junction.id]
         driven = {k for k, link in enumerate(links) if net.lanes[link.target].function == "normal"}
-        for index in driven:
-            if junction.yields.get(index, frozenset()) & driven:
-                found.add(links[index].via)
+        for index in sorted(driven):
+            before = junction.yields.get(index, frozenset()) & driven
+            if before:
+                found[links[index].via] = sorted(links[other].via for other in before)
     return found
 
 
 def _drivers(routes: Path) -> pl.DataFrame:
     import polars as pl
 
-    kinds: dict[str, tuple[float, float, bool]] = {}
+    kinds: dict[str, tuple[float, float, float, bool]] = {}
     rows = []
     for found in elements(routes, "vType", "vehicle", "trip"):
         if found.tag == "vType":
             speed, vclass = float(found.get("maxSpeed", "55.55")), found.get("vClass", "")
             desired = float(found.get("desiredMaxSpeed", _DESIRED.get(vclass, math.inf)))
-            kinds[found.get("id", "")] = speed, desired, vclass in HEAVY
+            length = float(found.get("length", "5"))
+            kinds[found.get("id", "")] = speed, desired, length, vclass in HEAVY
         else:
-            speed, desired, heavy = kinds.get(found.get("type", ""), (55.55, math.inf, False))
+            kind = kinds.get(found.get("type", ""), (55.55, math.inf, 5.0, False))
+            speed, desired, length, heavy = kind
             factor = float(found.get("speedFactor", "1"))
             serves = found.find("stop") is not None
-            rows.append((found.get("id"), factor, min(speed, desired * factor), heavy, serves))
+            top = min(speed, desired * factor)
+            rows.append((found.get("id"), factor, top, length, heavy, serves))
     schema = {
         "id": pl.String,
         "factor": pl.Float64,
         "max_speed": pl.Float64,
+        "length": pl.Float64,
         "heavy": pl.Boolean,
         "serves": pl.Boolean,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from odscen.sumo.folder.layout import EMISSIONS_FILE, LANES_FILE, STATES_FILE
@@ -21,10 +22,18 @@ EMISSIONS = ("CO2", "CO", "HC", "NOx", "PMx", "fuel", "electricity")
 """SUMO's names: mg, electricity in Wh."""
 
 
-def interval_of(until: float, slice_length: float | None = None) -> float:
-    """Seconds that a run of ``until`` seconds is measured over; no longer than a slice."""
+def interval_of(
+    until: float, slice_length: float | None = None, *, analysed: Sequence[float] = ()
+) -> float:
+    """Seconds that a run of ``until`` seconds is measured over; no longer than a slice.
+
+    ``analysed`` are times that figures begin at or are given over: whole multiples of it.
+    """
     fine = (one for one in INTERVALS if until / one <= MOST_INTERVALS)
-    return min(next(fine, INTERVALS[-1]), slice_length or until)
+    found = min(next(fine, INTERVALS[-1]), slice_length or until)
+    if all(math.isclose(one % found, 0.0, abs_tol=1e-6) for one in analysed):
+        return found
+    return float(math.gcd(round(found), *(round(one) for one in analysed)))
 
 
 def measures_xml(

@@ -54,6 +54,7 @@ from odscen.sumo.realize.traffic_measures.measure_actions import (
     measure_actions,
 )
 from odscen.sumo.realize.traffic_measures.signal_outages import with_outages
+from odscen.sumo.realize.traffic_measures.study_stations import planned_stations
 from odscen.sumo.realize.transit.line_vehicles import line_users
 from odscen.sumo.realize.transit.stop_places import left_out, stop_places, stops_xml
 from odscen.sumo.realize.usable import usable_places
@@ -138,6 +139,8 @@ def realize(
         scenario = scenario.model_copy(update={"seed": settings.seed})
     scenario = redrawn(scenario, settings.redraw)
     recording, (until, step_length) = settings.recorded, settings.times(scenario)
+    analysis = settings.analysis(scenario)
+    stations, unplaced = planned_stations(scenario, sumo_map)
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
     _refuse_twins(users)
@@ -164,6 +167,10 @@ def realize(
         trajectories=recording.trajectories,
         measures=actions.measures,
         closed=actions.closed,
+        warm_up=analysis.warm_up,
+        interval=analysis.interval,
+        clock=scenario.demand.clock,
+        stations=stations,
     )
     if settings.meso:
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})
@@ -192,7 +199,7 @@ def realize(
         files,
         plan,
         tuple(writer.problems),
-        (*unmet, *writer.notes),
+        (*unmet, *unplaced, *writer.notes),
         tuple(light.shown for light in lights),
     )
 
@@ -228,7 +235,8 @@ def _run_files(
         lateral_resolution=own.lateral_resolution,
         pedestrians=own.pedestrians,
     )
-    interval = interval_of(plan.until, plan.slice_length)
+    analysed = [one for one in (plan.warm_up, plan.interval) if one]
+    interval = interval_of(plan.until, plan.slice_length, analysed=analysed)
     files = {
         CONFIG_FILE: sumo_config(sumocfg),
         MEASURES_FILE: measures_xml(

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 from odscen.base.errors import InputError
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.measures.expectations import Expectation, needs_criticality, parse_expectation
 from odscen.scenario.sampling.redrawn_traffic import REDRAWS
 from odscen.sumo.realize.recording import Recording
@@ -63,6 +64,11 @@ class RunSettings:
         Wall time after which the run is stopped and has failed; ``None`` for no limit.
     expectations
         What must come out; the summary says of each whether it is met.
+    warm_up
+        Simulated time from the start that figures leave out, in whole seconds; the scenario's own
+        if ``None``.
+    interval
+        Of figures over time, in whole seconds; the scenario's own if ``None``.
 
     Raises
     ------
@@ -80,6 +86,8 @@ class RunSettings:
     slice_length: SliceLength = "auto"
     time_limit: float | None = None
     expectations: tuple[Expectation, ...] = ()
+    warm_up: float | None = None
+    interval: float | None = None
 
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed < _SEEDS:
@@ -93,6 +101,11 @@ class RunSettings:
         if self.slice_length != "auto":
             _refuse_time("slice_length", self.slice_length)
         _refuse_time("time_limit", self.time_limit)
+        for name, seconds in (("warm_up", self.warm_up), ("interval", self.interval)):
+            if seconds is not None and (seconds < 0 or seconds % 1.0 or not math.isfinite(seconds)):
+                msg = f"{name} must be whole seconds, not {seconds:g}"
+                raise InputError(msg)
+        _refuse_time("interval", self.interval)
         if self.meso and self.recorded.criticality:
             msg = "criticality cannot be measured in meso: it has queues, not vehicles that meet"
             raise InputError(msg)
@@ -119,6 +132,20 @@ class RunSettings:
             )
             raise InputError(msg)
         return until, step_length
+
+    def analysis(self, scenario: Scenario) -> AnalysisTimes:
+        """What of a run of a scenario is analysed.
+
+        Raises
+        ------
+        InputError
+            If the warm-up leaves nothing of it.
+        """
+        study = scenario.study
+        warm_up = study.warm_up if self.warm_up is None else self.warm_up
+        found = AnalysisTimes(warm_up, study.interval if self.interval is None else self.interval)
+        found.refuse_beyond(self.times(scenario)[0])
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """As values that JSON can hold."""

@@ -91,7 +91,11 @@ def forecast(
     rows = seconds / max(every or 0.0, plan.step_length) if plan.trajectories else 0.0
     slices = plan.until / plan.slice_length if plan.slice_length else 0.0
     written = sum(len(text) for text in files.values())
-    intervals = plan.until / interval_of(plan.until, plan.slice_length)
+    intervals = plan.until / interval_of(
+        plan.until,
+        plan.slice_length,
+        analysed=[one for one in (plan.warm_up, plan.interval) if one],
+    )
     measured = LANE_ROW * lanes * intervals if seconds else 0.0
     disk = written + ROW * rows + measured + ACTOR * len(plan.actors) + STATE * slices * most
     memory = MEMORY_BASE + MEMORY_RUNNING * most + MEMORY_PLANNED * len(plan.actors)

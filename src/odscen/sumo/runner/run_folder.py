@@ -11,13 +11,15 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.version import __version__
+from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.by_place.traffic import TABLES
 from odscen.results.measures.expectations import evaluate
-from odscen.results.measures.figure import SummaryPart
+from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE
 from odscen.results.measures.summary import actors_from_json
+from odscen.results.measures.traffic_files import STATIONS_TABLE
 from odscen.results.measures.usability import failed_run, run_usability
 from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
@@ -150,9 +152,11 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         text = (folder / layout.ACTORS_FILE).read_text(encoding="utf-8")
         outcomes = actors_from_json(text)
         meso = bool(prepared.about.get("meso"))
-        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso)
+        times = AnalysisTimes(plan.warm_up, plan.interval)
+        data = read_run_data(folder, outcomes, end=done.sim_seconds, meso=meso, times=times)
         write_figures(folder, data)
-        summary["actors"] = figure_values(data, part=SummaryPart.ACTORS)
+        summary |= times.to_dict()
+        summary["actors"] = figure_values(RunData(outcomes), part=SummaryPart.ACTORS)
         summary["figures"] = rounded(figure_values(data))
         summary["insertion_error_max"] = summary["figures"]["insertion_error_max"]
         text = (folder / layout.EVENTS_FILE).read_text(encoding="utf-8")
@@ -224,6 +228,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "stop_visit_parts": layout.VISITS_FOLDER,
         "lights": layout.LIGHTS_FILE,
         "signal_figures": f"{layout.FIGURES_FOLDER}/{SIGNALS_TABLE}",
+        "station_figures": f"{layout.FIGURES_FOLDER}/{STATIONS_TABLE}",
         "lane_places": layout.LANE_PLACES_FILE,
         "figures": layout.FIGURES_FILE,
         **{f"{name}_figures": f"{layout.FIGURES_FOLDER}/{name}.csv" for name in TABLES},

@@ -1,0 +1,326 @@
+"""Demand and capacity of lane groups at traffic lights, by interval.
+
+As HCM chapter 19 has it, for connections ``i`` of a lane that are driven in shares ``p_i``::
+
+    c_i = s * g_i / 3600                      vehicles in the interval
+    c   = sum over the lanes of 1 / sum over i of p_i / c_i
+    v/c = demand / c
+
+``g_i`` is the effective green that the light showed in the interval, actuated or not: the green
+displayed, for start-up lost time and the use of yellow are both 2 s by default (HCM chapter 19)
+and cancel. ``s`` is the saturation flow of the run itself, measured as HCM chapter 31 does in the
+field: headways of the fifth and later vehicles of each queue that drives off; where fewer than
+:data:`FEWEST_HEADWAYS` are known, that of all lanes at lights; where that is not known either,
+HCM's 1,900 pc/h/ln. Demand are those who would have come to the stop line in the interval without
+control delay, not those who passed it.
+
+A connection that has green together with vehicles to which it gives way (permitted turns) carries
+what their gaps let through: of a gap of ``h`` seconds ``floor((h - t_c) / t_f) + 1`` vehicles if
+``h >= t_c``, with HCM's critical gap and follow-up time of permitted left turns, and
+:data:`SNEAKERS` more at the end of each green. Where :data:`FEWEST_GREENS` greens or more of this
+run did not clear the queue, all of it is taken times what they let through in proportion.
+Pedestrians to whom turns give way are not considered otherwise. Capacity of unsignalised movements
+is not computed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.scenario.signals.webster import CRITICAL_GAP, FOLLOW_UP, SATURATION_FLOW
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import polars as pl
+
+    from odscen.base.arrays import FloatArray
+    from odscen.results.by_place.facilities import NetFacts
+    from odscen.results.by_place.lane_groups import LaneGroups
+    from odscen.results.records.light_programs import LightProgram
+
+FEWEST_HEADWAYS = 15
+"""Saturation headways from which a lane group has a saturation flow of its own."""
+SNEAKERS = 2
+"""Vehicles of a permitted turn that clear the junction after each green: HCM chapter 31."""
+FEWEST_GREENS = 5
+"""Greens that did not clear the queue from which permitted turns are taken as the run has them."""
+_FREE = 4
+"""Vehicles of a queue whose headways are longer because they start up."""
+_HELD = 4.0
+"""Seconds lost before the line from which a vehicle was in the queue."""
+_BREAK = 6.0
+"""Seconds between two vehicles that end a discharging queue."""
+_LEAST = 1e-9
+
+
+def shown_greens(
+    programs: Sequence[LightProgram],
+    states: pl.DataFrame,
+    clock: pl.DataFrame,
+    facts: NetFacts,
+) -> pl.DataFrame:
+    """Greens of each connection at lights, cut at the ends of intervals.
+
+    Parameters
+    ----------
+    states
+        From :func:`odscen.sumo.folder.recorded.read_light_states`.
+    clock
+        ``begin`` and ``end`` of each interval.
+
+    Returns
+    -------
+    ``via``, ``begin`` of the interval, ``time`` and ``until`` (s), and ``permitted``: whether
+    vehicles have green to whom the connection gives way.
+    """
+    import polars as pl
+
+    col = pl.col
+    first, last = clock.select(a=col("begin").min(), b=col("end").max()).row(0)
+    edges = clock.select(time="begin").join(states.select("light").unique(), how="cross")
+    spans = (
+        pl.concat([states.select("light", "time", "state"), edges], how="diagonal")
+        .sort("light", "time", maintain_order=True)
+        .with_columns(state=col("state").forward_fill().over("light"))
+        .with_columns(until=col("time").shift(-1).over("light").fill_null(last).clip(None, last))
+        .filter(col("state").is_not_null() & (col("until") > col("time")) & (col("time") >= first))
+        .sort("time")
+        .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)
+        .drop("end")
+    )
+    shown = _links_shown(programs, spans.select("light", "state").unique(), facts)
+    return spans.join(shown, on=("light", "state")).sort("via", "time").drop("light", "state")
+
+
+def _links_shown(
+    programs: Sequence[LightProgram], states: pl.DataFrame, facts: NetFacts
+) -> pl.DataFrame:
+    """Connections that have green in each state, and whether they give way in it."""
+    import polars as pl
+
+    before = dict(facts.links.select("via", "yields_to").rows())
+    rows = []
+    for light in programs:
+        at = {
+            lanes[1]: link
+            for group in light.groups
+            for link, lanes in zip(group.links, group.lanes, strict=False)
+            if len(lanes) > 1
+        }
+        for state in states.filter(pl.col("light") == light.id)["state"].sort():
+            green = {via for via, link in at.items() if state[link] in "Gg"}
+            rows += [
+                (light.id, state, via, state[at[via]] == "g" and bool(green & {*before[via]}))
+                for via in sorted(green)
+                if via in before
+            ]
+    return pl.DataFrame(
+        rows,
+        schema={
+            "light": pl.String, "state": pl.String, "via": pl.String, "permitted": pl.Boolean,
+        },
+        orient="row",
+    )  # fmt: skip
+
+
+def saturation_flows(passed: pl.DataFrame, groups: LaneGroups) -> pl.DataFrame:
+    """Saturation flow of each lane group in this run.
+
+    Parameters
+    ----------
+    passed
+        From :func:`odscen.results.by_place.control_delay.passages`, of movements at lights.
+
+    Returns
+    -------
+    ``lane_group``, ``headways`` that were measured, and ``saturation_flow``, veh/h and lane.
+    """
+    import polars as pl
+
+    col = pl.col
+    headway = col("time").diff().over("source")
+    held = col("before") >= _HELD
+    breaks = (~held | (headway > _BREAK)).fill_null(value=True)
+    queued = (
+        passed.drop_nulls("movement")
+        .join(groups.ways.select("via", "source", "lane_group"), left_on="lane", right_on="via")
+        .sort("source", "time", "id")
+        .with_columns(headway=headway, queue=breaks.cum_sum().over("source"))
+        .with_columns(place=col("time").cum_count().over("source", "queue"))
+        .filter(held & (col("place") > _FREE))
+    )
+    seconds, number = col("headway").sum(), pl.len()
+    whole = queued.select(seconds=seconds, number=number).row(0)
+    usual = 3600.0 * whole[1] / whole[0] if whole[1] >= FEWEST_HEADWAYS else SATURATION_FLOW
+    own = queued.group_by("lane_group").agg(headways=number, own=3600.0 * number / seconds)
+    known = col("headways") >= FEWEST_HEADWAYS
+    return (
+        groups.groups.select("lane_group")
+        .join(own, on="lane_group", how="left", maintain_order="left")
+        .select(
+            "lane_group",
+            col("headways").fill_null(0).cast(pl.Int64),
+            saturation_flow=pl.when(known).then("own").otherwise(usual),
+        )
+    )
+
+
+def demand_sums(passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame) -> pl.DataFrame:
+    """Vehicles that would have come to the stop line in each interval: ``demand``.
+
+    Parameters
+    ----------
+    passed
+        From :func:`odscen.results.by_place.control_delay.passages`: those that were queued when
+        the run ended count too.
+    """
+    import polars as pl
+
+    col = pl.col
+    inside = groups.ways.select("lane_group", lane="via")
+    on_the_way = groups.reach.sort("lane", "lane_group").unique("lane", keep="first")
+    led = pl.concat([inside, on_the_way.select("lane_group", "lane")]).unique("lane", keep="first")
+    return (
+        passed.join(led, on="lane")
+        .with_columns(due=col("time") - col("before"))
+        .sort("due")
+        .join_asof(clock.sort("begin"), left_on="due", right_on="begin", coalesce=False)
+        .drop_nulls("begin")
+        .group_by("lane_group", "begin")
+        .agg(demand=pl.len().cast(pl.Int64))
+        .sort("lane_group", "begin")
+    )
+
+
+def capacity_sums(
+    greens: pl.DataFrame,
+    flows: pl.DataFrame,
+    passed: pl.DataFrame,
+    groups: LaneGroups,
+    facts: NetFacts,
+) -> pl.DataFrame:
+    """Capacity of lane groups at lights, vehicles by interval.
+
+    Parameters
+    ----------
+    greens
+        From :func:`shown_greens`.
+    flows
+        From :func:`saturation_flows`.
+
+    Returns
+    -------
+    ``lane_group``, ``begin``, ``capacity``.
+    """
+    import polars as pl
+
+    col = pl.col
+    number = passed.drop_nulls("movement").group_by(via="lane").agg(number=pl.len())
+    links = groups.ways.join(number, on="via", how="left").with_columns(
+        number=col("number").fill_null(0) + _LEAST
+    )
+    share = col("number") / col("number").sum().over("source", "begin")
+    return (
+        _link_capacities(greens, flows, passed, groups, facts)
+        .join(links, on="via")
+        .with_columns(part=share / col("capacity").clip(_LEAST))
+        .group_by("lane_group", "source", "begin")
+        .agg(capacity=1.0 / col("part").sum())
+        .group_by("lane_group", "begin")
+        .agg(col("capacity").sum())
+        .sort("lane_group", "begin")
+    )
+
+
+def _link_capacities(
+    greens: pl.DataFrame,
+    flows: pl.DataFrame,
+    passed: pl.DataFrame,
+    groups: LaneGroups,
+    facts: NetFacts,
+) -> pl.DataFrame:
+    """``via``, ``begin`` and ``capacity``, as if each connection had its lane for itself."""
+    import polars as pl
+
+    col = pl.col
+    flow_of = dict(groups.ways.join(flows, on="lane_group").select("via", "saturation_flow").rows())
+    before = dict(facts.links.select("via", "yields_to").rows())
+    entered = passed.drop_nulls("movement").with_columns(due=col("time") - col("before"))
+    entries = {
+        str(via): rows.sort("time").select("due", "time").to_numpy()
+        for (via,), rows in entered.group_by("lane")
+    }
+    nothing = np.zeros((0, 2))
+    found = []
+    for (via,), rows in greens.filter(col("via").is_in(list(flow_of))).group_by("via"):
+        foes = [entries.get(one, nothing)[:, 1] for one in before[str(via)]]
+        opposing = np.sort(np.concatenate(foes)) if foes else np.zeros(0)
+        turns = [
+            (begin, time, until, through_gaps(opposing, time, until, most=flow_of[via]))
+            for (begin,), own in rows.filter("permitted").group_by("begin")
+            for time, until in _merged(own)
+        ]
+        share = _as_driven(entries.get(str(via), nothing), turns)
+        totals = {
+            begin: seconds * flow_of[via] / 3600.0
+            for begin, seconds in rows.group_by("begin")
+            .agg((col("until") - col("time")).filter(~col("permitted")).sum())
+            .rows()
+        }
+        for begin, _, _, number in turns:
+            totals[begin] += share * number
+        found += [(via, begin, total) for begin, total in sorted(totals.items())]
+    schema = {"via": pl.String, "begin": pl.Float64, "capacity": pl.Float64}
+    return pl.DataFrame(found, schema=schema, orient="row").sort("via", "begin")
+
+
+def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, float]]) -> float:
+    """What greens that did not clear the queue let through, as a share of what their gaps would.
+
+    Parameters
+    ----------
+    entries
+        ``(K, 2)``, when vehicles came to the queue and when they entered the junction.
+    turns
+        Interval, begin and end of each green, and vehicles that its gaps have room for.
+    """
+    due, time = entries[:, 0], entries[:, 1]
+    greens, served, room = 0, 0, 0.0
+    for _, begin, end, number in turns:
+        if np.any((due < begin) & (time > end)):
+            greens += 1
+            # Who waits in the junction enters before the green ends; a step is a second at most.
+            served += int(np.sum((time >= begin) & (time < end + 1.0)))
+            room += number
+    return served / room if greens >= FEWEST_GREENS and room else 1.0
+
+
+def _merged(rows: pl.DataFrame) -> list[tuple[float, float]]:
+    """Spans without a break between them as one."""
+    found: list[tuple[float, float]] = []
+    for time, until in rows.select("time", "until").sort("time").rows():
+        if found and time <= found[-1][1]:
+            found[-1] = found[-1][0], until
+        else:
+            found.append((time, until))
+    return found
+
+
+def through_gaps(opposing: FloatArray, begin: float, end: float, *, most: float) -> float:
+    """Vehicles that could turn between others in a green from ``begin`` to ``end`` seconds.
+
+    Parameters
+    ----------
+    opposing
+        ``(K,)`` times at which those come to whom they give way, ascending.
+    most
+        Saturation flow, veh/h: an empty road carries no more.
+    """
+    there = opposing[(opposing > begin) & (opposing < end)]
+    gaps = np.diff(np.concatenate(([begin], there, [end])))
+    taken = np.floor((gaps - CRITICAL_GAP) / FOLLOW_UP) + 1.0
+    turned = float(taken[gaps >= CRITICAL_GAP].sum()) + SNEAKERS
+    return min(turned, (end - begin) * most / 3600.0)

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import math
+import statistics
+from pathlib import Path
+
+import pytest
+from scipy.stats import t
+
+from odscen.app.confident_runs import confidence_of, parse_share, run_until_confident
+from odscen.base.errors import InputError, NotFoundError
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+
+DELAYS = (20.0, 22.0, 18.0, 21.0, 19.0)
+
+
+def test_the_interval_is_students_and_the_seeds_needed_are_the_fewest_that_narrow_it() -> None:
+    found = confidence_of([*DELAYS, None], share=0.05)
+    scatter = statistics.stdev(DELAYS)
+    assert (found.mean, found.seeds) == (20.0, 5)
+    assert found.half_width == pytest.approx(2.776 * scatter / math.sqrt(5), rel=1e-3)
+    assert not found.enough
+    assert found.needed == 13
+    for count, enough in ((12, False), (13, True)):
+        half = t.ppf(0.975, count - 1) * scatter / math.sqrt(count)
+        assert bool(half <= 0.05 * 20.0) == enough
+    assert found.words == (
+        "mean_delay 20.00 +- 1.96 s with 5 seeds: too few for the interval wanted, +- 5 %, "
+        "it takes about 13"
+    )
+    assert confidence_of(DELAYS, share=0.10).enough
+    assert "too few" in confidence_of([3.0], share=0.05).words
+
+
+@pytest.mark.parametrize("text", ["5 %", "5%", "0.05"])
+def test_a_share_is_read_as_people_write_it(text: str) -> None:
+    assert parse_share(text) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("text", ["", "5", "0 %", "150 %", "5 % of it", "nan"])
+def test_what_is_no_share_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="is no share of the mean"):
+        parse_share(text)
+
+
+def test_seeds_are_added_until_the_interval_is_narrow_enough_or_there_are_too_many(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    settings = RunSettings(until=90.0, redraw="traffic")
+    wanted = {"figure": "mean_speed", "settings": settings, "seeds": (1, 2, 3)}
+    said: list[str] = []
+    runs, wide = run_until_confident(
+        workspace, sampled, share=0.9, out=tmp_path / "wide", tell=said.append, **wanted
+    )
+    assert (len(runs), wide.seeds, wide.enough) == (3, 3, True)
+    assert len(said) == 1
+    runs, narrow = run_until_confident(
+        workspace, sampled, share=0.0001, most=5, out=tmp_path / "narrow", **wanted
+    )
+    assert [run.summary["seed"] for run in runs] == [1, 2, 3, 4, 5]
+    assert not narrow.enough
+    assert narrow.needed is None or narrow.needed > 5
+    speeds = [run.figure("mean_speed") for run in runs]
+    assert narrow.mean == pytest.approx(statistics.fmean(speeds))
+
+
+def test_a_figure_that_is_none_is_refused_before_anything_runs(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(NotFoundError, match="mean_dlay"):
+        run_until_confident(workspace, sampled, share=0.05, figure="mean_dlay", out=tmp_path)
+    assert list(tmp_path.iterdir()) == []
