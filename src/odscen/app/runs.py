@@ -25,6 +25,7 @@ from odscen.base.errors import in_file
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
+from odscen.sumo.runner.assignment import assign_routes, wants_assignment
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import RunJob, run_prepared
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.base.errors import InputError
+    from odscen.results.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
@@ -144,16 +146,40 @@ def check_file(
         return check_run(workspace, scenario, name=name, out=out, settings=settings, entry=entry)
 
 
-def prepare_run(run: CheckedRun) -> PreparedRun:
+def prepare_run(
+    run: CheckedRun, *, iterated: Callable[[AssignmentStep], None] | None = None
+) -> PreparedRun:
     """Make everything that a run is made of; nothing is written yet.
+
+    Where the scenario wants routes by travel time, they are found by runs of their own first.
+
+    Parameters
+    ----------
+    iterated
+        Called after each of these runs.
 
     Raises
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
+    SimulationError
+        If a run that routes are found by fails.
     """
-    net = run.entry.checked("net")
-    return prepare(run.scenario, run.map.sumo, net, run.assets, settings=run.settings)
+    net, sumo_map = run.entry.checked("net"), run.map.sumo
+    if not wants_assignment(run.scenario):
+        return prepare(run.scenario, sumo_map, net, run.assets, settings=run.settings)
+    assigned = assign_routes(
+        run.scenario, sumo_map, net, run.assets, settings=run.settings, on_step=iterated
+    )
+    return prepare(
+        run.scenario,
+        sumo_map,
+        net,
+        run.assets,
+        settings=run.settings,
+        assigned=assigned.paths,
+        assignment_json=assigned.to_json(),
+    )
 
 
 def carry_out(

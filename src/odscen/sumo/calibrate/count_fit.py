@@ -13,6 +13,7 @@ from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.counted_traffic import routes_past
 from odscen.sumo.realize.passages import planned_passages, seen_passages
 from odscen.sumo.realize.realization import all_road_users
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
@@ -102,7 +103,8 @@ def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
     users, _ = all_road_users(scenario, sumo_map, region, until=scenario.simulation.duration)
     ground = TripEnds(region, usable_places(sumo_map))
     seen = observations(scenario.demand)
-    passages = planned_passages(users, region, ground.router, seen)
+    routes = RoutesOfDemand(scenario, region, ground.router)
+    passages = planned_passages(users, region, ground.router, seen, routes=routes)
     vehicles = sum(not user.person for user in users)
     return _fit(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
 

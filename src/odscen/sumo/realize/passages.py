@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from odscen.scenario.demand.count_stations import Observation
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
+    from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
     from odscen.sumo.realize.sumo_map import SumoMap
 
 Passages = Counter[tuple[str, float, float]]
@@ -32,20 +33,36 @@ UNKNOWN_LIMIT = 13.89
 
 
 def planned_passages(
-    users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    seen: Sequence[Observation],
+    *,
+    routes: RoutesOfDemand | None = None,
 ) -> Passages:
-    """Count vehicles at the places of observations, as they would pass without congestion."""
+    """Count vehicles at the places of observations, as they would pass without congestion.
+
+    Parameters
+    ----------
+    routes
+        Those that trips choose; the shortest if not given.
+    """
     passing = Passing(region.graph, [one.place for one in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
-    for _, passed in each_passing(users, region, drivable, passing):
+    for _, passed in each_passing(users, region, drivable, passing, routes=routes):
         for place, time in passed:
             clock.count(found, passing.places[place], time)
     return found
 
 
 def each_passing(
-    users: Sequence[RoadUser], region: Region, drivable: Router, passing: Passing
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    passing: Passing,
+    *,
+    routes: RoutesOfDemand | None = None,
 ) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
     """Yield vehicles with the places that they pass, by number, and when, with a free road.
 
@@ -53,7 +70,8 @@ def each_passing(
     """
     lanes = region.graph.lanes
     vehicles = [user for user in users if not user.person]
-    for index, path in each_path(vehicles, region, drivable):
+    found = each_path(vehicles, region, drivable) if routes is None else routes.each_path(vehicles)
+    for index, path in found:
         if len(path):
             segment = lanes.segment[path]
             first = np.flatnonzero(np.diff(segment, prepend=-1))

@@ -41,7 +41,7 @@ from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.recording import region_xml
-from odscen.sumo.realize.route_paths import each_path
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.rules.story_files import story_plan
@@ -115,6 +115,7 @@ def realize(
     assets: ModelSizes | None = None,
     *,
     settings: RunSettings = AS_DESIGNED,
+    assigned: Mapping[str, Int32Array] | None = None,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -125,6 +126,8 @@ def realize(
         their category's and only single parameters of the environment count.
     settings
         How it is run; what they leave open is the scenario's own.
+    assigned
+        Paths on the lane graph of trips whose routes were found before, by the trip's id.
 
     Raises
     ------
@@ -133,9 +136,7 @@ def realize(
         traffic light that is not possible.
     """
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map)))
-    if settings.seed is not None:
-        scenario = scenario.model_copy(update={"seed": settings.seed})
-    scenario = redrawn(scenario, settings.redraw)
+    scenario = as_run(scenario, settings)
     recording, (until, step_length) = settings.recorded, settings.times(scenario)
     region = Region.of(sumo_map.graph, scenario.roi)
     users, unmet = all_road_users(scenario, sumo_map, region, until=until)
@@ -148,6 +149,7 @@ def realize(
     stops = stop_places(scenario, sumo_map)
     writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length, stops)
     writer.actions = actions
+    writer.assigned = assigned
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -191,6 +193,13 @@ def realize(
         (*unmet, *writer.notes),
         tuple(light.shown for light in lights),
     )
+
+
+def as_run(scenario: Scenario, settings: RunSettings) -> Scenario:
+    """Give a scenario the seed of its run, and what that draws anew."""
+    if settings.seed is not None:
+        scenario = scenario.model_copy(update={"seed": settings.seed})
+    return redrawn(scenario, settings.redraw)
 
 
 def _run_files(
@@ -308,8 +317,8 @@ class _Writer:
         self.problems: list[str] = []
         self.notes: list[str] = []
         self.actions = MeasureActions()
+        self.assigned: Mapping[str, Int32Array] | None = None
         self._graph = graph
-        self._net = sumo_map.net
         self._region = region
         self._assets = assets
         self._scenario = scenario
@@ -330,7 +339,8 @@ class _Writer:
         bodies = [self._body(user) for user in users]
         drivers = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
         routes: dict[int, _PlannedRoute] = {}
-        for index, path in each_path(users, self._region, self._drivable, bodies):
+        ways = RoutesOfDemand(self._scenario, self._region, self._drivable, self.assigned)
+        for index, path in ways.each_path(users, bodies):
             routes[index] = self._plan_route(users[index], bodies[index], drivers[index], path)
         return tuple(
             self._write(user, body, behaviour, routes[index])
