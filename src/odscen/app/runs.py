@@ -25,8 +25,7 @@ from odscen.base.errors import in_file
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
-from odscen.sumo.runner.assignment import assign_routes, wants_assignment
-from odscen.sumo.runner.prepare import prepare
+from odscen.sumo.runner.assignment import prepare_assigned
 from odscen.sumo.runner.run_jobs import RunJob, run_prepared
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
 
@@ -166,19 +165,8 @@ def prepare_run(
         If a run that routes are found by fails.
     """
     net, sumo_map = run.entry.checked("net"), run.map.sumo
-    if not wants_assignment(run.scenario):
-        return prepare(run.scenario, sumo_map, net, run.assets, settings=run.settings)
-    assigned = assign_routes(
+    return prepare_assigned(
         run.scenario, sumo_map, net, run.assets, settings=run.settings, on_step=iterated
-    )
-    return prepare(
-        run.scenario,
-        sumo_map,
-        net,
-        run.assets,
-        settings=run.settings,
-        assigned=assigned.paths,
-        assignment_json=assigned.to_json(),
     )
 
 
@@ -255,14 +243,14 @@ def run_all(
         Called with a run that cannot be prepared, and why; the others go on. Without it, the first
         such run ends all.
     tell
-        Called with what the user should know before a long run.
+        Called with what the user should know before a long run, and after each iteration of routes.
 
     Returns
     -------
     tuple of Run
         In the order of ``runs``, without those refused.
     """
-    jobs = [_job(run, report=reports) for run in runs]
+    jobs = [_job(run, report=reports, tell=tell) for run in runs]
     return run_jobs(
         jobs, processes=processes, progress=progress, done=done, refused=refused, tell=tell
     )
@@ -388,12 +376,16 @@ def run_many(
     return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
 
 
-def _job(run: CheckedRun, *, report: bool) -> RunJob:
+def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -> RunJob:
     kept: list[LoadedMap] = []  # the map may be removed while the run goes on
 
     def get_ready() -> PreparedRun:
         kept.append(run.map)
-        return prepare_run(run)
+        return prepare_run(run, iterated=None if tell is None else iterated)
+
+    def iterated(step: AssignmentStep) -> None:
+        if tell is not None:
+            tell(f"{run.name}: {step.words}")
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         write_report(folder, summary, loaded=kept.pop())

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
-from odscen.base.stored_files import typed_rows
-from odscen.results.records.run_records import json_with_rows, rows_from_json
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from odscen.base.stored_files import documents, read_document, typed_rows
+from odscen.results.records.run_records import json_with_rows
 
 ASSIGNMENT_FORMAT = "odscen-assignment"
+VERSION = 1
 
 
 class AssignmentStep(NamedTuple):
@@ -21,8 +20,8 @@ class AssignmentStep(NamedTuple):
     iteration
         From 1 on.
     gap
-        Share of the travel time of all trips that they would have saved on the routes that were
-        quickest: ``sum(own - quickest) / sum(quickest)``, with the travel times of this iteration.
+        ``sum(own - quickest) / sum(quickest)``: what trips would have saved on the routes that were
+        quickest, with the travel times of this iteration.
     travel_time
         Mean time from departure to arrival of the vehicles that arrived, seconds.
     changed
@@ -39,19 +38,50 @@ class AssignmentStep(NamedTuple):
     teleported: int
     waiting: int
 
+    @property
+    def words(self) -> str:
+        """One line for people."""
+        mean = "" if self.travel_time is None else f", mean travel time {self.travel_time:.1f} s"
+        return f"routes, iteration {self.iteration}: gap {100 * self.gap:.2f} %{mean}"
 
-def steps_to_json(steps: Iterable[AssignmentStep], *, wanted: float, used: int) -> str:
-    """``assignment.json``: one iteration per line; ``used`` is the one whose routes are driven."""
-    head = {"format": ASSIGNMENT_FORMAT, "version": 1, "wanted": wanted, "used": used}
-    return json_with_rows(head, "steps", (step._asdict() for step in steps))
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """All iterations; ``wanted`` is the gap aimed at, ``used`` the iteration that is driven."""
+
+    wanted: float
+    used: int
+    steps: tuple[AssignmentStep, ...]
+
+    @property
+    def gap(self) -> float:
+        """Gap of the routes that are driven."""
+        return self.steps[self.used - 1].gap
+
+    def to_json(self) -> str:
+        """``assignment.json``: one iteration per line."""
+        head = {
+            "format": ASSIGNMENT_FORMAT,
+            "version": VERSION,
+            "wanted": self.wanted,
+            "used": self.used,
+        }
+        return json_with_rows(head, "steps", [step._asdict() for step in self.steps])
+
+    @classmethod
+    def from_json(cls, text: str) -> Assignment:
+        """Inverse of :meth:`to_json`.
+
+        Raises
+        ------
+        InputError
+            If it is not an assignment of this version.
+        """
+        what = "an assignment of routes"
+        data = read_document(text, form=ASSIGNMENT_FORMAT, version=VERSION, what=what)
+        with documents(what):
+            steps = tuple(map(_STEP, data["steps"]))
+            return cls(float(data["wanted"]), int(data["used"]), steps)
 
 
-def steps_from_json(text: str) -> tuple[AssignmentStep, ...]:
-    """Inverse of :func:`steps_to_json`, without its head.
-
-    Raises
-    ------
-    InputError
-        If it is not an assignment of this version.
-    """
-    return rows_from_json(text, "steps", ASSIGNMENT_FORMAT, typed_rows(AssignmentStep))
+_STEP = typed_rows(AssignmentStep)

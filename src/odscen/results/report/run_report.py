@@ -18,6 +18,7 @@ from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.traces import bin_width, speed_over_time, tidy, travel
 from odscen.results.report.page_templates import html_page, page_head, report_section
 from odscen.results.report.plots import Series, line_chart
+from odscen.results.report.report_assignment import assignment_section
 from odscen.results.report.report_brief import brief_section
 from odscen.results.report.report_conflicts import conflict_section
 from odscen.results.report.report_corridor import corridor_section
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.gridlock import Incident
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.measures.usability import Usability
+    from odscen.results.records.assignment_steps import Assignment
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
@@ -70,6 +72,7 @@ def render_report(
     conflicts: pl.DataFrame | None = None,
     lights: LightsOfRun | None = None,
     visits: pl.DataFrame | None = None,
+    assignment: Assignment | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -102,6 +105,8 @@ def render_report(
         Programs of traffic lights and what they showed, if the map has any.
     visits
         Visits of stops, if the scenario has lines of public transport.
+    assignment
+        How routes by travel time were found, if the scenario wants such.
 
     Returns
     -------
@@ -129,6 +134,7 @@ def render_report(
         corridor_section(corridor) if corridor is not None else None,
         signal_section(lights, given, drawing=drawing) if lights is not None else None,
         transit_section(visits, given) if visits is not None else None,
+        assignment_section(assignment) if assignment is not None else None,
         _speed_section(traces, end),
         _progress_section(actors, end),
         conflict_section(conflicts) if conflicts is not None else None,

@@ -149,7 +149,7 @@ def realize(
     stops = stop_places(scenario, sumo_map)
     writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length, stops)
     writer.actions = actions
-    writer.assigned = assigned
+    writer.assigned = assigned or {}
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -225,6 +225,7 @@ def _run_files(
         signals=signals is not None,
         stops=stops,
         closures=closures is not None,
+        informed=any(actor.informed for actor in plan.actors),
         recording=recording,
         measures=True,
         meso=settings.meso,
@@ -317,7 +318,7 @@ class _Writer:
         self.problems: list[str] = []
         self.notes: list[str] = []
         self.actions = MeasureActions()
-        self.assigned: Mapping[str, Int32Array] | None = None
+        self.assigned: Mapping[str, Int32Array] = {}
         self._graph = graph
         self._region = region
         self._assets = assets
@@ -329,6 +330,8 @@ class _Writer:
         self._net, self._lane_places = sumo_map.net, sumo_map.lane_places
         self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
+        self._ways = RoutesOfDemand(scenario, region, self._drivable)
+        self._period = scenario.demand.routes.period
         self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
 
     def add(self, users: Sequence[RoadUser]) -> tuple[PlannedActor, ...]:
@@ -339,8 +342,7 @@ class _Writer:
         bodies = [self._body(user) for user in users]
         drivers = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
         routes: dict[int, _PlannedRoute] = {}
-        ways = RoutesOfDemand(self._scenario, self._region, self._drivable, self.assigned)
-        for index, path in ways.each_path(users, bodies):
+        for index, path in self._ways.each_path(users, bodies, self.assigned):
             routes[index] = self._plan_route(users[index], bodies[index], drivers[index], path)
         return tuple(
             self._write(user, body, behaviour, routes[index])
@@ -391,6 +393,7 @@ class _Writer:
                     planned.route,
                     bays=self._bays,
                     speed=self._initial_speed(user, behaviour),
+                    looks_every=self._period if self._ways.informed(user) else None,
                 )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
         return self._planned(user, body, behaviour, planned)
@@ -454,6 +457,7 @@ class _Writer:
             flow=user.flow,
             ego=user.design.ego,
             problem=planned.problem,
+            informed=self._ways.informed(user),
         )
 
     def _steps(self, user: RoadUser, path: Int32Array) -> np.ndarray:

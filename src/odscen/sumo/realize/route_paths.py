@@ -81,7 +81,17 @@ def each_path(
         for index in group:
             path = paths.get(index, _NOWHERE)
             yield index, _through(path, users[index].places, drivable) if len(path) else path
-    ways = CostRouter(drivable, region.graph.lanes) if quickest is None else quickest
+    ways = quickest or CostRouter(drivable, region.graph.lanes)
+    yield from _paths_of_trips(users, by_goal, region, ways, bodies)
+
+
+def _paths_of_trips(
+    users: Sequence[RoadUser],
+    by_goal: Mapping[tuple[bool, int], Sequence[int]],
+    region: Region,
+    ways: CostRouter,
+    bodies: Sequence[Body],
+) -> Iterator[tuple[int, Int32Array]]:
     for (person, goal), group in by_goal.items():
         if not person:
             yield from ways.paths_to(goal, {index: users[index].spawn for index in group}, bodies)

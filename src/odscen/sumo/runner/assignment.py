@@ -20,7 +20,7 @@ import numpy as np
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import SimulationError
 from odscen.lanegraph.shortest_paths import Router
-from odscen.results.records.assignment_steps import AssignmentStep, steps_to_json
+from odscen.results.records.assignment_steps import Assignment, AssignmentStep
 from odscen.results.records.run_records import EventKind, events_from_json
 from odscen.scenario.placing.region import Region
 from odscen.sumo.folder.layout import EVENTS_FILE
@@ -30,6 +30,7 @@ from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.route_choice.travel_times import EdgeSteps, TimedNetwork, path_costs
 from odscen.sumo.realize.route_paths import CostRouter
+from odscen.sumo.realize.traffic_measures.measure_actions import measure_actions
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.route_choice.travel_times import TravelTimes
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
+    from odscen.sumo.runner.run_folder import PreparedRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,22 +55,12 @@ class AssignedRoutes:
     ----------
     paths
         Nodes of the lane graph by the id of the trip.
-    steps
-        All iterations.
-    used
-        The iteration that these paths are of.
-    wanted
-        The gap at which it was to stop.
+    found
+        How they were found.
     """
 
     paths: Mapping[str, Int32Array]
-    steps: tuple[AssignmentStep, ...]
-    used: int
-    wanted: float
-
-    def to_json(self) -> str:
-        """``assignment.json`` of the run."""
-        return steps_to_json(self.steps, wanted=self.wanted, used=self.used)
+    found: Assignment
 
 
 def wants_assignment(scenario: Scenario) -> bool:
@@ -76,6 +68,33 @@ def wants_assignment(scenario: Scenario) -> bool:
     demand = scenario.demand
     chooses = demand.inputs or demand.matrices or demand.background
     return demand.routes.by == "travel_time" and bool(chooses)
+
+
+def prepare_assigned(
+    scenario: Scenario,
+    sumo_map: SumoMap,
+    net: Path,
+    assets: ModelSizes | None = None,
+    *,
+    settings: RunSettings,
+    on_step: Callable[[AssignmentStep], None] | None = None,
+) -> PreparedRun:
+    """Prepare a run; where the scenario wants routes by travel time, they are found first.
+
+    Parameters and errors as of :func:`assign_routes`.
+    """
+    if not wants_assignment(scenario):
+        return prepare(scenario, sumo_map, net, assets, settings=settings)
+    assigned = assign_routes(scenario, sumo_map, net, assets, settings=settings, on_step=on_step)
+    return prepare(
+        scenario,
+        sumo_map,
+        net,
+        assets,
+        settings=settings,
+        assigned=assigned.paths,
+        assignment_json=assigned.found.to_json(),
+    )
 
 
 def assign_routes(
@@ -136,7 +155,7 @@ def assign_routes(
             break
         changed = search.change(gain, share=1.0 / (iteration + 1.0))
     used = min(steps, key=lambda step: (step.gap, step.iteration)).iteration
-    return AssignedRoutes(best, tuple(steps), used, choice.gap)
+    return AssignedRoutes(best, Assignment(choice.gap, used, tuple(steps)))
 
 
 class _Search:
@@ -149,6 +168,7 @@ class _Search:
         self._until, self._interval = until, scenario.demand.routes.interval
         self._lanes = sumo_map.graph.lanes
         self._network = TimedNetwork(sumo_map)
+        self._closings = measure_actions(scenario, sumo_map, until=until).closings
         self._edges = EdgeSteps(self._lanes)
         self._drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
         routes = RoutesOfDemand(scenario, region, self._drivable)
@@ -178,7 +198,9 @@ class _Search:
             .sort("begin", "edge")
             .rows()
         )
-        return self._network.measured(rows, until=self._until, interval=self._interval)
+        return self._network.measured(
+            rows, until=self._until, interval=self._interval, closings=self._closings
+        )
 
     def compare(self, times: TravelTimes) -> np.ndarray:
         """Find the quickest paths; what each trip would save as a share of its time."""

@@ -23,14 +23,11 @@ if TYPE_CHECKING:
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
 
-Paths = dict[str, "Int32Array"]
-"""Nodes of the lane graph by the id of the road user."""
-
 
 class RoutesOfDemand:
     """Chooses paths for the road users of one scenario.
 
-    Without ``assigned`` paths, trips that choose by travel time take the quickest route in free
+    Without assigned paths, trips that choose by travel time take the quickest route in free
     flow.
 
     Parameters
@@ -41,8 +38,6 @@ class RoutesOfDemand:
         Of the scenario.
     drivable
         Paths over lanes that SUMO has.
-    assigned
-        Paths found before, by the id of the trip.
     """
 
     def __init__(
@@ -50,12 +45,10 @@ class RoutesOfDemand:
         scenario: Scenario,
         region: Region,
         drivable: Router,
-        assigned: Mapping[str, Int32Array] | None = None,
     ) -> None:
         self._scenario = scenario
         self._region = region
         self._drivable = drivable
-        self._assigned = assigned or {}
         self._choice = scenario.demand.routes
         self._generated = frozenset(part.id for part in scenario.demand.counts)
         self._ways: CostRouter | None = None
@@ -68,19 +61,37 @@ class RoutesOfDemand:
         """Whether a road user chooses among routes: trips by vehicle, except those from counts."""
         return user.trip and not user.person and user.flow not in self._generated
 
+    def informed(self, user: RoadUser) -> bool:
+        """Whether the driver of a trip looks for quicker routes on the way, by seed and id."""
+        share = self._choice.informed
+        if not share or not self.chooses(user):
+            return False
+        return float(stream(self._scenario.seed, "informed", user.id).random()) < share
+
     def shared(self, user: RoadUser) -> bool:
         """Whether the routes of a trip have fixed shares."""
         return self._shares_of(user) is not None
 
     def each_path(
-        self, users: Sequence[RoadUser], bodies: Sequence[Body] | None = None
+        self,
+        users: Sequence[RoadUser],
+        bodies: Sequence[Body] | None = None,
+        assigned: Mapping[str, Int32Array] | None = None,
     ) -> Iterator[tuple[int, Int32Array]]:
-        """Yield the position of each user and the nodes of its route, in no particular order."""
+        """Yield the position of each user and the nodes of its route, in no particular order.
+
+        Parameters
+        ----------
+        bodies
+            Of the users; those of their categories if not given.
+        assigned
+            Paths found before, by the id of the trip.
+        """
         if bodies is None:
             bodies = [DEFAULT_BODY[user.category] for user in users]
         rest: list[int] = []
         for index, user in enumerate(users):
-            path = self._assigned.get(user.id)
+            path = (assigned or {}).get(user.id)
             if path is None and self._choice.shares:
                 path = self.shared_path(user, bodies[index])
             if path is None:

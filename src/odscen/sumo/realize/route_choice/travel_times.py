@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odscen.base.categories import Category
+from odscen.sumo.realize.driving import KINDS
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -19,11 +22,14 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import LaneGraph
     from odscen.sumo.realize.road_net import RoadNetLane
     from odscen.sumo.realize.sumo_map import SumoMap
+    from odscen.sumo.realize.traffic_measures.measure_actions import ClosedLanes
 
 UNKNOWN_LIMIT = 13.89
 """m/s assumed where the map gives no limit: 50 km/h."""
 SLOWEST = 0.1
 """m/s taken at least, where vehicles were stopped for a whole interval."""
+
+CAR = KINDS[Category.CAR].vclass
 
 EdgeUse = tuple[float, str, float, float]
 """Begin of an interval (s), SUMO edge, vehicle-seconds and vehicle-metres on it."""
@@ -73,11 +79,19 @@ class TimedNetwork:
     def __init__(self, sumo_map: SumoMap) -> None:
         self._map = sumo_map
 
-    def measured(self, uses: Iterable[EdgeUse], *, until: float, interval: float) -> TravelTimes:
+    def measured(
+        self,
+        uses: Iterable[EdgeUse],
+        *,
+        until: float,
+        interval: float,
+        closings: Sequence[ClosedLanes] = (),
+    ) -> TravelTimes:
         """Travel times from what vehicles spent on SUMO's edges.
 
         One vehicle in free flow is added to those measured, so that a single one that waited at a
-        red light does not make an edge impassable.
+        red light does not make an edge impassable. Where all lanes are closed to cars for at least
+        half of an interval, nothing is quick in it.
         """
         count = max(1, int(np.ceil(until / interval)))
         seconds = np.zeros((count, len(self._edges)))
@@ -90,10 +104,28 @@ class TimedNetwork:
                 metres[row, column] += driven
         pace = (seconds + self._edge_length / self._edge_speed) / (metres + self._edge_length)
         pace = np.minimum(pace, 1.0 / SLOWEST)
+        for row in range(count):
+            pace[row, self._closed(closings, row * interval, (row + 1) * interval)] = 1.0 / SLOWEST
         lanes = self._map.graph.lanes
         own = np.where(self._edge_of_node >= 0, pace[:, self._edge_of_node], 0.0)
         of_node = np.maximum(own, _free_pace(lanes))
         return TravelTimes(interval, lanes.length * of_node[:, lanes.source])
+
+    def _closed(self, closings: Sequence[ClosedLanes], begin: float, end: float) -> list[int]:
+        lanes = {
+            lane
+            for one in closings
+            if CAR in one.banned
+            and min(one.end, end) - max(one.begin, begin) >= 0.5 * (end - begin)
+            for lane in one.lanes
+        }
+        edges = sorted({self._map.net.lanes[lane].edge for lane in lanes})
+        every = self._map.net.edge_lanes
+        return [
+            self._column[edge]
+            for edge in edges
+            if all(one.id in lanes for one in every[edge] if one.allows(CAR))
+        ]
 
     @cached_property
     def _edges(self) -> list[str]:
