@@ -16,6 +16,7 @@ ALL = (
     "capacity",
     "saturation",
     "signal_timing",
+    "assignment",
     "recording",
     "long_run",
     "live_view",

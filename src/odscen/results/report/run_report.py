@@ -18,10 +18,10 @@ from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.traces import bin_width, speed_over_time, tidy, travel
 from odscen.results.report.page_templates import html_page, page_head, report_section
 from odscen.results.report.plots import Series, line_chart
-from odscen.results.report.report_assignment import assignment_section
 from odscen.results.report.report_brief import brief_section
 from odscen.results.report.report_conflicts import conflict_section
 from odscen.results.report.report_corridor import corridor_section
+from odscen.results.report.report_demand import assignment_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section

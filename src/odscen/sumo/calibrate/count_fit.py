@@ -124,13 +124,7 @@ def _fit(
     source: str,
     vehicles: int,
 ) -> CountFits:
-    opposed: dict[tuple[str, str, float, float], str] = {}
-    problems: list[str] = []
-    for part in scenario.demand.counts:
-        for one in contradictions(part, sumo_map.graph):
-            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
-            for place in one.places:
-                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+    opposed, problems = counts_apart(scenario, sumo_map)
     passable = _Passable(scenario, sumo_map)
     rows = []
     for name, place, begin, end, counted in observations(scenario.demand):
@@ -144,7 +138,26 @@ def _fit(
             if not why:
                 why = _otherwise(modelled, counted, source)
         rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
-    return CountFits(source, tuple(rows), vehicles, tuple(problems))
+    return CountFits(source, tuple(rows), vehicles, problems)
+
+
+class CountsApart(NamedTuple):
+    """Counts that contradict each other: why, by set, place, begin and end; and all in words."""
+
+    by_count: dict[tuple[str, str, float, float], str]
+    words: tuple[str, ...]
+
+
+def counts_apart(scenario: Scenario, sumo_map: SumoMap) -> CountsApart:
+    """Find counts of a scenario that cannot be right together."""
+    opposed: dict[tuple[str, str, float, float], str] = {}
+    problems: list[str] = []
+    for part in scenario.demand.counts:
+        for one in contradictions(part, sumo_map.graph):
+            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
+            for place in one.places:
+                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+    return CountsApart(opposed, tuple(problems))
 
 
 def _otherwise(modelled: float, counted: float, source: str) -> str:

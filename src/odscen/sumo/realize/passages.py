@@ -13,10 +13,11 @@ from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.sumo.realize.route_paths import each_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import polars as pl
 
+    from odscen.base.arrays import Int32Array
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
     from odscen.lanegraph.shortest_paths import Router
     from odscen.scenario.demand.count_stations import Observation
@@ -63,6 +64,7 @@ def each_passing(
     passing: Passing,
     *,
     routes: RoutesOfDemand | None = None,
+    assigned: Mapping[str, Int32Array] | None = None,
 ) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
     """Yield vehicles with the places that they pass, by number, and when, with a free road.
 
@@ -70,7 +72,10 @@ def each_passing(
     """
     lanes = region.graph.lanes
     vehicles = [user for user in users if not user.person]
-    found = each_path(vehicles, region, drivable) if routes is None else routes.each_path(vehicles)
+    if routes is None:
+        found = each_path(vehicles, region, drivable)
+    else:
+        found = routes.each_path(vehicles, assigned=assigned)
     for index, path in found:
         if len(path):
             segment = lanes.segment[path]
