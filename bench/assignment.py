@@ -23,7 +23,7 @@ from odscen.app.demand_correction import correct_matrix
 from odscen.app.maps import LoadedMap, load_map
 from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.base.categories import Category
-from odscen.results.records.assignment_steps import Assignment
+from odscen.results.records.assignment_steps import Assignment, AssignmentStep
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
@@ -48,7 +48,7 @@ SHARES = (0.20, 0.28, 0.30, 0.22)
 """Of the trips of the hour, in each quarter of it."""
 ROUTES = {"by": "travel_time", "iterations": 20, "gap": 0.01, "interval": SLICE}
 SETTINGS = RunSettings(recording=Recording(every=1.0, emissions=False), slice_length=None)
-TOWNS = {"carla-2020/Town04": 3000, "carla-2020/Town07": 800, "town_5x5": 3000}
+TOWNS = {"carla-2020/Town04": 2000, "carla-2020/Town07": 800, "town_5x5": 3000}
 """Trips in the hour."""
 
 
@@ -78,7 +78,7 @@ def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]
     real = simulated(workspace, true, "true")
     counts = counted(loaded, real, rng)
     prior = true.model_copy(update={"demand": prior_demand(true.demand, counts, rng)})
-    found = correct_matrix(workspace, prior, rounds=2)
+    found = correct_matrix(workspace, prior, rounds=2, iterated=progress)
     run = simulated(workspace, found.scenario, "corrected")
     fit = run_fit(found.scenario, loaded.sumo, pl.scan_parquet(trajectory_files(run.folder)))
     text = (run.folder / ASSIGNMENT_FILE).read_text(encoding="utf-8")
@@ -102,6 +102,10 @@ def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]
         flush=True,
     )
     return (fit.share_met or 0.0) >= 0.85 and not teleported and gap < 0.01
+
+
+def progress(step: AssignmentStep) -> None:
+    print(f"  {step.words}, teleported {step.teleported}", file=sys.stderr, flush=True)
 
 
 def passages(fit: CountFits, kind: str) -> float:
@@ -156,7 +160,7 @@ def zones_of(loaded: LoadedMap, region: Region) -> list[Zone]:
 
 def simulated(workspace: Workspace, scenario: Scenario, name: str) -> Run:
     checked = check_run(workspace, scenario, name=name, settings=SETTINGS)
-    run = carry_out(checked, prepare_run(checked))
+    run = carry_out(checked, prepare_run(checked, iterated=progress))
     if run.status != "completed":
         raise SystemExit(run.summary["error"])
     return run

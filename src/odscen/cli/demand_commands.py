@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
 from odscen.cli.scenario_commands import ScenarioArgument
-
-if TYPE_CHECKING:
-    from odscen.sumo.calibrate.count_fit import CountFits
 
 app = typer.Typer(
     help="Traffic from tables of trips and counts, or made up, and how well it fits counts.",
@@ -33,12 +30,6 @@ MixOption = Annotated[
 DayOption = Annotated[
     str | None,
     typer.Option("--day", help="Day profile: weekday, weekend, or one of the scenario's own."),
-]
-
-
-PageOption = Annotated[
-    Path | None,
-    typer.Option("--page", help="Page to write, with a scatter plot and what is not met."),
 ]
 
 
@@ -247,108 +238,6 @@ def weekday(
     log(f"Wrote {path}")
     if as_json:
         print_json({"file": str(path), **load._asdict()})
-
-
-@app.command()
-def fit(
-    what: Annotated[
-        Path, typer.Argument(help="Scenario, or folder of a run.", metavar="SCENARIO_OR_RUN")
-    ],
-    every: Annotated[bool, typer.Option("--all", help="Show the counts that are met too.")] = False,
-    page: PageOption = None,
-    workspace: WorkspaceOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Compare traffic with the counts of its scenario: GEH and RMSE; what is not met and why.
-
-    Of a scenario, traffic as planned, without congestion; of a run, as simulated.
-    """
-    from odscen.app import demands
-    from odscen.workspace.store import Workspace
-
-    found = demands.fit(Workspace.open(workspace), what)
-    if page is not None:
-        from odscen.app.demand_correction import write_fit_page
-
-        log(f"Wrote {write_fit_page([('Counts and traffic', found)], page, title=what.stem)}")
-    if as_json:
-        print_json({"file": str(what), **found.to_dict()})
-        return
-    show_fit(found, every=every)
-
-
-@app.command()
-def correct(
-    scenario: ScenarioArgument,
-    trust: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            help="Weight of a trip more or less than in the matrix, against a vehicle that "
-            "counts do not have.",
-        ),
-    ] = 0.1,
-    rounds: Annotated[
-        int, typer.Option(min=1, max=20, help="Times that routes by travel time are found.")
-    ] = 1,
-    page: PageOption = None,
-    out: OutOption = None,
-    workspace: WorkspaceOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Correct the matrices of a scenario by its counts: link and turn counts by slices of time.
-
-    Each matrix becomes one for each slice; the counts are kept to compare with.
-    """
-    from odscen.app import demand_correction, scenarios
-    from odscen.workspace.store import Workspace
-
-    document = scenarios.read_scenario(scenario)
-    found = demand_correction.correct_matrix(
-        Workspace.open(workspace),
-        document,
-        trust=trust,
-        rounds=rounds,
-        iterated=lambda step: log(step.words),
-    )
-    path = scenarios.write_scenario(found.scenario, out or scenario)
-    if page is not None:
-        fits = [("Prior matrix", found.before), ("Corrected matrix", found.after)]
-        log(f"Wrote {demand_correction.write_fit_page(fits, page, title=document.name)}")
-    if as_json:
-        trips = {"trips_before": found.trips_before, "trips_after": found.trips_after}
-        fits_json = {"before": found.before.to_dict(), "after": found.after.to_dict()}
-        print_json({"file": str(path), **trips, **fits_json})
-        return
-    show_fit(found.after, every=False)
-    log(
-        f"{found.trips_before:,.0f} trips became {found.trips_after:,.0f}; counts within GEH 5: "
-        f"{found.before.share_met or 0:.1%} before, {found.after.share_met or 0:.1%} now"
-    )
-    log(f"Wrote {path}")
-
-
-def show_fit(found: CountFits, *, every: bool) -> None:
-    """Print a fit for people."""
-    rows = [row for row in found.rows if every or not row.met]
-    if rows:
-        print_table(
-            "",
-            ("place", "from, s", "to, s", "counted", "traffic", "GEH", "why not"),
-            [
-                (row.place, row.begin, row.end, row.counted, row.modelled, row.geh, row.why)
-                for row in rows
-            ],
-        )
-    for message in found.contradictions:
-        log(f"contradictory: {message}")
-    met = sum(row.met for row in found.rows)
-    log(
-        f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "
-        f"{found.rmse or 0:.2f} vehicles; {found.vehicles} vehicles ({found.source}), "
-        f"{sum(row.counted for row in found.rows):g} passages counted, "
-        f"{sum(row.modelled for row in found.rows)} made"
-    )
 
 
 def parse_mix(text: str) -> dict[str, float]:
