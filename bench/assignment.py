@@ -48,7 +48,7 @@ SHARES = (0.20, 0.28, 0.30, 0.22)
 """Of the trips of the hour, in each quarter of it."""
 ROUTES = {"by": "travel_time", "iterations": 20, "gap": 0.01, "interval": SLICE}
 SETTINGS = RunSettings(recording=Recording(every=1.0, emissions=False), slice_length=None)
-TOWNS = {"carla-2020/Town04": 2000, "carla-2020/Town07": 800, "town_5x5": 3000}
+TOWNS = {"carla-2020/Town04": 1200, "carla-2020/Town07": 500, "town_5x5": 2000}
 """Trips in the hour."""
 
 
@@ -78,7 +78,7 @@ def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]
     real = simulated(workspace, true, "true")
     counts = counted(loaded, real, rng)
     prior = true.model_copy(update={"demand": prior_demand(true.demand, counts, rng)})
-    found = correct_matrix(workspace, prior, rounds=2, iterated=progress)
+    found = correct_matrix(workspace, prior, iterated=progress)
     run = simulated(workspace, found.scenario, "corrected")
     fit = run_fit(found.scenario, loaded.sumo, pl.scan_parquet(trajectory_files(run.folder)))
     text = (run.folder / ASSIGNMENT_FILE).read_text(encoding="utf-8")

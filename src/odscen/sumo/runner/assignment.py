@@ -28,7 +28,12 @@ from odscen.sumo.folder.recorded import read_lanes, read_trips
 from odscen.sumo.realize.realization import all_road_users, as_run
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
-from odscen.sumo.realize.route_choice.travel_times import EdgeSteps, TimedNetwork, path_costs
+from odscen.sumo.realize.route_choice.travel_times import (
+    EdgeSteps,
+    TimedNetwork,
+    TravelTimes,
+    path_costs,
+)
 from odscen.sumo.realize.route_paths import CostRouter
 from odscen.sumo.realize.traffic_measures.measure_actions import measure_actions
 from odscen.sumo.runner.prepare import prepare
@@ -38,10 +43,9 @@ from odscen.sumo.runner.worker_process import run_worker
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from odscen.base.arrays import Int32Array
+    from odscen.base.arrays import FloatArray, Int32Array
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.realization import ModelSizes
-    from odscen.sumo.realize.route_choice.travel_times import TravelTimes
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.runner.run_folder import PreparedRun
@@ -180,6 +184,8 @@ class _Search:
         self._steps = [self._edges.of(path) for path in self._paths]
         self._departs = np.array([user.depart for user in self._trips])
         self._quick = list(self._paths)
+        self._mean: TravelTimes | None = None
+        self._iterations = 0
 
     def paths(self) -> dict[str, Int32Array]:
         """Paths that the trips have now, by their ids."""
@@ -202,17 +208,35 @@ class _Search:
             rows, until=self._until, interval=self._interval, closings=self._closings
         )
 
-    def compare(self, times: TravelTimes) -> np.ndarray:
-        """Find the quickest paths; what each trip would save as a share of its time."""
+    def compare(self, times: TravelTimes) -> FloatArray:
+        """Measure the gap, and find the paths that are quickest by the mean of all iterations.
+
+        Returns
+        -------
+        What each trip would save by these means, as a share of its time, shape ``(trips,)``.
+        """
         rows = times.row(self._departs)
-        own = path_costs(times, self._steps, rows)
-        self._quick = self._quickest(times, rows)
-        best = path_costs(times, [self._edges.of(path) for path in self._quick], rows)
-        best = np.minimum(own, best)
+        own, best, _ = self._compared(times, rows)
         self.gap = float((own - best).sum() / max(best.sum(), 1e-9))
+        self._iterations += 1
+        if self._mean is None:
+            self._mean = times
+        else:
+            more = (times.costs - self._mean.costs) / self._iterations
+            self._mean = TravelTimes(times.interval, self._mean.costs + more)
+        own, best, self._quick = self._compared(self._mean, rows)
         return np.asarray((own - best) / np.maximum(own, 1e-9))
 
-    def change(self, gain: np.ndarray, *, share: float) -> int:
+    def _compared(
+        self, times: TravelTimes, rows: Int32Array
+    ) -> tuple[FloatArray, FloatArray, list[Int32Array]]:
+        """Seconds of each trip on its path and on the quickest, and the latter."""
+        own = path_costs(times, self._steps, rows)
+        quick = self._quickest(times, rows)
+        best = path_costs(times, [self._edges.of(path) for path in quick], rows)
+        return own, np.minimum(own, best), quick
+
+    def change(self, gain: FloatArray, *, share: float) -> int:
         """Give a share of the trips the quickest paths; how many have changed."""
         most = max(1, round(share * len(gain)))
         order = np.argsort(-gain, kind="stable")[:most]
