@@ -10,6 +10,7 @@ at most. Aim: at least 85 % of the counts within GEH 5 after the run, no telepor
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import tempfile
 import time
@@ -24,6 +25,7 @@ from odscen.app.maps import LoadedMap, load_map
 from odscen.app.runs import carry_out, check_run, prepare_run
 from odscen.base.categories import Category
 from odscen.results.records.assignment_steps import Assignment, AssignmentStep
+from odscen.results.report.report_demand import ShownCount, convergence_chart, scatter_chart
 from odscen.scenario import edits
 from odscen.scenario.demand.count_stations import Observation, transitions
 from odscen.scenario.demand.zones import TripEnds
@@ -52,7 +54,17 @@ TOWNS = {"carla-2020/Town04": 1200, "carla-2020/Town07": 500, "town_5x5": 2000}
 """Trips in the hour."""
 
 
-def main(only: str | None, iterations: int | None) -> None:
+STYLE = """
+text { font: 13px system-ui, sans-serif; fill: #5b6670; }
+.axis-name { fill: #1f252b; }
+.grid, .tick { stroke: #d9dcdd; fill: none; }
+.trail { fill: none; stroke: #5b6670; opacity: 0.6; }
+.dots { fill: #2f7fc8; }
+.dots.c-waiting { fill: #c8502f; }
+"""
+
+
+def main(only: str | None, iterations: int | None, pictures: Path | None) -> None:
     real = shared_maps()
     shipped = {path.stem: path for path in shipped_maps()}
     routes = ROUTES | ({} if iterations is None else {"iterations": iterations, "gap": 0.0})
@@ -63,12 +75,18 @@ def main(only: str | None, iterations: int | None) -> None:
             print(f"{name}: left out")
             continue
         with tempfile.TemporaryDirectory() as folder:
-            missed |= not town(Workspace.open(Path(folder)), path, trips, routes)
+            missed |= not town(Workspace.open(Path(folder)), path, trips, routes, pictures)
     if missed:
         sys.exit(1)
 
 
-def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]) -> bool:
+def town(
+    workspace: Workspace,
+    path: Path,
+    trips: int,
+    routes: dict[str, object],
+    pictures: Path | None,
+) -> bool:
     """Do all of it on one map; whether the aims are met."""
     start = time.perf_counter()
     entry = workspace.add_map(path)
@@ -82,7 +100,12 @@ def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]
     run = simulated(workspace, found.scenario, "corrected")
     fit = run_fit(found.scenario, loaded.sumo, pl.scan_parquet(trajectory_files(run.folder)))
     text = (run.folder / ASSIGNMENT_FILE).read_text(encoding="utf-8")
-    steps = Assignment.from_json(text).steps
+    assignment = Assignment.from_json(text)
+    steps = assignment.steps
+    if pictures is not None:
+        shown = [ShownCount(*row[1:5], float(row.modelled), row.geh, row.why) for row in fit.rows]
+        draw(pictures / "assignment-gap.svg", convergence_chart(assignment))
+        draw(pictures / "counts-scatter.svg", scatter_chart(shown))
     teleported = run.summary["actors"]["teleported"]
     gap = min(step.gap for step in steps)
     print(
@@ -102,6 +125,17 @@ def town(workspace: Workspace, path: Path, trips: int, routes: dict[str, object]
         flush=True,
     )
     return (fit.share_met or 0.0) >= 0.85 and not teleported and gap < 0.01
+
+
+def draw(file: Path, chart: str) -> None:
+    """Write a chart of the report as a picture of its own."""
+    svg = re.search(r"<svg.*</svg>", str(chart), flags=re.DOTALL)
+    if svg is None:
+        raise ValueError(file)
+    head = '<svg xmlns="http://www.w3.org/2000/svg"'
+    back = '<rect width="100%" height="100%" fill="#fff"/>'
+    text = svg[0].replace("<svg", head, 1).replace(">", f"><style>{STYLE}</style>{back}", 1)
+    file.write_text(text + "\n", encoding="utf-8")
 
 
 def progress(step: AssignmentStep) -> None:
@@ -207,6 +241,7 @@ def prior_demand(true: Demand, counts: Counts, rng: np.random.Generator) -> Dema
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", metavar="MAP")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write those of the docs")
     parser.add_argument("--iterations", type=int, help="make so many, whatever the gap")
     given = parser.parse_args()
-    main(given.only, given.iterations)
+    main(given.only, given.iterations, given.pictures)

@@ -1,9 +1,9 @@
 """Routes by travel time: the scenario is run again and again, and trips change to quicker routes.
 
 The method of successive averages: after iteration ``n`` one in ``n + 1`` of the trips takes the
-route that would have been quickest in the interval of its departure, those first who would save the
-largest share of their time (Sbayti, Lu and Mahmassani 2007, Transportation Research Record 2029).
-Of all iterations the routes with the smallest gap are kept.
+route that is quickest in the interval of its departure, by the mean travel times of all iterations
+so far, those first who would save the largest share of their time (Sbayti, Lu and Mahmassani 2007,
+Transportation Research Record 2029). Of all iterations the routes with the smallest gap are kept.
 """
 
 from __future__ import annotations
