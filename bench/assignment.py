@@ -96,7 +96,7 @@ def town(
     real = simulated(workspace, true, "true")
     counts = counted(loaded, real, rng)
     prior = true.model_copy(update={"demand": prior_demand(true.demand, counts, rng)})
-    found = correct_matrix(workspace, prior, iterated=progress)
+    found = correct_matrix(workspace, prior, rounds=2, iterated=progress)
     run = simulated(workspace, found.scenario, "corrected")
     fit = run_fit(found.scenario, loaded.sumo, pl.scan_parquet(trajectory_files(run.folder)))
     text = (run.folder / ASSIGNMENT_FILE).read_text(encoding="utf-8")

@@ -161,3 +161,22 @@ def test_an_assignment_survives_json() -> None:
     assert Assignment.from_json(kept.to_json()) == kept
     assert json.loads(kept.to_json())["steps"][0]["gap"] == 0.125
     assert step.words == "routes, iteration 1: gap 12.50 %"
+
+
+def test_informed_drivers_avoid_the_queue_behind_a_broken_down_vehicle(
+    workspace: Workspace, town: LoadedMap, tmp_path: Path
+) -> None:
+    broken = {
+        "id": "broken", "kind": "incident", "begin": 100.0, "end": 800.0, "lane": "25.0.-1",
+        "s": 40.0,
+    }  # fmt: skip
+    lost = {}
+    for share in (0.0, 1.0):
+        one = scenario(town, {"informed": share, "period": 30.0}, measures=[broken])
+        name = f"informed-{share:g}"
+        run = run_prepared(
+            prepare_run(check_run(workspace, one, name=name, out=tmp_path)), tmp_path / name
+        )
+        assert run.status == "completed"
+        lost[share] = run.summary["figures"]["mean_delay"]
+    assert lost[1.0] < 0.9 * lost[0.0]

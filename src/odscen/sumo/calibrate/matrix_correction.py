@@ -4,11 +4,12 @@ Cells are trips ``x`` from one place to another in one slice; ``q`` are those of
 ``c`` the counts and ``p`` the share of the trips of a cell that pass a count station in the slice
 of the count. Cells of 0 stay 0. What is minimised over ``x >= 0`` is
 
-    sum((p x - c)^2 / max(c, 1)) + trust * sum((x - q)^2 / q)
+    sum((p x - c)^2 / max((p x + c) / 2, 1)) + trust * sum((x - q)^2 / q)
 
 (Cascetta 1984, Transportation Research Part B 18(4/5), with variances as those of Poisson numbers);
-the first sum is about half the squared GEH statistics. The result is rounded to whole trips, so
-that rows in their order, added up, are right to one trip.
+the first sum is that of the squared GEH statistics of the slices. Its denominators are those of the
+solution before, three times: with those of the counts alone too few trips would come out. The
+result is rounded to whole trips, so that rows in their order, added up, are right to one trip.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
 
 SAMPLE = 12
 """Trips of each pair of places at least from which shares are estimated, and at most ten times."""
+WEIGHINGS = 3
+"""Times that the squared differences are weighed anew."""
 MOST_ROUNDS = 200
 """Of the solver."""
 
@@ -160,7 +163,11 @@ def corrected(
     counted = np.array([one.counted for one in seen])
     prior = np.array([cell.prior for cell in cells])
     rest = np.maximum(counted - others, 0.0)
-    trips = whole_trips(cells, least_squares(shares, rest, counted, prior, trust=trust))
+    found = prior
+    for _ in range(WEIGHINGS):
+        variance = (others + shares @ found + counted) / 2.0
+        found = least_squares(shares, rest, variance, prior, trust=trust)
+    trips = whole_trips(cells, found)
     apart = counts_apart(scenario, sumo_map)
 
     def fits(numbers: FloatArray) -> CountFits:
@@ -249,7 +256,7 @@ def share_matrix(
 def least_squares(
     shares: sparse.csr_array,
     wanted: FloatArray,
-    counted: FloatArray,
+    variance: FloatArray,
     prior: FloatArray,
     *,
     trust: float,
@@ -260,10 +267,10 @@ def least_squares(
     ----------
     wanted
         Vehicles that the matrices are to bring to each count, shape ``(counts,)``.
-    counted
-        The counts, which say how exact these are.
+    variance
+        What their squared differences are divided by, at least by 1, shape ``(counts,)``.
     """
-    exact = sparse.diags_array(1.0 / np.sqrt(np.maximum(counted, 1.0)))
+    exact = sparse.diags_array(1.0 / np.sqrt(np.maximum(variance, 1.0)))
     kept = np.sqrt(trust / prior)
     # In multiples of the prior, so that the solver sees columns alike.
     scaled = sparse.vstack(
