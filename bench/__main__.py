@@ -16,6 +16,7 @@ ALL = (
     "capacity",
     "saturation",
     "signal_timing",
+    "assignment",
     "recording",
     "rules",
     "long_run",

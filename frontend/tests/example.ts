@@ -1,5 +1,17 @@
+import type { RouteChoice } from "../src/api/demand";
 import type { Actor, Assets, Flow, GraphColumns, MapInfo, Problem, ScenarioDocument } from "../src/api/types";
 import { Graph, type Place } from "../src/map/graph";
+
+/** How trips choose their routes where a document does not say. */
+export const BY_LENGTH: RouteChoice = {
+  by: "length",
+  iterations: 20,
+  gap: 0.01,
+  interval: 900,
+  informed: 0,
+  period: 60,
+  shares: [],
+};
 
 export const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   id,
@@ -46,7 +58,16 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   },
   actors,
   flows,
-  demand: { clock: 0, zones: [], profiles: [], inputs: [], matrices: [], counts: [], background: [] },
+  demand: {
+    clock: 0,
+    zones: [],
+    profiles: [],
+    inputs: [],
+    matrices: [],
+    counts: [],
+    background: [],
+    routes: BY_LENGTH,
+  },
   transit: { stops: [], lines: [] },
   signals: { control: "fixed", bus_priority: false, junctions: [] },
   measures: [],

@@ -17,6 +17,7 @@ import {
 import { createEditorStore } from "../src/editor/store";
 import { fileGroups } from "../src/run/files";
 import { countMarks, countStations, worstFirst } from "../src/run/fit";
+import { BY_LENGTH } from "./example";
 import { bytes, hoursMinutes, longClock, span } from "../src/ui/words";
 
 const empty: Demand = {
@@ -27,6 +28,7 @@ const empty: Demand = {
   matrices: [],
   counts: [],
   background: [],
+  routes: BY_LENGTH,
 };
 const background: Background = {
   id: "background",
@@ -68,7 +70,12 @@ test("traffic is summed up in a line, and zones or profiles alone bring no road 
       ["b", "a", 99.6],
     ] as Demand["matrices"][0]["trips"],
   };
-  const counts = { id: "c", mix: { car: 1 }, rows: [["r1", 0, 900, 4]] as Demand["counts"][0]["rows"] };
+  const counts = {
+    id: "c",
+    use: "generate" as const,
+    mix: { car: 1 },
+    rows: [["r1", 0, 900, 4]] as Demand["counts"][0]["rows"],
+  };
   expect(trafficNote({ ...empty, matrices: [matrix], counts: [counts], background: [background] })).toBe(
     "1,000 trips, 1 count, background traffic",
   );

@@ -15,7 +15,9 @@ from odscen.sumo.realize.run_settings import RunSettings
 ROOT = Path(odscen.__file__).parent
 STEPS = {
     # Whatever makes or starts a run, and the rooms that may import it.
-    "prepare": {"app"},
+    "prepare": set[str](),
+    "prepare_assigned": {"app"},
+    "assign_routes": {"app"},
     "run_prepared": {"app"},
     "run_many": {"app"},
     "run_worker": set[str](),

@@ -151,3 +151,41 @@ def test_a_feed_without_its_tables_is_refused_and_changes_nothing(workspace, sce
     )
     assert "a day is written as 2026-11-23" in wrong.err
     assert Path(scenario).read_bytes() == before
+
+
+def test_a_matrix_is_corrected_by_counts_and_its_page_shows_them(workspace, scenario, tmp_path):
+    one, other = roads(scenario)[:2]
+    trips, counts = (tmp_path / f"{name}.csv" for name in ("trips", "counts"))
+    trips.write_text(f"from,to,trips\n{one},{other},60\n")
+    counts.write_text(f"place,begin,end,count\n{one}>j10001>{other},0,600,120\n")
+    done = odscen(
+        *("demand", "import", scenario, "--od", trips, "--counts", counts),
+        *("--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    page, out = tmp_path / "fit.html", tmp_path / "corrected.json"
+    done = odscen(
+        *("demand", "correct", scenario, "--trust", "0.01", "--out", out, "--page", page),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert (done.json["before"]["met"], done.json["after"]["met"]) == (0, 1)
+    assert done.json["trips_after"] > 110
+    assert json.loads(out.read_text())["demand"]["counts"][0]["use"] == "compare"
+    assert "Corrected matrix" in page.read_text()
+    fit = odscen("demand", "fit", out, "--json", "--workspace", workspace)
+    assert fit.json["vehicles"] < 140
+
+
+def test_how_trips_choose_routes_is_set_and_kept(workspace, scenario):
+    done = odscen(
+        *("demand", "routes", scenario, "--by", "travel_time", "--informed", "0.3"),
+        *("--json", "--workspace", workspace),
+    )
+    assert done.code == 0, done.err
+    assert done.json["routes"]["by"] == "travel_time"
+    document = json.loads(Path(scenario).read_text(encoding="utf-8"))
+    assert document["demand"]["routes"] == {"by": "travel_time", "informed": 0.3}
+    wrong = odscen("demand", "routes", scenario, "--by", "beauty", "--workspace", workspace)
+    assert wrong.code == 2
+    assert "by" in wrong.err

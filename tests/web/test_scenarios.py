@@ -59,6 +59,7 @@ ALL = (
     ("remove_actors", {"actors": ["car-1", "big"]}),
     ("fill_roi", {"share": 0.3, "seed": 4}),
     ("set_clock", {"clock": 25_200}),
+    ("set_routes", {"by": "travel_time", "informed": 0.2}),
     ("set_zone", {"zone": "west", "segments": ["r1"]}),
     ("set_zone", {"zone": "east", "segments": ["r2"]}),
     ("set_profile", {"profile": "morning", "shares": [1, 3, 2]}),

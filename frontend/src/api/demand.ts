@@ -7,6 +7,7 @@ export type Demand = Schemas["Demand"];
 export type Zone = Schemas["Zone"];
 export type Matrix = Schemas["Matrix"];
 export type Counts = Schemas["Counts"];
+export type RouteChoice = Schemas["RouteChoice"];
 export type VehicleInput = Schemas["VehicleInput"];
 /** Where vehicles can drive into the region. */
 export type Entry = Schemas["EntryPlace"];

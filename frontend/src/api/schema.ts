@@ -1778,11 +1778,18 @@ export interface components {
          *
          *     A place is one segment, or segments that are passed one after another, written
          *     ``r12>j54>r8``: two count those who go from one into the next, three or more a turn. Traffic is
-         *     made that reproduces the counts, of vehicles in the shares of ``mix``.
+         *     made that reproduces the counts, of vehicles in the shares of ``mix``; with ``use`` ``compare``
+         *     none is, and other traffic is held against them.
          */
         Counts: {
             /** Id */
             id: string;
+            /**
+             * Use
+             * @default generate
+             * @enum {string}
+             */
+            use: "generate" | "compare";
             mix: {
                 car?: number;
                 van?: number;
@@ -1975,6 +1982,8 @@ export interface components {
         /**
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
+         *
+         *     ``routes`` says how its trips choose their routes.
          */
         Demand: {
             /**
@@ -2012,6 +2021,18 @@ export interface components {
              * @default []
              */
             background: components["schemas"]["Background"][];
+            /**
+             * @default {
+             *       "by": "length",
+             *       "iterations": 20,
+             *       "gap": 0.01,
+             *       "interval": 900,
+             *       "informed": 0,
+             *       "period": 60,
+             *       "shares": []
+             *     }
+             */
+            routes: components["schemas"]["RouteChoice"];
         };
         /**
          * Detector
@@ -2254,7 +2275,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -3875,6 +3896,56 @@ export interface components {
             removable: string[];
         };
         /**
+         * RouteChoice
+         * @description How trips of inputs, matrices and background traffic choose their routes.
+         *
+         *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
+         *     ``iterations`` times, and each time some trips change to the route that was quickest, until
+         *     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
+         *     of ``interval`` seconds.
+         *
+         *     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
+         *     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
+         */
+        RouteChoice: {
+            /**
+             * By
+             * @default length
+             * @enum {string}
+             */
+            by: "length" | "travel_time";
+            /**
+             * Iterations
+             * @default 20
+             */
+            iterations: number;
+            /**
+             * Gap
+             * @default 0.01
+             */
+            gap: number;
+            /**
+             * Interval
+             * @default 900
+             */
+            interval: number;
+            /**
+             * Informed
+             * @default 0
+             */
+            informed: number;
+            /**
+             * Period
+             * @default 60
+             */
+            period: number;
+            /**
+             * Shares
+             * @default []
+             */
+            shares: components["schemas"]["SharedRoutes"][];
+        };
+        /**
          * RunContent
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
@@ -4231,7 +4302,16 @@ export interface components {
              *       "inputs": [],
              *       "matrices": [],
              *       "counts": [],
-             *       "background": []
+             *       "background": [],
+             *       "routes": {
+             *         "by": "length",
+             *         "gap": 0.01,
+             *         "informed": 0,
+             *         "interval": 900,
+             *         "iterations": 20,
+             *         "period": 60,
+             *         "shares": []
+             *       }
              *     }
              */
             demand: components["schemas"]["Demand"];
@@ -4451,6 +4531,11 @@ export interface components {
             kind: "set_counts";
             /** Id */
             id?: string;
+            /**
+             * Use
+             * @enum {string}
+             */
+            use?: "generate" | "compare";
             mix?: {
                 car?: number;
                 van?: number;
@@ -4675,6 +4760,34 @@ export interface components {
             shares: number[];
         };
         /**
+         * SetRoutesEdit
+         * @description Change how trips of the demand choose their routes.
+         */
+        SetRoutesEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_routes";
+            /**
+             * By
+             * @enum {string}
+             */
+            by?: "length" | "travel_time";
+            /** Iterations */
+            iterations?: number;
+            /** Gap */
+            gap?: number;
+            /** Interval */
+            interval?: number;
+            /** Informed */
+            informed?: number;
+            /** Period */
+            period?: number;
+            /** Shares */
+            shares?: components["schemas"]["SharedRoutes"][];
+        };
+        /**
          * SetSeedEdit
          * @description Set the random seed of the open goals and of the run.
          */
@@ -4805,6 +4918,23 @@ export interface components {
             zone: string;
             /** Segments */
             segments: string[];
+        };
+        /**
+         * SharedRoutes
+         * @description Trips from ``origin`` to ``destination`` are dealt out to routes by fixed shares.
+         *
+         *     Both are zones or segments. Each of ``routes`` is the segments it leads over and its share.
+         */
+        SharedRoutes: {
+            /** Origin */
+            origin: string;
+            /** Destination */
+            destination: string;
+            /** Routes */
+            routes: [
+                string[],
+                number
+            ][];
         };
         /**
          * ShownStates
@@ -6201,11 +6331,18 @@ export interface components {
          *
          *     A place is one segment, or segments that are passed one after another, written
          *     ``r12>j54>r8``: two count those who go from one into the next, three or more a turn. Traffic is
-         *     made that reproduces the counts, of vehicles in the shares of ``mix``.
+         *     made that reproduces the counts, of vehicles in the shares of ``mix``; with ``use`` ``compare``
+         *     none is, and other traffic is held against them.
          */
         "Counts-File": {
             /** Id */
             id: string;
+            /**
+             * Use
+             * @default generate
+             * @enum {string}
+             */
+            use?: "generate" | "compare";
             mix?: {
                 car?: number;
                 van?: number;
@@ -6289,6 +6426,8 @@ export interface components {
         /**
          * Demand
          * @description Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
+         *
+         *     ``routes`` says how its trips choose their routes.
          */
         "Demand-File": {
             /**
@@ -6326,6 +6465,18 @@ export interface components {
              * @default []
              */
             background?: components["schemas"]["Background-File"][];
+            /**
+             * @default {
+             *       "by": "length",
+             *       "iterations": 20,
+             *       "gap": 0.01,
+             *       "interval": 900,
+             *       "informed": 0,
+             *       "period": 60,
+             *       "shares": []
+             *     }
+             */
+            routes?: components["schemas"]["RouteChoice-File"];
         };
         /**
          * Detector
@@ -7111,6 +7262,56 @@ export interface components {
             width?: number | null;
         };
         /**
+         * RouteChoice
+         * @description How trips of inputs, matrices and background traffic choose their routes.
+         *
+         *     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
+         *     ``iterations`` times, and each time some trips change to the route that was quickest, until
+         *     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
+         *     of ``interval`` seconds.
+         *
+         *     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
+         *     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
+         */
+        "RouteChoice-File": {
+            /**
+             * By
+             * @default length
+             * @enum {string}
+             */
+            by?: "length" | "travel_time";
+            /**
+             * Iterations
+             * @default 20
+             */
+            iterations?: number;
+            /**
+             * Gap
+             * @default 0.01
+             */
+            gap?: number;
+            /**
+             * Interval
+             * @default 900
+             */
+            interval?: number;
+            /**
+             * Informed
+             * @default 0
+             */
+            informed?: number;
+            /**
+             * Period
+             * @default 60
+             */
+            period?: number;
+            /**
+             * Shares
+             * @default []
+             */
+            shares?: components["schemas"]["SharedRoutes-File"][];
+        };
+        /**
          * ServedStop
          * @description A stop on a line.
          *
@@ -7130,6 +7331,23 @@ export interface components {
              * @default null
              */
             dwell?: (components["schemas"]["Constant-File"] | components["schemas"]["Uniform-File"] | components["schemas"]["Normal-File"] | components["schemas"]["Choice-File"]) | null;
+        };
+        /**
+         * SharedRoutes
+         * @description Trips from ``origin`` to ``destination`` are dealt out to routes by fixed shares.
+         *
+         *     Both are zones or segments. Each of ``routes`` is the segments it leads over and its share.
+         */
+        "SharedRoutes-File": {
+            /** Origin */
+            origin: string;
+            /** Destination */
+            destination: string;
+            /** Routes */
+            routes: [
+                string[],
+                number
+            ][];
         };
         /**
          * SignalDetector
@@ -7800,7 +8018,16 @@ export interface components {
              *       "inputs": [],
              *       "matrices": [],
              *       "counts": [],
-             *       "background": []
+             *       "background": [],
+             *       "routes": {
+             *         "by": "length",
+             *         "gap": 0.01,
+             *         "informed": 0,
+             *         "interval": 900,
+             *         "iterations": 20,
+             *         "period": 60,
+             *         "shares": []
+             *       }
              *     }
              */
             demand?: components["schemas"]["Demand-File"];

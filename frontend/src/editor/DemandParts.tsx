@@ -144,7 +144,12 @@ export function CountsList({
   const where = `${count(counts.rows.length, "count")} at ${count(stations.length, "count station")}`;
   const note = `${where}, ${count(Math.round(total), "vehicle")} in total`;
   return (
-    <PartCard name={counts.id} what="Counts to be reproduced" note={note} onRemove={onRemove}>
+    <PartCard
+      name={counts.id}
+      what={counts.use === "compare" ? "Counts to compare with" : "Counts to be reproduced"}
+      note={note}
+      onRemove={onRemove}
+    >
       <MixFold mix={counts.mix} onChange={(mix) => onEdit({ kind: "set_counts", counts: counts.id, mix })} />
       <Group>
         <Button

@@ -4,9 +4,10 @@ import { useState } from "react";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { BackgroundForm } from "./BackgroundForm";
 import { InputForm, NewInput } from "./InputForm";
-import { freeName, secondsOfDay, timeOfDay } from "./demand";
+import { bringsTraffic, freeName, secondsOfDay, timeOfDay } from "./demand";
 import { CountsList, MatrixForm, ProfileList, ZoneList } from "./DemandParts";
 import type { Profiles } from "./DayProfiles";
+import { RoutesForm } from "./RoutesForm";
 import type { EditorStore } from "./store";
 import { TableForm } from "./TableForm";
 import { WholeDay } from "./WholeDay";
@@ -89,6 +90,7 @@ export function TrafficStep({
         />
       ))}
       {demand.zones.length > 0 && <ZoneList zones={demand.zones} onShow={onShow} onRemove={remove} />}
+      {bringsTraffic(demand) && <RoutesForm routes={demand.routes} onEdit={onEdit} />}
       <Stack gap={6}>
         <Button
           variant="default"

@@ -165,6 +165,11 @@ def find_entries(scenario: Scenario, graph: MapGraph) -> tuple[Entry, ...]:
     return entries(Region.of(graph, scenario.roi))
 
 
+def choose_routes(workspace: Workspace, scenario: Scenario, **fields: Any) -> Scenario:
+    """Say how trips choose their routes; ``fields`` are those of ``RouteChoice``."""
+    return edits.set_routes(scenario, map_of(workspace, scenario).sumo.graph, **fields)
+
+
 def add_background(
     workspace: Workspace, scenario: Scenario, *, name: str, **fields: Any
 ) -> Scenario:

@@ -19,6 +19,7 @@ from odscen.results.measures.registry import figure_values
 from odscen.results.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.measures.traffic_files import read_stations, read_tables
+from odscen.results.records.assignment_steps import Assignment
 from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Plan, events_from_json, rounded
@@ -130,7 +131,13 @@ def _page(
         lights=_lights(folder),
         visits=read_visits(folder),
         stations=stations,
+        assignment=_assignment(folder),
     )
+
+
+def _assignment(folder: Path) -> Assignment | None:
+    file = folder / layout.ASSIGNMENT_FILE
+    return Assignment.from_json(file.read_text(encoding="utf-8")) if file.is_file() else None
 
 
 def _lights(folder: Path) -> LightsOfRun | None:

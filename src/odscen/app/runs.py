@@ -25,7 +25,7 @@ from odscen.base.errors import in_file
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.problems import refuse_errors
 from odscen.sumo.realize.run_settings import AS_DESIGNED
-from odscen.sumo.runner.prepare import prepare
+from odscen.sumo.runner.assignment import prepare_assigned
 from odscen.sumo.runner.run_jobs import RunJob, run_prepared
 from odscen.sumo.runner.run_jobs import run_many as run_jobs
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from odscen.app.maps import LoadedMap
     from odscen.base.errors import InputError
+    from odscen.results.records.assignment_steps import AssignmentStep
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.realize.run_settings import RunSettings
@@ -144,16 +145,29 @@ def check_file(
         return check_run(workspace, scenario, name=name, out=out, settings=settings, entry=entry)
 
 
-def prepare_run(run: CheckedRun) -> PreparedRun:
+def prepare_run(
+    run: CheckedRun, *, iterated: Callable[[AssignmentStep], None] | None = None
+) -> PreparedRun:
     """Make everything that a run is made of; nothing is written yet.
+
+    Where the scenario wants routes by travel time, they are found by runs of their own first.
+
+    Parameters
+    ----------
+    iterated
+        Called after each of these runs.
 
     Raises
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
+    SimulationError
+        If a run that routes are found by fails.
     """
-    net = run.entry.checked("net")
-    return prepare(run.scenario, run.map.sumo, net, run.assets, settings=run.settings)
+    net, sumo_map = run.entry.checked("net"), run.map.sumo
+    return prepare_assigned(
+        run.scenario, sumo_map, net, run.assets, settings=run.settings, on_step=iterated
+    )
 
 
 def carry_out(
@@ -229,14 +243,14 @@ def run_all(
         Called with a run that cannot be prepared, and why; the others go on. Without it, the first
         such run ends all.
     tell
-        Called with what the user should know before a long run.
+        Called with what the user should know before a long run, and after each iteration of routes.
 
     Returns
     -------
     tuple of Run
         In the order of ``runs``, without those refused.
     """
-    jobs = [_job(run, report=reports) for run in runs]
+    jobs = [_job(run, report=reports, tell=tell) for run in runs]
     return run_jobs(
         jobs, processes=processes, progress=progress, done=done, refused=refused, tell=tell
     )
@@ -362,12 +376,16 @@ def run_many(
     return run_all(runs, processes=processes, progress=progress, done=done, tell=tell)
 
 
-def _job(run: CheckedRun, *, report: bool) -> RunJob:
+def _job(run: CheckedRun, *, report: bool, tell: Callable[[str], None] | None) -> RunJob:
     kept: list[LoadedMap] = []  # the map may be removed while the run goes on
 
     def get_ready() -> PreparedRun:
         kept.append(run.map)
-        return prepare_run(run)
+        return prepare_run(run, iterated=None if tell is None else iterated)
+
+    def iterated(step: AssignmentStep) -> None:
+        if tell is not None:
+            tell(f"{run.name}: {step.words}")
 
     def finish(folder: Path, summary: Mapping[str, Any]) -> None:
         write_report(folder, summary, loaded=kept.pop())

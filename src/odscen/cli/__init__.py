@@ -19,6 +19,7 @@ from odscen.base.version import __version__
 from odscen.cli.asset_commands import app as assets
 from odscen.cli.console import report_error, report_usage
 from odscen.cli.cosim_commands import cosim
+from odscen.cli.count_commands import correct, fit, routes
 from odscen.cli.demand_commands import app as demand
 from odscen.cli.demo_command import demo
 from odscen.cli.difference_commands import diff_maps, diff_scenarios
@@ -55,6 +56,9 @@ maps.command("diff")(diff_maps)
 maps.command("remove")(remove_map)
 app.add_typer(maps, name="maps")
 app.add_typer(assets, name="assets")
+demand.command()(routes)
+demand.command()(fit)
+demand.command()(correct)
 app.add_typer(demand, name="demand")
 app.add_typer(signals, name="signals")
 app.add_typer(transit, name="transit")

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
 from odscen.cli.scenario_commands import ScenarioArgument
-
-if TYPE_CHECKING:
-    from odscen.sumo.calibrate.count_fit import CountFits
 
 app = typer.Typer(
     help="Traffic from tables of trips and counts, or made up, and how well it fits counts.",
@@ -241,52 +238,6 @@ def weekday(
     log(f"Wrote {path}")
     if as_json:
         print_json({"file": str(path), **load._asdict()})
-
-
-@app.command()
-def fit(
-    what: Annotated[
-        Path, typer.Argument(help="Scenario, or folder of a run.", metavar="SCENARIO_OR_RUN")
-    ],
-    every: Annotated[bool, typer.Option("--all", help="Show the counts that are met too.")] = False,
-    workspace: WorkspaceOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Compare traffic with the counts of its scenario: GEH and RMSE; what is not met and why.
-
-    Of a scenario, traffic as planned, without congestion; of a run, as simulated.
-    """
-    from odscen.app import demands
-    from odscen.workspace.store import Workspace
-
-    found = demands.fit(Workspace.open(workspace), what)
-    if as_json:
-        print_json({"file": str(what), **found.to_dict()})
-        return
-    show_fit(found, every=every)
-
-
-def show_fit(found: CountFits, *, every: bool) -> None:
-    """Print a fit for people."""
-    rows = [row for row in found.rows if every or not row.met]
-    if rows:
-        print_table(
-            "",
-            ("place", "from, s", "to, s", "counted", "traffic", "GEH", "why not"),
-            [
-                (row.place, row.begin, row.end, row.counted, row.modelled, row.geh, row.why)
-                for row in rows
-            ],
-        )
-    for message in found.contradictions:
-        log(f"contradictory: {message}")
-    met = sum(row.met for row in found.rows)
-    log(
-        f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "
-        f"{found.rmse or 0:.2f} vehicles; {found.vehicles} vehicles ({found.source}), "
-        f"{sum(row.counted for row in found.rows):g} passages counted, "
-        f"{sum(row.modelled for row in found.rows)} made"
-    )
 
 
 def parse_mix(text: str) -> dict[str, float]:

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 
 NO_PREDECESSOR = -9999
+FEW = 100
+"""Sources that are followed one by one: numpy would take a step of all of them no faster."""
 
 
 class PathsTo:
@@ -42,6 +44,8 @@ class PathsTo:
 
     def paths(self, sources: Int32Array) -> list[Int32Array]:
         """Nodes of the path from each source, both ends included; empty where there is none."""
+        if len(sources) <= FEW:
+            return [self._path(int(start)) for start in self._local[sources]]
         current = self._local[sources]
         steps = [current]
         counts = np.ones(len(sources), dtype=np.intp)
@@ -52,6 +56,14 @@ class PathsTo:
         counts[~np.isfinite(self.distances[steps[0]])] = 0
         table = self.nodes[np.stack(steps, axis=1)].astype(np.int32)
         return [row[:count] for row, count in zip(table, counts.tolist(), strict=True)]
+
+    def _path(self, start: int) -> Int32Array:
+        if not np.isfinite(self.distances[start]):
+            return np.empty(0, dtype=np.int32)
+        steps, after = [start], self._next.item
+        while (step := after(steps[-1])) != NO_PREDECESSOR:
+            steps.append(step)
+        return self.nodes[steps].astype(np.int32)
 
     def stretches(
         self, sources: NDArray[np.integer], marks: Int32Array

@@ -244,16 +244,30 @@ class Router(_PathFinder):
         The map.
     mask
         Lane-graph nodes of the region, shape ``(N,)``; ``None`` for the whole map.
+    costs
+        What is to be least instead of the length, for each edge, shape ``(E,)``; distances are sums
+        of it.
     """
 
-    def __init__(self, graph: MapGraph, mask: BoolArray | None = None) -> None:
+    def __init__(
+        self,
+        graph: MapGraph,
+        mask: BoolArray | None = None,
+        *,
+        costs: FloatArray | None = None,
+    ) -> None:
         lanes = graph.lanes
+        length = lanes.length if costs is None else costs
         super().__init__(
-            len(lanes.x), lanes.source, lanes.target, lanes.length, lanes.lane, mask, directed=True
+            len(lanes.x), lanes.source, lanes.target, length, lanes.lane, mask, directed=True
         )
         self._graph = graph
         inside_junction = np.array([name is not None for name in lanes.lanes.junctions], np.bool_)
         self._in_junction = inside_junction[lanes.lane]
+
+    def with_costs(self, costs: FloatArray) -> Router:
+        """Router of the same region by another cost of each edge, shape ``(E,)``."""
+        return Router(self._graph, self.mask, costs=costs)
 
     def is_terminal(self, node: int) -> bool:
         """Whether no edge leaves ``node`` inside the region."""

@@ -52,6 +52,8 @@ class PlannedActor:
         Id of the flow it belongs to, if any.
     problem
         Why it is not in the SUMO files, if it is not.
+    informed
+        Whether it looks for quicker routes on the way.
     """
 
     id: str
@@ -73,6 +75,7 @@ class PlannedActor:
     flow: str | None = None
     ego: bool = False
     problem: str | None = None
+    informed: bool = False
 
     @property
     def person(self) -> bool:

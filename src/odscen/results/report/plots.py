@@ -190,8 +190,16 @@ def dot_chart(
         for values, name in ((x, x_label), (y, y_label))
     )
     frame = ChartFrame(x_axis, y_axis, height=360.0)
+    parts = dot_parts(frame, groups, joined=joined)
+    entries = [(dots.style, dots.label) for dots in groups]
+    return chart(frame, parts, description=description, keys=legend(entries))
+
+
+def dot_parts(frame: ChartFrame, groups: Sequence[Dots], *, joined: bool = False) -> list[Markup]:
+    """Dots of a chart, and the thin line that joins them in their order if wanted."""
     parts = []
     if joined:
+        x, y = (np.concatenate([getattr(dots, key) for dots in groups]) for key in ("x", "y"))
         parts.append(element("path", d=_line_data(frame, x, y), class_="trail"))
     for dots in groups:
         circles = []
@@ -200,8 +208,7 @@ def dot_chart(
             words = element("title", title) if title else None
             circles.append(element("circle", words, cx=number(a, 1), cy=number(b, 1), r=4))
         parts.append(element("g", *circles, class_=f"dots {dots.style}"))
-    entries = [(dots.style, dots.label) for dots in groups]
-    return chart(frame, parts, description=description, keys=legend(entries))
+    return parts
 
 
 @dataclass(frozen=True, slots=True)

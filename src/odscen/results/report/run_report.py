@@ -22,6 +22,7 @@ from odscen.results.report.plots import Series, line_chart
 from odscen.results.report.report_brief import brief_section
 from odscen.results.report.report_conflicts import conflict_section
 from odscen.results.report.report_corridor import corridor_section
+from odscen.results.report.report_demand import assignment_section
 from odscen.results.report.report_emissions import emission_section
 from odscen.results.report.report_figures import key_figure_section
 from odscen.results.report.report_flow import diagram_section, flow_section
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from odscen.results.measures.gridlock import Incident
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.measures.usability import Usability
+    from odscen.results.records.assignment_steps import Assignment
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
@@ -73,6 +75,7 @@ def render_report(
     lights: LightsOfRun | None = None,
     visits: pl.DataFrame | None = None,
     stations: pl.DataFrame | None = None,
+    assignment: Assignment | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -107,6 +110,8 @@ def render_report(
         Visits of stops, if the scenario has lines of public transport.
     stations
         What the stations of the study counted, if it has any.
+    assignment
+        How routes by travel time were found, if the scenario wants such.
 
     Returns
     -------
@@ -137,6 +142,7 @@ def render_report(
             corridor_section(corridor) if corridor is not None else None,
             signal_section(lights, given, drawing=drawing) if lights is not None else None,
             transit_section(visits, given) if visits is not None else None,
+            assignment_section(assignment) if assignment is not None else None,
             _speed_section(traces, end),
             _progress_section(actors, end),
             conflict_section(conflicts) if conflicts is not None else None,

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from odscen.base.shown import some_of
+from odscen.scenario.checks.demand_route_checks import route_problems
 from odscen.scenario.checks.input_checks import input_problems
 from odscen.scenario.checks.window_checks import foot_problems, window_problems
 from odscen.scenario.demand.count_stations import contradictions, transitions
@@ -31,6 +32,7 @@ def demand_problems(scenario: Scenario, region: Region) -> Iterator[Problem]:
     yield from _zone_problems(demand, region)
     yield from _profile_problems(scenario)
     yield from input_problems(scenario, region)
+    yield from route_problems(scenario, region)
     for index, matrix in enumerate(demand.matrices):
         where = f"demand.matrices[{index}]"
         yield from window_problems(scenario, matrix, where)

@@ -17,6 +17,7 @@ from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.parameters_document import Parameter, ParameterName
+from odscen.scenario.document.routes_document import RouteChoice
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.study_document import Study
@@ -158,10 +159,12 @@ class Counts(Part):
 
     A place is one segment, or segments that are passed one after another, written
     ``r12>j54>r8``: two count those who go from one into the next, three or more a turn. Traffic is
-    made that reproduces the counts, of vehicles in the shares of ``mix``.
+    made that reproduces the counts, of vehicles in the shares of ``mix``; with ``use`` ``compare``
+    none is, and other traffic is held against them.
     """
 
     id: Identifier
+    use: Literal["generate", "compare"] = "generate"
     mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
     rows: Annotated[tuple[tuple[Label, Seconds, Seconds, Number], ...], Field(min_length=1)]
 
@@ -217,7 +220,10 @@ class VehicleInput(Window):
 
 
 class Demand(Part):
-    """Traffic around the placed actors; ``clock`` is the time of day at the start, seconds."""
+    """Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
+
+    ``routes`` says how its trips choose their routes.
+    """
 
     clock: Annotated[float, Field(ge=0, lt=86_400)] = 0.0
     zones: tuple[Zone, ...] = ()
@@ -226,6 +232,7 @@ class Demand(Part):
     matrices: tuple[Matrix, ...] = ()
     counts: tuple[Counts, ...] = ()
     background: tuple[Background, ...] = ()
+    routes: RouteChoice = RouteChoice()
 
     @property
     def parts(self) -> tuple[tuple[str, VehicleInput | Matrix | Counts | Background], ...]:

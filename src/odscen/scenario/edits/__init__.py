@@ -22,6 +22,7 @@ from odscen.scenario.edits.demand_edits import (
     set_input,
     set_matrix,
     set_profile,
+    set_routes,
     set_zone,
 )
 from odscen.scenario.edits.flow_edits import add_flow, change_flow, remove_flow
@@ -73,6 +74,7 @@ __all__ = [
     "set_line",
     "set_matrix",
     "set_profile",
+    "set_routes",
     "set_seed",
     "set_signal_control",
     "set_simulation",

@@ -9,6 +9,7 @@ from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
 from odscen.scenario.document.document_parts import Identifier  # noqa: TC001 (read at run time)
 from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.routes_document import RouteChoice
 from odscen.scenario.document.scenario_document import (
     Background,
     Counts,
@@ -35,6 +36,28 @@ _Part = TypeVar("_Part", bound=Zone | Profile | VehicleInput | Matrix | Counts |
 def set_clock(scenario: Scenario, *, clock: float) -> Scenario:
     """Set the time of day at the start of the run, seconds after midnight."""
     return _changed(scenario, clock=clock)
+
+
+@edit("Routes of trips")
+def set_routes(
+    scenario: Scenario, graph: MapGraph, **fields: Annotated[Any, RouteChoice]
+) -> Scenario:
+    """Change how trips of the demand choose their routes.
+
+    Parameters
+    ----------
+    fields
+        Fields of :class:`~odscen.scenario.document.routes_document.RouteChoice`, such as ``by``;
+        those not given stay as they are.
+
+    Raises
+    ------
+    ScenarioError
+        If a zone or segment is unknown or outside the region.
+    """
+    old = scenario.demand.routes
+    kept = {name: getattr(old, name) for name in RouteChoice.model_fields}
+    return _checked(_changed(scenario, routes=validated(RouteChoice, {**kept, **fields})), graph)
 
 
 @edit("Zone {zone}")

@@ -13,6 +13,7 @@ from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.counted_traffic import routes_past
 from odscen.sumo.realize.passages import planned_passages, seen_passages
 from odscen.sumo.realize.realization import all_road_users
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
@@ -102,7 +103,8 @@ def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:
     users, _ = all_road_users(scenario, sumo_map, region, until=scenario.simulation.duration)
     ground = TripEnds(region, usable_places(sumo_map))
     seen = observations(scenario.demand)
-    passages = planned_passages(users, region, ground.router, seen)
+    routes = RoutesOfDemand(scenario, region, ground.router)
+    passages = planned_passages(users, region, ground.router, seen, routes=routes)
     vehicles = sum(not user.person for user in users)
     return _fit(scenario, sumo_map, passages, source="planned", vehicles=vehicles)
 
@@ -122,13 +124,7 @@ def _fit(
     source: str,
     vehicles: int,
 ) -> CountFits:
-    opposed: dict[tuple[str, str, float, float], str] = {}
-    problems: list[str] = []
-    for part in scenario.demand.counts:
-        for one in contradictions(part, sumo_map.graph):
-            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
-            for place in one.places:
-                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+    opposed, problems = counts_apart(scenario, sumo_map)
     passable = _Passable(scenario, sumo_map)
     rows = []
     for name, place, begin, end, counted in observations(scenario.demand):
@@ -142,7 +138,26 @@ def _fit(
             if not why:
                 why = _otherwise(modelled, counted, source)
         rows.append(CountFit(name, place, begin, end, counted, modelled, value, why))
-    return CountFits(source, tuple(rows), vehicles, tuple(problems))
+    return CountFits(source, tuple(rows), vehicles, problems)
+
+
+class CountsApart(NamedTuple):
+    """Counts that contradict each other: why, by set, place, begin and end; and all in words."""
+
+    by_count: dict[tuple[str, str, float, float], str]
+    words: tuple[str, ...]
+
+
+def counts_apart(scenario: Scenario, sumo_map: SumoMap) -> CountsApart:
+    """Find counts of a scenario that cannot be right together."""
+    opposed: dict[tuple[str, str, float, float], str] = {}
+    problems: list[str] = []
+    for part in scenario.demand.counts:
+        for one in contradictions(part, sumo_map.graph):
+            problems.append(f"{one.counts}, {one.begin:g} to {one.end:g} s: {one.message}")
+            for place in one.places:
+                opposed.setdefault((one.counts, place, one.begin, one.end), one.message)
+    return CountsApart(opposed, tuple(problems))
 
 
 def _otherwise(modelled: float, counted: float, source: str) -> str:

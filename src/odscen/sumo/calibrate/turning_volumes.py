@@ -14,7 +14,7 @@ from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.placing.region import Region
 from odscen.sumo.realize.driving import KINDS
 from odscen.sumo.realize.realization import all_road_users
-from odscen.sumo.realize.route_paths import each_path
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.route_planner import NoRouteError, RoutePlanner
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def planned_vehicles(scenario: Scenario, sumo_map: SumoMap) -> Iterator[PlannedV
     vehicles = [user for user in users if not user.person]
     router = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
     planner = RoutePlanner(sumo_map.graph.lanes, sumo_map.net, sumo_map.lane_places)
-    for index, path in each_path(vehicles, region, router):
+    for index, path in RoutesOfDemand(scenario, region, router).each_path(vehicles):
         user = vehicles[index]
         vclass = KINDS[user.category].vclass
         try:

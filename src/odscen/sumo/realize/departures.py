@@ -22,6 +22,7 @@ from odscen.scenario.placing.region import place_of
 from odscen.sumo.realize.counted_traffic import counted_trips
 from odscen.sumo.realize.passages import planned_passages
 from odscen.sumo.realize.road_user import RoadUser
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -140,11 +141,13 @@ def demand_users(
         add(matrix_trips(scenario, ground, matrix))
     for background in scenario.demand.background:
         add(background_trips(scenario, ground, background, usable))
-    if scenario.demand.counts:
+    generated = [one for one in scenario.demand.counts if one.use == "generate"]
+    if generated:
         others = [*placed, *users]
         seen = observations(scenario.demand)
-        passages = planned_passages(others, region, ground.router, seen)
-        for counts in scenario.demand.counts:
+        routes = RoutesOfDemand(scenario, region, ground.router)
+        passages = planned_passages(others, region, ground.router, seen, routes=routes)
+        for counts in generated:
             add(counted_trips(scenario, ground, counts, passages))
     return users, unmet
 

@@ -13,15 +13,17 @@ from odscen.scenario.demand.count_stations import Passing, transitions
 from odscen.sumo.realize.route_paths import each_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import polars as pl
 
+    from odscen.base.arrays import Int32Array
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
     from odscen.lanegraph.shortest_paths import Router
     from odscen.scenario.demand.count_stations import Observation
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
+    from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
     from odscen.sumo.realize.sumo_map import SumoMap
 
 Passages = Counter[tuple[str, float, float]]
@@ -32,20 +34,37 @@ UNKNOWN_LIMIT = 13.89
 
 
 def planned_passages(
-    users: Sequence[RoadUser], region: Region, drivable: Router, seen: Sequence[Observation]
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    seen: Sequence[Observation],
+    *,
+    routes: RoutesOfDemand | None = None,
 ) -> Passages:
-    """Count vehicles at the places of observations, as they would pass without congestion."""
+    """Count vehicles at the places of observations, as they would pass without congestion.
+
+    Parameters
+    ----------
+    routes
+        Those that trips choose; the shortest if not given.
+    """
     passing = Passing(region.graph, [one.place for one in seen])
     clock = _Slices(seen)
     found: Passages = Counter()
-    for _, passed in each_passing(users, region, drivable, passing):
+    for _, passed in each_passing(users, region, drivable, passing, routes=routes):
         for place, time in passed:
             clock.count(found, passing.places[place], time)
     return found
 
 
 def each_passing(
-    users: Sequence[RoadUser], region: Region, drivable: Router, passing: Passing
+    users: Sequence[RoadUser],
+    region: Region,
+    drivable: Router,
+    passing: Passing,
+    *,
+    routes: RoutesOfDemand | None = None,
+    assigned: Mapping[str, Int32Array] | None = None,
 ) -> Iterator[tuple[RoadUser, list[tuple[int, float]]]]:
     """Yield vehicles with the places that they pass, by number, and when, with a free road.
 
@@ -53,7 +72,11 @@ def each_passing(
     """
     lanes = region.graph.lanes
     vehicles = [user for user in users if not user.person]
-    for index, path in each_path(vehicles, region, drivable):
+    if routes is None:
+        found = each_path(vehicles, region, drivable)
+    else:
+        found = routes.each_path(vehicles, assigned=assigned)
+    for index, path in found:
         if len(path):
             segment = lanes.segment[path]
             first = np.flatnonzero(np.diff(segment, prepend=-1))

@@ -42,7 +42,7 @@ from odscen.sumo.realize.light_views import scenario_lights
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.program_files import signals_xml
 from odscen.sumo.realize.recording import region_xml
-from odscen.sumo.realize.route_paths import each_path
+from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.route_planner import NoRouteError, Route, RoutePlanner
 from odscen.sumo.realize.routes_file import RoutesFile
 from odscen.sumo.realize.rules.story_files import story_plan
@@ -117,6 +117,7 @@ def realize(
     assets: ModelSizes | None = None,
     *,
     settings: RunSettings = AS_DESIGNED,
+    assigned: Mapping[str, Int32Array] | None = None,
 ) -> Realization:
     """Derive SUMO files and plan from a scenario.
 
@@ -127,6 +128,8 @@ def realize(
         their category's and only single parameters of the environment count.
     settings
         How it is run; what they leave open is the scenario's own.
+    assigned
+        Paths on the lane graph of trips whose routes were found before, by the trip's id.
 
     Raises
     ------
@@ -135,9 +138,7 @@ def realize(
         traffic light that is not possible.
     """
     refuse_errors(signal_problems(scenario.signals, scenario_lights(sumo_map)))
-    if settings.seed is not None:
-        scenario = scenario.model_copy(update={"seed": settings.seed})
-    scenario = redrawn(scenario, settings.redraw)
+    scenario = as_run(scenario, settings)
     recording, (until, step_length) = settings.recorded, settings.times(scenario)
     analysis = settings.analysis(scenario)
     stations, unplaced = planned_stations(scenario, sumo_map)
@@ -155,6 +156,7 @@ def realize(
     stops = stop_places(scenario, sumo_map)
     writer = _Writer(sumo_map, region, assets, scenario, effect, demand, step_length, stops)
     writer.actions = actions
+    writer.assigned = assigned or {}
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -204,6 +206,13 @@ def realize(
     )
 
 
+def as_run(scenario: Scenario, settings: RunSettings) -> Scenario:
+    """Give a scenario the seed of its run, and what that draws anew."""
+    if settings.seed is not None:
+        scenario = scenario.model_copy(update={"seed": settings.seed})
+    return redrawn(scenario, settings.redraw)
+
+
 def _run_files(
     plan: Plan,
     settings: RunSettings,
@@ -227,6 +236,7 @@ def _run_files(
         signals=signals is not None,
         stops=stops,
         closures=closures is not None,
+        informed=any(actor.informed for actor in plan.actors),
         recording=recording,
         measures=True,
         meso=settings.meso,
@@ -320,8 +330,8 @@ class _Writer:
         self.problems: list[str] = []
         self.notes: list[str] = []
         self.actions = MeasureActions()
+        self.assigned: Mapping[str, Int32Array] = {}
         self._graph = graph
-        self._net = sumo_map.net
         self._region = region
         self._assets = assets
         self._scenario = scenario
@@ -332,6 +342,8 @@ class _Writer:
         self._net, self._lane_places = sumo_map.net, sumo_map.lane_places
         self._drivable = Router(graph, region.lanes & sumo_map.drivable)
         self._routes = RoutePlanner(graph.lanes, sumo_map.net, sumo_map.lane_places)
+        self._ways = RoutesOfDemand(scenario, region, self._drivable)
+        self._period = scenario.demand.routes.period
         self._walks = WalkPlanner(graph.walks, sumo_map.net, sumo_map.walk_places)
 
     def add(self, users: Sequence[RoadUser]) -> tuple[PlannedActor, ...]:
@@ -342,7 +354,7 @@ class _Writer:
         bodies = [self._body(user) for user in users]
         drivers = [self._driver(*pair) for pair in zip(users, bodies, strict=True)]
         routes: dict[int, _PlannedRoute] = {}
-        for index, path in each_path(users, self._region, self._drivable, bodies):
+        for index, path in self._ways.each_path(users, bodies, self.assigned):
             routes[index] = self._plan_route(users[index], bodies[index], drivers[index], path)
         return tuple(
             self._write(user, body, behaviour, routes[index])
@@ -393,6 +405,7 @@ class _Writer:
                     planned.route,
                     bays=self._bays,
                     speed=self._initial_speed(user, behaviour),
+                    looks_every=self._period if self._ways.informed(user) else None,
                 )
             self.notes += [f"{user.id}: {repair.words}" for repair in planned.route.repairs]
         return self._planned(user, body, behaviour, planned)
@@ -456,6 +469,7 @@ class _Writer:
             flow=user.flow,
             ego=user.design.ego,
             problem=planned.problem,
+            informed=self._ways.informed(user),
         )
 
     def _steps(self, user: RoadUser, path: Int32Array) -> np.ndarray:

@@ -24,7 +24,7 @@ from odscen.scenario.placing.spawn_room import LANE_CHANGE
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from odscen.base.arrays import BoolArray, Int32Array
+    from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph
     from odscen.lanegraph.paths_to_goal import PathsTo
@@ -43,6 +43,8 @@ def each_path(
     region: Region,
     drivable: Router,
     bodies: Sequence[Body] | None = None,
+    *,
+    quickest: CostRouter | None = None,
 ) -> Iterator[tuple[int, Int32Array]]:
     """Yield the position of each user and the nodes of its route inside the region.
 
@@ -54,6 +56,8 @@ def each_path(
     ----------
     bodies
         Of the users; those of their categories if not given.
+    quickest
+        What vehicles of the demand choose their routes by, instead of the length.
     """
     if bodies is None:
         bodies = [DEFAULT_BODY[user.category] for user in users]
@@ -77,16 +81,86 @@ def each_path(
         for index in group:
             path = paths.get(index, _NOWHERE)
             yield index, _through(path, users[index].places, drivable) if len(path) else path
+    ways = quickest or CostRouter(drivable, region.graph.lanes)
+    yield from _paths_of_trips(users, by_goal, region, ways, bodies)
+
+
+def _paths_of_trips(
+    users: Sequence[RoadUser],
+    by_goal: Mapping[tuple[bool, int], Sequence[int]],
+    region: Region,
+    ways: CostRouter,
+    bodies: Sequence[Body],
+) -> Iterator[tuple[int, Int32Array]]:
     for (person, goal), group in by_goal.items():
-        there = (region.walk_router if person else drivable).paths_to(goal)
+        if not person:
+            yield from ways.paths_to(goal, {index: users[index].spawn for index in group}, bodies)
+            continue
+        there = region.walk_router.paths_to(goal)
         for first in range(0, len(group), TOGETHER):
             part = group[first : first + TOGETHER]
-            spawns = [users[index].spawn for index in part]
+            begun = [[_Lead((users[index].spawn,), 0.0, 0.0)] for index in part]
+            yield from zip(part, _to_goal(goal, begun, there), strict=True)
+
+
+class CostRouter:
+    """Best paths of trips by length or another cost, of those that lead straight on at first.
+
+    Parameters
+    ----------
+    router
+        Of the lanes that SUMO has.
+    lanes
+        The lane graph.
+    costs
+        Those of the router, shape ``(E,)``; the lengths if not given.
+    """
+
+    def __init__(self, router: Router, lanes: LaneGraph, costs: FloatArray | None = None) -> None:
+        self._router = router
+        self._leads = _Leads(lanes, costs)
+
+    def paths_to(
+        self, goal: int, spawns: Mapping[int, int], bodies: Sequence[Body]
+    ) -> Iterator[tuple[int, Int32Array]]:
+        """Yield the nodes of the path of each trip to a goal; ``spawns`` by the trip's index."""
+        there = self._router.paths_to(goal)
+        group = list(spawns)
+        for first in range(0, len(group), TOGETHER):
+            part = group[first : first + TOGETHER]
             begun = [
-                [_Lead((spawn,), 0.0)] if person else leads.of(spawn, bodies[index], drivable.mask)
-                for index, spawn in zip(part, spawns, strict=True)
+                self._leads.of(spawns[index], bodies[index], self._router.mask) for index in part
             ]
             yield from zip(part, _to_goal(goal, begun, there), strict=True)
+
+    def path_over(
+        self, spawn: int, body: Body, places: Sequence[Int32Array], goal: int
+    ) -> Int32Array:
+        """Nodes of a path to the goal that passes a node of each of some places, in their order.
+
+        Each is passed where the way to there and on to the goal is least. Empty if there is none.
+        """
+        if not self._router.mask[spawn] or not self._router.mask[goal]:
+            return _NOWHERE
+        onwards = self._router.paths_to(goal)
+        for lead in self._leads.of(spawn, body, self._router.mask):
+            path = np.array(lead.nodes, dtype=np.int32)
+            for nodes in (*places, np.array([goal], dtype=np.int32)):
+                inside = nodes[self._router.mask[nodes]]
+                if not len(inside):
+                    return _NOWHERE
+                ahead = self._router.distances(int(path[-1]))[inside] + onwards.distance(inside)
+                nearest = int(np.argmin(ahead))
+                if not math.isfinite(ahead[nearest]):
+                    break
+                path = _joined_paths(path, self._router.path(int(path[-1]), int(inside[nearest])))
+            else:
+                return path
+        return _NOWHERE
+
+
+def _joined_paths(one: Int32Array, other: Int32Array) -> Int32Array:
+    return np.concatenate([one, other[1:]])
 
 
 def _through(path: Int32Array, places: Sequence[int], router: Router) -> Int32Array:
@@ -95,22 +169,24 @@ def _through(path: Int32Array, places: Sequence[int], router: Router) -> Int32Ar
         further = router.path(here, there)
         if not len(further):
             return _NOWHERE
-        path = np.concatenate([path, further[1:]])
+        path = _joined_paths(path, further)
     return path
 
 
 class _Lead(NamedTuple):
-    """A way straight on from a spawn: its nodes, from the spawn on, and its length, metres."""
+    """A path straight on from a spawn: its nodes, from the spawn on, its metres and its cost."""
 
     nodes: tuple[int, ...]
     metres: float
+    cost: float
 
 
 class _Leads:
     """Ways straight on from spawns, on which no vehicle changes lanes yet."""
 
-    def __init__(self, lanes: LaneGraph) -> None:
+    def __init__(self, lanes: LaneGraph, costs: FloatArray | None = None) -> None:
         follows = lanes.relation == Relation.SUCCESSOR  # edges are in the order of their sources
+        self._cost = (lanes.length if costs is None else costs)[follows]
         self._target, self._length = lanes.target[follows], lanes.length[follows]
         self._first = np.searchsorted(lanes.source[follows], np.arange(len(lanes.x) + 1))
 
@@ -118,7 +194,7 @@ class _Leads:
         """Straight paths of a vehicle that departs, inside the mask, and last the spawn alone."""
         least = body.length / 2.0 + LANE_CHANGE
         found: list[_Lead] = []
-        open_ = [_Lead((spawn,), 0.0)]
+        open_ = [_Lead((spawn,), 0.0, 0.0)]
         while open_:
             lead = open_.pop()
             if lead.metres >= least:
@@ -126,11 +202,15 @@ class _Leads:
                 continue
             first, end = self._first[lead.nodes[-1] : lead.nodes[-1] + 2].tolist()
             open_ += [
-                _Lead((*lead.nodes, int(self._target[k])), lead.metres + float(self._length[k]))
+                _Lead(
+                    (*lead.nodes, int(self._target[k])),
+                    lead.metres + float(self._length[k]),
+                    lead.cost + float(self._cost[k]),
+                )
                 for k in range(first, end)
                 if mask[self._target[k]]
             ]
-        return [*found, _Lead((spawn,), 0.0)]
+        return [*found, _Lead((spawn,), 0.0, 0.0)]
 
 
 def _from_spawn(
@@ -149,7 +229,7 @@ def _from_spawn(
     chosen = {
         index: _best(
             goals[index],
-            [(lead, lead.metres + float(metres[lead.nodes[-1]][goals[index]])) for lead in mine],
+            [(lead, lead.cost + float(metres[lead.nodes[-1]][goals[index]])) for lead in mine],
         )
         for index, mine in begun.items()
     }
@@ -163,16 +243,14 @@ def _from_spawn(
 def _to_goal(goal: int, begun: Sequence[Sequence[_Lead]], there: PathsTo) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
     ends = np.array([lead.nodes[-1] for leads in begun for lead in leads], dtype=np.int32)
-    metres = iter(there.distance(ends).tolist())
-    chosen = [
-        _best(goal, [(lead, lead.metres + next(metres)) for lead in leads]) for leads in begun
-    ]
+    costs = iter(there.distance(ends).tolist())
+    chosen = [_best(goal, [(lead, lead.cost + next(costs)) for lead in leads]) for leads in begun]
     paths = there.paths(np.array([lead.nodes[-1] for lead in chosen], dtype=np.int32))
     return [_joined(lead, path) for lead, path in zip(chosen, paths, strict=True)]
 
 
 def _best(goal: int, leads: Sequence[tuple[_Lead, float]]) -> _Lead:
-    """Lead with the shortest way in all; the last, which is no lead, where no other leads there."""
+    """Lead with the best path in all; the last, which is no lead, where no other leads there."""
     *ahead, (none, _) = leads
     fit = [pair for pair in ahead if math.isfinite(pair[1]) and goal not in pair[0].nodes]
     return min(fit, key=lambda pair: pair[1])[0] if fit else none

@@ -70,6 +70,7 @@ class RoutesFile:
         *,
         bays: Collection[str] = (),
         speed: float = 0.0,
+        looks_every: float | None = None,
     ) -> None:
         """Add a vehicle that drives ``route``.
 
@@ -79,6 +80,8 @@ class RoutesFile:
             Stops at which vehicles stand beside the lane.
         speed
             At departure, m/s, of one that does not enter from outside.
+        looks_every
+            Seconds after which the driver looks for a quicker route again; ``None`` is never.
         """
         attributes = [
             ("id", user.id),
@@ -103,6 +106,7 @@ class RoutesFile:
             f"    <vehicle{_xml(attributes)}>",
             f'        <route edges="{" ".join(route.edges)}"/>',
             *(_stop(visit, bay=visit.stop in bays) for visit in user.visits),
+            *_rerouting(looks_every),
             "    </vehicle>",
         ]
         self._lines.append((user.depart, user.id, lines))
@@ -169,6 +173,14 @@ class RoutesFile:
             if category == Category.PEDESTRIAN:
                 self._on_foot.add(name)
         return name
+
+
+def _rerouting(period: float | None) -> list[str]:
+    """Parameters of a vehicle with SUMO's rerouting device; they outlive a saved state."""
+    if period is None:
+        return []
+    given = (("has.rerouting.device", "true"), ("device.rerouting.period", f"{period:g}"))
+    return [f"        <param{_xml([('key', key), ('value', value)])}/>" for key, value in given]
 
 
 def _stop(visit: StopVisit, *, bay: bool) -> str:

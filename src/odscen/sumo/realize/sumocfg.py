@@ -44,6 +44,19 @@ SSM_OPTIONS = {
 """What the SSM device measures; range in metres."""
 
 
+REROUTING = {
+    "device.rerouting.probability": "0",
+    "device.rerouting.pre-period": "0",
+    "device.rerouting.adaptation-interval": "10",
+    "device.rerouting.adaptation-steps": "18",
+    "device.rerouting.threshold.factor": "1.1",
+}
+"""Which drivers have the device is said at each; nothing is looked for before the departure.
+
+Travel times are means of the last 3 min, and a route is changed for one that is a tenth quicker.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class SumocfgSettings:
     """What a sumocfg says.
@@ -74,6 +87,8 @@ class SumocfgSettings:
         Whether ``measures.add.xml`` is there, which makes SUMO measure lanes.
     meso
         Queues on road sections instead of single vehicles that follow each other: for scale.
+    informed
+        Whether there are drivers who look for quicker routes on the way.
     """
 
     until: float
@@ -90,6 +105,7 @@ class SumocfgSettings:
     recording: Recording = field(default_factory=Recording)
     measures: bool = False
     meso: bool = False
+    informed: bool = False
 
 
 def sumo_config(settings: SumocfgSettings) -> str:
@@ -134,6 +150,8 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "xml-validation": "never",
         },
     }
+    if settings.informed:
+        sections["routing"] = REROUTING
     if recording.criticality:
         sections["ssm_device"] = {**SSM_OPTIONS, "device.ssm.file": SSM_FILE}
     if settings.meso:

@@ -12,8 +12,10 @@ from odscen.sumo.runner.forecast import forecast
 from odscen.sumo.runner.run_folder import PreparedRun
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.base.arrays import Int32Array
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.realization import ModelSizes
     from odscen.sumo.realize.run_settings import RunSettings
@@ -33,6 +35,8 @@ def prepare(
     assets: ModelSizes | None = None,
     *,
     settings: RunSettings = AS_DESIGNED,
+    assigned: Mapping[str, Int32Array] | None = None,
+    assignment_json: str | None = None,
 ) -> PreparedRun:
     """Realize a scenario and put together what its run folder will hold.
 
@@ -47,13 +51,17 @@ def prepare(
         See :func:`odscen.sumo.realize.realization.realize`.
     settings
         How it is run. A run in slices can be resumed.
+    assigned
+        See :func:`odscen.sumo.realize.realization.realize`.
+    assignment_json
+        How these routes were found, kept in the run folder.
 
     Raises
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
     """
-    realization = realize(scenario, sumo_map, assets, settings=settings)
+    realization = realize(scenario, sumo_map, assets, settings=settings, assigned=assigned)
     plan = realization.plan
     return PreparedRun(
         plan=plan,
@@ -61,6 +69,7 @@ def prepare(
         net=net,
         settings=settings,
         scenario_json=dumps(scenario),
+        assignment_json=assignment_json,
         problems=realization.problems,
         notes=((MESO_NOTE,) if settings.meso else ()) + realization.notes,
         places=lane_places(sumo_map),

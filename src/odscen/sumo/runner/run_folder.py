@@ -73,6 +73,8 @@ class PreparedRun:
         Where each lane lies; figures of traffic by place need them.
     lights
         What each traffic light shows; figures of signals need it.
+    assignment_json
+        How routes by travel time were found, kept in the run folder.
     """
 
     plan: Plan
@@ -86,6 +88,7 @@ class PreparedRun:
     expected: Forecast | None = None
     places: LanePlaces | None = None
     lights: tuple[LightProgram, ...] = ()
+    assignment_json: str | None = None
 
 
 def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
@@ -95,6 +98,8 @@ def write_run_folder(prepared: PreparedRun, folder: Path) -> None:
     (folder / layout.PLAN_FILE).write_text(prepared.plan.to_json(), encoding="utf-8")
     if prepared.places is not None:
         (folder / layout.LANE_PLACES_FILE).write_text(prepared.places.to_json(), encoding="utf-8")
+    if prepared.assignment_json is not None:
+        (folder / layout.ASSIGNMENT_FILE).write_text(prepared.assignment_json, encoding="utf-8")
     if prepared.lights:
         text = programs_to_json(prepared.lights)
         (folder / layout.LIGHTS_FILE).write_text(text, encoding="utf-8")
@@ -206,6 +211,7 @@ def found_files(folder: Path) -> dict[str, str]:
     names = {
         "scenario": layout.SCENARIO_FILE,
         "plan": layout.PLAN_FILE,
+        "assignment": layout.ASSIGNMENT_FILE,
         "net": f"{sumo}/{layout.NET_FILE}",
         "routes": f"{sumo}/{layout.ROUTES_FILE}",
         "signals": f"{sumo}/{layout.SIGNALS_FILE}",

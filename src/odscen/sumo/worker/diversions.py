@@ -37,6 +37,7 @@ class Diversions:
         vehicles = sorted((one.depart, one.id) for one in plan.actors if not one.person)
         self._departs = [depart for depart, _ in vehicles]
         self._names = [name for _, name in vehicles]
+        self._informed = frozenset(one.id for one in plan.actors if one.informed)
         self._pairs: Mapping[str, Pairs] = {}
         self._detours: Detours | None = None
         self._inside: set[str] = set()
@@ -60,8 +61,10 @@ class Diversions:
             waiting = session.waiting_vehicles() if everyone else ()
             # SUMO inserts in the first step that begins after the departure.
             departing = self._departing(begin - length, begin + length)
+            # SUMO's rerouting knows no closed turns, and may have led those over one.
+            looking = self._informed.intersection(session.vehicles()) if self._informed else ()
             events += self._divert(
-                session, {*concerned, *waiting, *departing, *self._inside}, begin
+                session, {*concerned, *waiting, *departing, *looking, *self._inside}, begin
             )
         self._begun = True
         return events

@@ -1,0 +1,164 @@
+"""``odscen demand fit``, ``routes`` and ``correct``: counts against traffic, and its routes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
+from odscen.cli.demand_commands import OutOption
+from odscen.cli.scenario_commands import ScenarioArgument
+
+if TYPE_CHECKING:
+    from odscen.sumo.calibrate.count_fit import CountFits
+
+PageOption = Annotated[
+    Path | None,
+    typer.Option("--page", help="Page to write, with a scatter plot and what is not met."),
+]
+
+
+def fit(
+    what: Annotated[
+        Path, typer.Argument(help="Scenario, or folder of a run.", metavar="SCENARIO_OR_RUN")
+    ],
+    every: Annotated[bool, typer.Option("--all", help="Show the counts that are met too.")] = False,
+    page: PageOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare traffic with the counts of its scenario: GEH and RMSE; what is not met and why.
+
+    Of a scenario, traffic as planned, without congestion; of a run, as simulated.
+    """
+    from odscen.app import demands
+    from odscen.workspace.store import Workspace
+
+    found = demands.fit(Workspace.open(workspace), what)
+    if page is not None:
+        from odscen.app.demand_correction import write_fit_page
+
+        log(f"Wrote {write_fit_page([('Counts and traffic', found)], page, title=what.stem)}")
+    if as_json:
+        print_json({"file": str(what), **found.to_dict()})
+        return
+    show_fit(found, every=every)
+
+
+def routes(
+    scenario: ScenarioArgument,
+    by: Annotated[
+        str | None, typer.Option(help="length, or travel_time: found by repeated runs.")
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option(min=1, max=100, help="Runs that routes are found by, at most.")
+    ] = None,
+    gap: Annotated[
+        float | None,
+        typer.Option(min=0, max=1, help="Share of travel time left to save at which it is enough."),
+    ] = None,
+    interval: Annotated[
+        float | None, typer.Option(help="Seconds that travel times are means of.")
+    ] = None,
+    informed: Annotated[
+        float | None,
+        typer.Option(min=0, max=1, help="Share of drivers who look for quicker routes on the way."),
+    ] = None,
+    period: Annotated[
+        float | None, typer.Option(help="Seconds after which these look again.")
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say how trips of the demand choose their routes; what is not given stays as it is."""
+    from odscen.app import demands, scenarios
+    from odscen.workspace.store import Workspace
+
+    given = {
+        "by": by, "iterations": iterations, "gap": gap, "interval": interval,
+        "informed": informed, "period": period,
+    }  # fmt: skip
+    fields = {name: value for name, value in given.items() if value is not None}
+    document = scenarios.read_scenario(scenario)
+    document = demands.choose_routes(Workspace.open(workspace), document, **fields)
+    path = scenarios.write_scenario(document, out or scenario)
+    log(f"Wrote {path}")
+    if as_json:
+        chosen = document.demand.routes.model_dump(mode="json")
+        print_json({"file": str(path), "routes": chosen})
+
+
+def correct(
+    scenario: ScenarioArgument,
+    trust: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            help="Weight of a trip more or less than in the matrix, against a vehicle that "
+            "counts do not have.",
+        ),
+    ] = 0.1,
+    rounds: Annotated[
+        int, typer.Option(min=1, max=20, help="Times that routes by travel time are found.")
+    ] = 1,
+    page: PageOption = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Correct the matrices of a scenario by its counts: link and turn counts by slices of time.
+
+    Each matrix becomes one for each slice; the counts are kept to compare with.
+    """
+    from odscen.app import demand_correction, scenarios
+    from odscen.workspace.store import Workspace
+
+    document = scenarios.read_scenario(scenario)
+    found = demand_correction.correct_matrix(
+        Workspace.open(workspace),
+        document,
+        trust=trust,
+        rounds=rounds,
+        iterated=lambda step: log(step.words),
+    )
+    path = scenarios.write_scenario(found.scenario, out or scenario)
+    if page is not None:
+        fits = [("Prior matrix", found.before), ("Corrected matrix", found.after)]
+        log(f"Wrote {demand_correction.write_fit_page(fits, page, title=document.name)}")
+    if as_json:
+        trips = {"trips_before": found.trips_before, "trips_after": found.trips_after}
+        fits_json = {"before": found.before.to_dict(), "after": found.after.to_dict()}
+        print_json({"file": str(path), **trips, **fits_json})
+        return
+    show_fit(found.after, every=False)
+    log(
+        f"{found.trips_before:,.0f} trips became {found.trips_after:,.0f}; counts within GEH 5: "
+        f"{found.before.share_met or 0:.1%} before, {found.after.share_met or 0:.1%} now"
+    )
+    log(f"Wrote {path}")
+
+
+def show_fit(found: CountFits, *, every: bool) -> None:
+    """Print a fit for people."""
+    rows = [row for row in found.rows if every or not row.met]
+    if rows:
+        print_table(
+            "",
+            ("place", "from, s", "to, s", "counted", "traffic", "GEH", "why not"),
+            [
+                (row.place, row.begin, row.end, row.counted, row.modelled, row.geh, row.why)
+                for row in rows
+            ],
+        )
+    for message in found.contradictions:
+        log(f"contradictory: {message}")
+    met = sum(row.met for row in found.rows)
+    log(
+        f"{met} of {len(found.rows)} counts within GEH 5 ({found.share_met or 0:.1%}); RMSE "
+        f"{found.rmse or 0:.2f} vehicles; {found.vehicles} vehicles ({found.source}), "
+        f"{sum(row.counted for row in found.rows):g} passages counted, "
+        f"{sum(row.modelled for row in found.rows)} made"
+    )

@@ -1,0 +1,1 @@
+"""Which of the possible routes the trips of the demand take."""
