@@ -1544,7 +1544,39 @@ export interface components {
          * ChangedPermission
          * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
          */
-        ChangedPermission: {
+        "ChangedPermission-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "permission";
+            /** Places */
+            places: string[];
+            /**
+             * Allowed
+             * @default []
+             */
+            allowed?: components["schemas"]["Category"][];
+            /**
+             * Banned
+             * @default []
+             */
+            banned?: components["schemas"]["Category"][];
+        };
+        /**
+         * ChangedPermission
+         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
+         */
+        "ChangedPermission-Output": {
             /** Id */
             id: string;
             /**
@@ -2190,7 +2222,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -2805,7 +2837,39 @@ export interface components {
          *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
          *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
          */
-        LaneIncident: {
+        "LaneIncident-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "incident";
+            /** Lane */
+            lane: string;
+            /** S */
+            s: number;
+            /**
+             * Length
+             * @default 5
+             */
+            length?: number;
+        };
+        /**
+         * LaneIncident
+         * @description A broken-down vehicle that blocks a lane.
+         *
+         *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
+         *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
+         */
+        "LaneIncident-Output": {
             /** Id */
             id: string;
             /**
@@ -3572,6 +3636,19 @@ export interface components {
             flow: string;
         };
         /**
+         * RemoveMeasureEdit
+         * @description Remove a measure by its id.
+         */
+        RemoveMeasureEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_measure";
+            /** Measure */
+            measure: string;
+        };
+        /**
          * RemoveTransitEdit
          * @description Remove a stop or a line by its name.
          */
@@ -3683,7 +3760,29 @@ export interface components {
          * RoadClosure
          * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
          */
-        RoadClosure: {
+        "RoadClosure-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "closure";
+            /** Places */
+            places: string[];
+        };
+        /**
+         * RoadClosure
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         */
+        "RoadClosure-Output": {
             /** Id */
             id: string;
             /**
@@ -3708,7 +3807,41 @@ export interface components {
          *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
          *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
          */
-        Roadworks: {
+        "Roadworks-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "roadworks";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed?: number | null;
+            /**
+             * Closed Lanes
+             * @default []
+             */
+            closed_lanes?: string[];
+            /** Width */
+            width?: number | null;
+        };
+        /**
+         * Roadworks
+         * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
+         *
+         *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
+         *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
+         */
+        "Roadworks-Output": {
             /** Id */
             id: string;
             /**
@@ -4127,7 +4260,7 @@ export interface components {
              * Measures
              * @default []
              */
-            measures: (components["schemas"]["RoadClosure"] | components["schemas"]["Roadworks"] | components["schemas"]["LaneIncident"] | components["schemas"]["SpeedLimit"] | components["schemas"]["ChangedPermission"] | components["schemas"]["SignalOutage"])[];
+            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -4524,6 +4657,19 @@ export interface components {
             matrix: string;
         };
         /**
+         * SetMeasureEdit
+         * @description Add a measure, or put it in the place of that with its id; of another kind, too.
+         */
+        SetMeasureEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_measure";
+            /** Measure */
+            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+        };
+        /**
          * SetProfileEdit
          * @description Give the scenario a day profile of its own; one of that name is replaced.
          */
@@ -4809,7 +4955,38 @@ export interface components {
          *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
          *     named as in the timing of signals.
          */
-        SignalOutage: {
+        "SignalOutage-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "signal_outage";
+            /** Junction */
+            junction: string;
+            /**
+             * Shows
+             * @default off
+             * @enum {string}
+             */
+            shows?: "off" | "flashing";
+        };
+        /**
+         * SignalOutage
+         * @description A traffic light out of order.
+         *
+         *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
+         *     named as in the timing of signals.
+         */
+        "SignalOutage-Output": {
             /** Id */
             id: string;
             /**
@@ -4963,7 +5140,31 @@ export interface components {
          * SpeedLimit
          * @description Another speed limit, m/s; of several at a place the lowest holds.
          */
-        SpeedLimit: {
+        "SpeedLimit-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed: number;
+        };
+        /**
+         * SpeedLimit
+         * @description Another speed limit, m/s; of several at a place the lowest holds.
+         */
+        "SpeedLimit-Output": {
             /** Id */
             id: string;
             /**
