@@ -2753,6 +2753,7 @@ export interface components {
             /** Job */
             job: string;
         };
+        JsonValue: unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -4195,6 +4196,7 @@ export interface components {
              */
             description: string;
             map: components["schemas"]["MapReference"];
+            variant: components["schemas"]["Variant"] | null;
             /**
              * Seed
              * @default 0
@@ -5496,6 +5498,26 @@ export interface components {
          */
         Vanishing: Record<string, never>;
         /**
+         * Variant
+         * @description The scenario that a variant was made of, and the edits that made it.
+         *
+         *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
+         *     parent and of this scenario when it was made, seed and name apart. An edit is an object with its
+         *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
+         */
+        Variant: {
+            /** Parent */
+            parent: string;
+            /** Parent Sha256 */
+            parent_sha256: string;
+            /** Sha256 */
+            sha256: string;
+            /** Edits */
+            edits: {
+                [key: string]: components["schemas"]["JsonValue"];
+            }[];
+        };
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -6476,6 +6498,7 @@ export interface components {
              */
             right_of_way?: boolean;
         };
+        "JsonValue-File": unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -7354,6 +7377,26 @@ export interface components {
          */
         "Vanishing-File": Record<string, never>;
         /**
+         * Variant
+         * @description The scenario that a variant was made of, and the edits that made it.
+         *
+         *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
+         *     parent and of this scenario when it was made, seed and name apart. An edit is an object with its
+         *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
+         */
+        "Variant-File": {
+            /** Parent */
+            parent: string;
+            /** Parent Sha256 */
+            parent_sha256: string;
+            /** Sha256 */
+            sha256: string;
+            /** Edits */
+            edits: {
+                [key: string]: components["schemas"]["JsonValue-File"];
+            }[];
+        };
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -7485,6 +7528,8 @@ export interface components {
              */
             description?: string;
             map: components["schemas"]["MapReference-File"];
+            /** @default null */
+            variant?: components["schemas"]["Variant-File"] | null;
             /**
              * Seed
              * @default 0

@@ -131,6 +131,7 @@ function End({ end, line, graph, pick, onChange }: EndProps) {
       </Text>
       <Button
         size="compact-sm"
+        style={{ flexShrink: 0 }}
         variant={active ? "filled" : "default"}
         aria-pressed={active}
         aria-label={`${word} elsewhere`}

@@ -20,6 +20,7 @@ from odscen.scenario.document.parameters_document import Parameter, ParameterNam
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.transit_document import Transit
+from odscen.scenario.document.variants_document import Variant
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
@@ -272,6 +273,8 @@ class Scenario(Part):
         For people.
     map
         Name and SHA-256 of the map, and metres between the nodes of its lane graph.
+    variant
+        Parent and edits, if the scenario was made as a variant of another.
     seed
         Random seed of whatever is drawn in a run, 0 to 2^31 - 1.
     roi
@@ -310,6 +313,7 @@ class Scenario(Part):
     name: Annotated[str, Field(min_length=1, max_length=120, pattern=PRINTABLE)]
     description: Prose = ""
     map: MapReference
+    variant: Variant | None = None
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
     roi: tuple[Label, ...]
     environment: Environment = Environment()
