@@ -103,7 +103,7 @@ function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: Plac
     const next = withPlace(measure, picked);
     if (next) onChange(next);
   });
-  const ways = picksOf(measure.kind);
+  const kinds = picksOf(measure.kind);
   return (
     <>
       {"places" in measure && (
@@ -119,17 +119,17 @@ function PlaceFields({ measure, pick, onChange }: { measure: Measure; pick: Plac
         />
       )}
       <Group gap={6} role="group" aria-label={`Choose places of ${measure.id} on the map`}>
-        {ways.map((way) => {
-          const on = active && pick.now?.by === way;
+        {kinds.map((kind) => {
+          const on = active && pick.now?.by === kind;
           return (
             <Button
-              key={way}
+              key={kind}
               size="compact-sm"
               variant={on ? "filled" : "default"}
               aria-pressed={on}
-              onClick={() => (on ? pick.stop() : pick.start(key, way))}
+              onClick={() => (on ? pick.stop() : pick.start(key, kind))}
             >
-              {on ? "Stop choosing" : `${PICK_WORD[way]} on the map`}
+              {on ? "Stop choosing" : `${PICK_WORD[kind]} on the map`}
             </Button>
           );
         })}

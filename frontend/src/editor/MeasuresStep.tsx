@@ -78,15 +78,15 @@ function NewMeasure({
   const [kind, setKind] = useState<Measure["kind"]>("closure");
   const [by, setBy] = useState<PickBy>("segment");
   const [typed, setTyped] = useState("");
-  const ways = picksOf(kind);
-  const chosen = ways.includes(by) ? by : (ways[0] ?? "segment");
+  const choices = picksOf(kind);
+  const chosen = choices.includes(by) ? by : (choices[0] ?? "segment");
   const add = (picked: Picked): void => {
     onAdd(newMeasure(kind, picked, measures));
     setTyped("");
   };
   const active = useTaking(pick, NEW, add);
-  const arm = (way: PickBy): void => {
-    if (active) pick.start(NEW, way);
+  const arm = (choice: PickBy): void => {
+    if (active) pick.start(NEW, choice);
   };
   const type = (): void => {
     if (typed.trim()) add({ name: typed.trim(), s: 0 });
@@ -104,17 +104,17 @@ function NewMeasure({
           arm(picksOf(next)[0] ?? "segment");
         }}
       />
-      {ways.length > 1 && (
+      {choices.length > 1 && (
         <SegmentedControl
           fullWidth
           size="xs"
           aria-label="What it is about"
-          data={ways.map((way) => ({ value: way, label: PICK_WORD[way] }))}
+          data={choices.map((choice) => ({ value: choice, label: PICK_WORD[choice] }))}
           value={chosen}
           onChange={(next) => {
-            const way = ways.find((one) => one === next) ?? chosen;
-            setBy(way);
-            arm(way);
+            const choice = choices.find((one) => one === next) ?? chosen;
+            setBy(choice);
+            arm(choice);
           }}
         />
       )}

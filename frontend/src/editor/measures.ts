@@ -63,7 +63,7 @@ export const inWords = (measure: Measure): { title: string; detail: string; when
   when: `${clock(measure.begin)} to ${measure.end === null ? "the end" : clock(measure.end)}`,
 });
 
-/** How places of a kind of measure can be picked, the usual way first. */
+/** How places of a kind of measure can be picked, the usual one first. */
 export function picksOf(kind: Measure["kind"]): readonly PickBy[] {
   switch (kind) {
     case "incident":

@@ -28,7 +28,7 @@ export const transitNote = ({ stops, lines }: Transit): string =>
 type SetLine = EditOf<"set_line">;
 type Dwell = NonNullable<SetLine["dwell"]>;
 
-/** A dwell time as edits have it: a number of seconds stands for a constant. */
+/** A dwell time as edits have it: a number is a constant, in seconds. */
 export const dwellOf = (dwell: Line["dwell"]): Dwell =>
   typeof dwell === "number" ? { kind: "constant", value: dwell } : (dwell as Dwell);
 

@@ -64,7 +64,7 @@ def read_edits(path: Path) -> list[EditBase]:
 def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
     """Read edits from ``KIND.FIELD=VALUE``; fields of one kind that follow each other are one edit.
 
-    A value is JSON, or else text as it stands. A field that is given again begins another edit.
+    A value is JSON, or else plain text. A field that is given again begins another edit.
 
     Raises
     ------
