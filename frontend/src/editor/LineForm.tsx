@@ -134,7 +134,7 @@ function End({ end, line, graph, pick, onChange }: EndProps) {
         style={{ flexShrink: 0 }}
         variant={active ? "filled" : "default"}
         aria-pressed={active}
-        aria-label={`${word} elsewhere`}
+        aria-label={active ? "Stop choosing" : `Choose where it ${word.toLowerCase()}`}
         onClick={() => (active ? pick.stop() : pick.start(key, "node"))}
       >
         {active ? "Stop choosing" : "Choose"}
@@ -181,7 +181,7 @@ function Served({ line, stops, onChange }: { line: Line; stops: readonly Stop[];
                 aria-label={`Serve ${stop} earlier`}
                 onClick={() => swap(n)}
               >
-                ↑
+                <span aria-hidden="true">↑</span>
               </ActionIcon>
             </Tooltip>
             <ActionIcon

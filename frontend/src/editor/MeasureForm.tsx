@@ -67,7 +67,7 @@ export function MeasureCard({
         >
           {open ? "Close" : "Change"}
         </Button>
-        <Button size="compact-sm" variant="default" aria-label={`Show ${id}`} onClick={onShow}>
+        <Button size="compact-sm" variant="default" aria-label={`Show where ${id} is`} onClick={onShow}>
           Show where
         </Button>
       </Group>

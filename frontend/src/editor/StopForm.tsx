@@ -113,7 +113,7 @@ export function OpenAndShow({
       >
         {open ? "Close" : "Change"}
       </Button>
-      <Button size="compact-sm" variant="default" aria-label={`Show ${part}`} onClick={onShow}>
+      <Button size="compact-sm" variant="default" aria-label={`Show where ${part} is`} onClick={onShow}>
         Show where
       </Button>
     </Group>
