@@ -2753,7 +2753,6 @@ export interface components {
             /** Job */
             job: string;
         };
-        JsonValue: unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -5514,7 +5513,7 @@ export interface components {
             sha256: string;
             /** Edits */
             edits: {
-                [key: string]: components["schemas"]["JsonValue"];
+                [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
             }[];
         };
         /**
@@ -6498,7 +6497,6 @@ export interface components {
              */
             right_of_way?: boolean;
         };
-        "JsonValue-File": unknown;
         /**
          * JunctionTiming
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -7393,7 +7391,7 @@ export interface components {
             sha256: string;
             /** Edits */
             edits: {
-                [key: string]: components["schemas"]["JsonValue-File"];
+                [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
             }[];
         };
         /**

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field, JsonValue
+from pydantic import Field, WithJsonSchema
 
 from odscen.scenario.document.document_parts import Label, Part
+
+EditValue = Annotated[
+    Any,
+    WithJsonSchema({"type": ["null", "boolean", "number", "string", "array", "object"]}),
+]
+"""An argument of an edit: any JSON, for what is possible is for the edit to say."""
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
@@ -22,4 +28,4 @@ class Variant(Part):
     parent: Label
     parent_sha256: Sha256
     sha256: Sha256
-    edits: Annotated[tuple[dict[str, JsonValue], ...], Field(min_length=1, max_length=5000)]
+    edits: Annotated[tuple[dict[str, EditValue], ...], Field(min_length=1, max_length=5000)]
