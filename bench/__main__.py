@@ -15,6 +15,7 @@ ALL = (
     "netconvert_maps",
     "capacity",
     "saturation",
+    "weather",
     "signal_timing",
     "assignment",
     "recording",

@@ -28,7 +28,7 @@ from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.sumo.realize.driving import draw_factor, driver
 from odscen.sumo.realize.road_user import RoadUser
-from odscen.sumo.realize.weather_effects import NO_EFFECT
+from odscen.sumo.realize.weather_effects import NO_EFFECT, WeatherEffect
 
 MAPS = Path(__file__).parents[1] / "maps"
 HCM_SATURATION = 1900.0
@@ -147,22 +147,29 @@ def _turn_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
             print(f"| {name}; {step} s | {'; '.join(cells)} |", flush=True)
 
 
-def straight_road(net: Path) -> None:
-    """Write a lane with a light after 800 m."""
+def straight_road(net: Path, *, limit: float = 13.89) -> None:
+    """Write a lane with a light after 800 m; ``limit`` in m/s."""
     nodes, edges = net.with_suffix(".nod.xml"), net.with_suffix(".edg.xml")
     nodes.write_text(
         '<nodes><node id="a" x="0" y="0"/><node id="light" x="800" y="0" type="traffic_light"/>'
         '<node id="b" x="1300" y="0"/></nodes>'
     )
     edges.write_text(
-        '<edges><edge id="in" from="a" to="light" numLanes="1" speed="13.89"/>'
-        '<edge id="out" from="light" to="b" numLanes="1" speed="13.89"/></edges>'
+        f'<edges><edge id="in" from="a" to="light" numLanes="1" speed="{limit}"/>'
+        f'<edge id="out" from="light" to="b" numLanes="1" speed="{limit}"/></edges>'
     )
     _tool("netconvert", "-n", nodes, "-e", edges, "-o", net, "--no-warnings")
 
 
 def saturation_flow(
-    folder: Path, net: Path, route: str, lane: str, step: str, seed: int, drivers: Drivers
+    folder: Path,
+    net: Path,
+    route: str,
+    lane: str,
+    step: str,
+    seed: int,
+    drivers: Drivers,
+    weather: WeatherEffect = NO_EFFECT,
 ) -> float:
     """Vehicles per hour of green that leave a queue, after the first."""
     light = next(one for one in ET.parse(net).getroot().iter("tlLogic"))
@@ -178,7 +185,7 @@ def saturation_flow(
         f' file="{loop}"/></additional>'
     )
     queue = [(float(second), route, lane.rpartition("_")[2]) for second in range(2400)]
-    _run(folder, net, queue, seed=seed, step=step, end=2460.0, drivers=drivers)
+    run_cars(folder, net, queue, seed=seed, step=step, end=2460.0, drivers=drivers, weather=weather)
     cycle = RED + GREEN + YELLOW
     passed: dict[int, list[float]] = {}
     for event in ET.parse(loop).getroot():
@@ -213,7 +220,7 @@ def _turn(
         )
         + "</additional>"
     )
-    _run(folder, net, sorted(departs), seed=seed, step=step, end=end)
+    run_cars(folder, net, sorted(departs), seed=seed, step=step, end=end)
     counts = dict.fromkeys(lanes, 0)
     for row in ET.parse(loops).getroot():
         if float(row.get("begin", 0)) >= WARM_UP:
@@ -223,7 +230,7 @@ def _turn(
     return float(sum(counts[lane] for lane in turn.counted)), float(counts[turn.own]), collisions
 
 
-def _run(
+def run_cars(
     folder: Path,
     net: Path,
     departs: list[tuple[float, str, str]],
@@ -232,6 +239,7 @@ def _run(
     step: str,
     end: float,
     drivers: Drivers | None = None,
+    weather: WeatherEffect = NO_EFFECT,
 ) -> None:
     """Run cars that depart at a time on a route and lane, with what ``extra.xml`` says."""
     user = RoadUser("car", Category.CAR, 0, 0, depart=0.0)
@@ -240,7 +248,7 @@ def _run(
         DEFAULT_BODY[Category.CAR],
         factor=1.0,
         limit=None,
-        weather=NO_EFFECT,
+        weather=weather,
         drivers=drivers or Drivers(),
         step_length=float(step),
     )
@@ -248,7 +256,8 @@ def _run(
     cars = (
         f'<vehicle id="{number}" type="car" depart="{time:.1f}" departLane="{lane}"'
         f' departSpeed="max" speedFactor="'
-        f'{draw_factor(seed, str(number), "normal", Category.CAR)}"><route edges="{route}"/>'
+        f'{draw_factor(seed, str(number), "normal", Category.CAR) * weather.speed}">'
+        f'<route edges="{route}"/>'
         "</vehicle>"
         for number, (time, route, lane) in enumerate(departs)
     )

@@ -7,17 +7,19 @@ import {
   nearestOne,
   ofProblem,
   sceneActors,
-  measureStyles,
   sceneFlows,
   segmentStyles,
   wrongOnes,
 } from "../src/editor/scene";
+import { measureShapes, transitPins } from "../src/editor/sceneParts";
 import { createEditorStore, selectionAfter } from "../src/editor/store";
 import { laneFacts, placeWord } from "../src/editor/placeWords";
 import { Starts } from "../src/editor/placing";
 import { rowsInSight } from "../src/editor/windowed";
 import { Picker } from "../src/map/picking";
-import { actor, flow, graph, place, problem, scenario } from "./example";
+import { turnShapes } from "../src/map/laneShapes";
+import { Graph } from "../src/map/graph";
+import { actor, columns, flow, graph, place, problem, scenario } from "./example";
 
 test("the first segment is dark blue, the rest of the region blue, what can be added light blue", () => {
   const styles = segmentStyles(graph, ["b", "a"], ["c"], true);
@@ -32,13 +34,58 @@ test("before the first segment nothing is highlighted, though all may be chosen"
   expect(segmentStyles(graph, [], ["a", "b", "c"], true).size).toBe(0);
 });
 
-test("places of measures are drawn: segments, lanes, and both roads of a turn", () => {
+test("segments of measures are drawn whole, lanes as lanes, and incidents as signs", () => {
   const closure = { id: "m", kind: "closure", begin: 0, end: null } as const;
-  const drawn = (...places: string[]) => [...measureStyles(graph, [{ ...closure, places }]).keys()];
-  expect(drawn("b")).toEqual([1]);
-  expect(drawn("a>c")).toEqual([0, 2]);
-  expect(drawn("1.0.-1").length).toBeGreaterThan(0);
-  expect(drawn("nowhere")).toEqual([]);
+  const drawn = (...places: string[]) => measureShapes(graph, [{ ...closure, places }], null);
+  expect([...drawn("b").segments.keys()]).toEqual([1]);
+  expect(drawn("b").rings).toEqual([]);
+  const lane = drawn("1.0.-1");
+  expect([lane.segments.size, lane.rings.length]).toEqual([0, 1]);
+  expect(drawn("nowhere")).toEqual({ segments: new Map(), rings: [], pins: [] });
+  const { pins } = measureShapes(
+    graph,
+    [{ ...closure, kind: "incident", lane: "1.0.-1", s: 2.4, length: 5 }],
+    null,
+  );
+  expect(pins).toEqual([{ x: 2, y: 0, sign: "!", text: "m" }]);
+});
+
+test("a turn is drawn by the lanes inside its junction that lead from the one road to the other", () => {
+  const crossing = new Graph({
+    ...columns,
+    lane_keys: ["1.0.-1", "9.0.-1", "2.0.-1", "8.0.-1"],
+    lane_types: ["driving", "driving", "driving", "driving"],
+    lane_junctions: [null, "j", null, "j"],
+    first_node: [0, 1, 2, 3, 4],
+    lane: [0, 1, 2, 3],
+    s: [0, 0, 0, 0],
+    x: [0, 4, 8, 4],
+    y: [0, 0, 0, 6],
+    hdg: [0, 0, 0, 0],
+    width: [3, 3, 3, 3],
+    segment: [0, 1, 2, 1],
+    left_lane: [-1, -1, -1, -1],
+    right_lane: [-1, -1, -1, -1],
+    speed_limit: [null, null, null, null],
+    spawnable: [1, 1, 1, 1],
+    segments: ["r1", "j", "r2"].map((id) => ({ id, kind: id === "j" ? "junction" : "road", neighbours: [] })),
+    // The lane at the side leads out of the first road, too, but into no other.
+    edges: { source: [0, 1, 0], target: [1, 2, 3], relation: [0, 0, 0] },
+  });
+  const rings = turnShapes(crossing, "r1>r2");
+  expect(rings).toHaveLength(1);
+  expect(rings[0]?.slice(0, 2)).toEqual(new Float64Array([3, 1.5]));
+  expect(turnShapes(crossing, "r2>r1")).toEqual([]);
+});
+
+test("stops are drawn with their names, lines where they begin and end", () => {
+  const stop = { id: "s", name: "Market", node: "1.0.-1.1", length: 15, bay: false };
+  const line = { id: "7", start: "1.0.-1.0", goal: null };
+  const pins = transitPins(graph, { stops: [stop], lines: [line as never] });
+  expect(pins).toEqual([
+    { x: 2, y: 0, sign: "H", text: "Market" },
+    { x: 0, y: 0, sign: "▸", text: "Line 7" },
+  ]);
 });
 
 test("a new road user or flow is selected; after a removal the others stay selected", () => {

@@ -45,6 +45,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   name: "s",
   description: "",
   map: { name: "m", sha256: "", spacing: 2 },
+  variant: null,
   seed: 0,
   roi,
   environment: { preset: "ClearNoon", parameters: {}, affects_driving: true },

@@ -145,6 +145,26 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
         expect(user.page.get_by_role("dialog")).to_have_count(0)
 
 
+def test_measures_and_public_transport(
+    visit: Callable[..., Any], served: tool.Served, sampled: str
+) -> None:
+    user, inspector = visit(served.url)
+    user.open_editor(sampled)
+    user.step("Measures").click()
+    with user.changing():
+        user.page.get_by_label("or type its name").fill("r2")
+        user.page.keyboard.press("Enter")
+    user.choose("Kind of measure", "Signal out of order")
+    inspector.look("editor-measures")
+    user.step("Public transport").click()
+    user.page.get_by_role("button", name="Add stops on the map").click()
+    with user.changing():
+        user.map.click(user.graph.middle("r2"))
+    user.page.get_by_role("button", name="Change stop-1").click()
+    user.page.get_by_role("button", name="Add a line").click()
+    inspector.look("editor-public-transport")
+
+
 def test_traffic_and_counts(
     visit: Callable[..., Any], served: tool.Served, sampled: str, tmp_path: Path
 ) -> None:

@@ -18,12 +18,12 @@ from odscen.scenario import edits
 from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Actor, Flow, Matrix
+from odscen.scenario.edits.edit_messages import MESSAGES, EditBase
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region, name_of, place_of
 from odscen.scenario.placing.spawn_room import late_for_changes
 from odscen.web.application import create_app
-from odscen.web.edit_messages import MESSAGES, EditBase
 from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
@@ -71,6 +71,8 @@ ALL = (
     ("set_stop", {"stop": "market", "node": "SPAWN3", "length": 12}),
     ("set_line", {"line": "7", "start": "SPAWN2", "stops": [{"stop": "market"}], "headway": 60}),
     ("remove_transit", {"part": "7"}),
+    ("set_measure", {"measure": {"id": "shut", "kind": "closure", "places": ["r1>r2"]}}),
+    ("remove_measure", {"measure": "shut"}),
 )
 
 
@@ -132,7 +134,8 @@ def test_every_edit_function_is_an_edit_message_and_tried_below() -> None:
 @pytest.mark.parametrize("message", MESSAGES, ids=lambda message: message.__name__)
 def test_the_words_of_an_edit_need_only_what_it_always_has(message: type[EditBase]) -> None:
     (kind,) = get_args(message.model_fields["kind"].annotation)
-    named = {name for _, name, _, _ in Formatter().parse(EDIT_ENTRIES[kind].label) if name}
+    label = Formatter().parse(EDIT_ENTRIES[kind].label)
+    named = {name.partition(".")[0] for _, name, _, _ in label if name}
     required = {name for name, field in message.model_fields.items() if field.is_required()}
     assert named <= required
 

@@ -1569,7 +1569,39 @@ export interface components {
          * ChangedPermission
          * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
          */
-        ChangedPermission: {
+        "ChangedPermission-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "permission";
+            /** Places */
+            places: string[];
+            /**
+             * Allowed
+             * @default []
+             */
+            allowed?: components["schemas"]["Category"][];
+            /**
+             * Banned
+             * @default []
+             */
+            banned?: components["schemas"]["Category"][];
+        };
+        /**
+         * ChangedPermission
+         * @description Who may use segments, lanes or turns: only ``allowed``, or all vehicles but ``banned``.
+         */
+        "ChangedPermission-Output": {
             /** Id */
             id: string;
             /**
@@ -2903,7 +2935,39 @@ export interface components {
          *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
          *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
          */
-        LaneIncident: {
+        "LaneIncident-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "incident";
+            /** Lane */
+            lane: string;
+            /** S */
+            s: number;
+            /**
+             * Length
+             * @default 5
+             */
+            length?: number;
+        };
+        /**
+         * LaneIncident
+         * @description A broken-down vehicle that blocks a lane.
+         *
+         *     Its front stops ``s`` metres from the start of the road, as OpenDRIVE counts; it is ``length``
+         *     metres long. It drives up as all others do, so that it stops at ``begin`` or a little later.
+         */
+        "LaneIncident-Output": {
             /** Id */
             id: string;
             /**
@@ -3704,6 +3768,19 @@ export interface components {
             flow: string;
         };
         /**
+         * RemoveMeasureEdit
+         * @description Remove a measure by its id.
+         */
+        RemoveMeasureEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_measure";
+            /** Measure */
+            measure: string;
+        };
+        /**
          * RemoveTransitEdit
          * @description Remove a stop or a line by its name.
          */
@@ -3831,7 +3908,29 @@ export interface components {
          * RoadClosure
          * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
          */
-        RoadClosure: {
+        "RoadClosure-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "closure";
+            /** Places */
+            places: string[];
+        };
+        /**
+         * RoadClosure
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         */
+        "RoadClosure-Output": {
             /** Id */
             id: string;
             /**
@@ -3856,7 +3955,41 @@ export interface components {
          *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
          *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
          */
-        Roadworks: {
+        "Roadworks-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "roadworks";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed?: number | null;
+            /**
+             * Closed Lanes
+             * @default []
+             */
+            closed_lanes?: string[];
+            /** Width */
+            width?: number | null;
+        };
+        /**
+         * Roadworks
+         * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
+         *
+         *     ``width`` (metres) is that of the lanes left open. SUMO does not drive slower on narrow lanes,
+         *     so the limit is lowered by what HCM takes off the free-flow speed. At least one of the three.
+         */
+        "Roadworks-Output": {
             /** Id */
             id: string;
             /**
@@ -4260,6 +4393,7 @@ export interface components {
              */
             description: string;
             map: components["schemas"]["MapReference"];
+            variant: components["schemas"]["Variant"] | null;
             /**
              * Seed
              * @default 0
@@ -4334,7 +4468,7 @@ export interface components {
              * Measures
              * @default []
              */
-            measures: (components["schemas"]["RoadClosure"] | components["schemas"]["Roadworks"] | components["schemas"]["LaneIncident"] | components["schemas"]["SpeedLimit"] | components["schemas"]["ChangedPermission"] | components["schemas"]["SignalOutage"])[];
+            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -4745,6 +4879,19 @@ export interface components {
             matrix: string;
         };
         /**
+         * SetMeasureEdit
+         * @description Add a measure, or put it in the place of that with its id; of another kind, too.
+         */
+        SetMeasureEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_measure";
+            /** Measure */
+            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+        };
+        /**
          * SetProfileEdit
          * @description Give the scenario a day profile of its own; one of that name is replaced.
          */
@@ -5075,7 +5222,38 @@ export interface components {
          *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
          *     named as in the timing of signals.
          */
-        SignalOutage: {
+        "SignalOutage-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "signal_outage";
+            /** Junction */
+            junction: string;
+            /**
+             * Shows
+             * @default off
+             * @enum {string}
+             */
+            shows?: "off" | "flashing";
+        };
+        /**
+         * SignalOutage
+         * @description A traffic light out of order.
+         *
+         *     ``off``: right of way as without lights; ``flashing``: all vehicles give way. ``junction`` is
+         *     named as in the timing of signals.
+         */
+        "SignalOutage-Output": {
             /** Id */
             id: string;
             /**
@@ -5248,7 +5426,31 @@ export interface components {
          * SpeedLimit
          * @description Another speed limit, m/s; of several at a place the lowest holds.
          */
-        SpeedLimit: {
+        "SpeedLimit-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Begin
+             * @default 0
+             */
+            begin?: number;
+            /** End */
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            /** Places */
+            places: string[];
+            /** Speed */
+            speed: number;
+        };
+        /**
+         * SpeedLimit
+         * @description Another speed limit, m/s; of several at a place the lowest holds.
+         */
+        "SpeedLimit-Output": {
             /** Id */
             id: string;
             /**
@@ -5622,6 +5824,26 @@ export interface components {
          * @description Leave the simulation.
          */
         Vanishing: Record<string, never>;
+        /**
+         * Variant
+         * @description The scenario that a variant was made of, and the edits that made it.
+         *
+         *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
+         *     parent and of this scenario when it was made, seed and name apart. An edit is an object with its
+         *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
+         */
+        Variant: {
+            /** Parent */
+            parent: string;
+            /** Parent Sha256 */
+            parent_sha256: string;
+            /** Sha256 */
+            sha256: string;
+            /** Edits */
+            edits: {
+                [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
+            }[];
+        };
         /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
@@ -7807,6 +8029,26 @@ export interface components {
          */
         "Vanishing-File": Record<string, never>;
         /**
+         * Variant
+         * @description The scenario that a variant was made of, and the edits that made it.
+         *
+         *     ``parent`` is the name of its file, ``parent_sha256`` and ``sha256`` are of the content of the
+         *     parent and of this scenario when it was made, seed and name apart. An edit is an object with its
+         *     ``kind`` and arguments, as :mod:`odscen.scenario.edits` has them.
+         */
+        "Variant-File": {
+            /** Parent */
+            parent: string;
+            /** Parent Sha256 */
+            parent_sha256: string;
+            /** Sha256 */
+            sha256: string;
+            /** Edits */
+            edits: {
+                [key: string]: null | boolean | number | string | unknown[] | Record<string, never>;
+            }[];
+        };
+        /**
          * VehicleInput
          * @description Vehicles that drive into the region at its boundary, at the speed of those before them.
          *
@@ -7974,6 +8216,8 @@ export interface components {
              */
             description?: string;
             map: components["schemas"]["MapReference-File"];
+            /** @default null */
+            variant?: components["schemas"]["Variant-File"] | null;
             /**
              * Seed
              * @default 0

@@ -56,7 +56,8 @@ export function Editor({
     sheet: () => setHelp(true),
     remove: () => now.changes.remove(selection),
     escape: () => {
-      if (tool) arm(null);
+      if (now.pick.now) now.pick.stop();
+      else if (tool) arm(null);
       else if (tour) closeTour();
       else select([]);
     },

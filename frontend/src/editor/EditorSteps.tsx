@@ -9,12 +9,16 @@ import { useStarter } from "./asked";
 import { profilesOf } from "./DayProfiles";
 import { bringsTraffic, trafficNote } from "./demand";
 import { EnvironmentStep } from "./EnvironmentStep";
+import { measureNote } from "./measures";
+import { MeasuresStep } from "./MeasuresStep";
 import { MapStep, RegionStep } from "./MapSteps";
 import { actorNote, weatherNote } from "./notes";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
 import { TrafficStep } from "./TrafficStep";
+import { transitNote } from "./transit";
+import { TransitStep } from "./TransitStep";
 import type { EditorNow } from "./useEditing";
 
 /** The steps, each with its forms. */
@@ -42,7 +46,7 @@ export function EditorSteps({
     sights,
     openStep,
   } = now;
-  const { roi, demand, environment, map } = document;
+  const { roi, demand, environment, map, measures, transit } = document;
   const run = useStarter(name);
   const [filling, setFilling] = useState(false);
   const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
@@ -164,6 +168,34 @@ export function EditorSteps({
               />
               <Button onClick={() => openStep("run")}>Next: run</Button>
             </>
+          ),
+        },
+        transit: {
+          title: "Public transport",
+          done: transit.lines.length > 0,
+          note: transitNote(transit),
+          body: (
+            <TransitStep
+              transit={transit}
+              graph={graph}
+              pick={now.pick}
+              onEdit={changes.change}
+              onShow={sights.nodes}
+            />
+          ),
+        },
+        measures: {
+          title: "Measures",
+          done: measures.length > 0,
+          note: measureNote(measures),
+          body: (
+            <MeasuresStep
+              measures={measures}
+              lights={now.lights?.junctions ?? []}
+              pick={now.pick}
+              onEdit={changes.change}
+              onShow={sights.measure}
+            />
           ),
         },
         run: {

@@ -1,4 +1,14 @@
-import { ELIGIBLE, FLOW, GOAL, PEDESTRIAN_NODE, ROI_BASE, ROI_MEMBER, VEHICLE_NODE } from "../map/colors";
+import {
+  ELIGIBLE,
+  FLOW,
+  GOAL,
+  MEASURE,
+  PEDESTRIAN_NODE,
+  ROI_BASE,
+  ROI_MEMBER,
+  TRANSIT,
+  VEHICLE_NODE,
+} from "../map/colors";
 import type { Step } from "./scene";
 
 const ROWS: Partial<Record<Step, [color: string, word: string][]>> = {
@@ -7,6 +17,8 @@ const ROWS: Partial<Record<Step, [color: string, word: string][]>> = {
     [ROI_MEMBER, "Region"],
     [ELIGIBLE, "Can be added"],
   ],
+  transit: [[TRANSIT, "Stop, begin or end of a line"]],
+  measures: [[MEASURE, "Measure"]],
   actors: [
     [VEHICLE_NODE, "Vehicle start"],
     [PEDESTRIAN_NODE, "Pedestrian start"],

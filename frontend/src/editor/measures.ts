@@ -1,9 +1,10 @@
 import type { ScenarioDocument } from "../api/types";
-import { clock, kmh } from "../ui/words";
+import { clock, count, kmh } from "../ui/words";
+import type { PickBy, Picked } from "./pick";
 
 export type Measure = ScenarioDocument["measures"][number];
 
-const KIND: Record<Measure["kind"], string> = {
+export const KIND: Record<Measure["kind"], string> = {
   closure: "Closure",
   roadworks: "Roadworks",
   incident: "Incident",
@@ -51,9 +52,71 @@ function detail(measure: Measure): string {
   }
 }
 
+/** Of the step, in a line. */
+export const measureNote = (measures: readonly Measure[]): string =>
+  measures.length === 0 ? "None" : count(measures.length, "measure");
+
 /** A measure in words: what it is, where, and when. */
 export const inWords = (measure: Measure): { title: string; detail: string; when: string } => ({
   title: `${KIND[measure.kind]} ${measure.id}`,
   detail: detail(measure),
   when: `${clock(measure.begin)} to ${measure.end === null ? "the end" : clock(measure.end)}`,
 });
+
+/** How places of a kind of measure can be picked, the usual one first. */
+export function picksOf(kind: Measure["kind"]): readonly PickBy[] {
+  switch (kind) {
+    case "incident":
+      return ["point"];
+    case "signal_outage":
+      return ["light"];
+    case "roadworks":
+    case "speed_limit":
+      return ["segment", "lane"];
+    default:
+      return ["segment", "lane", "turn"];
+  }
+}
+
+/** 30 km/h in m/s. */
+const SLOW = 30 / 3.6;
+
+/** A measure at a first place, for the whole run, with an id that is free. */
+export function newMeasure(
+  kind: Measure["kind"],
+  { name, s }: Picked,
+  measures: readonly { id: string }[],
+): Measure {
+  const always = { id: freeId(kind, measures), begin: 0, end: null };
+  const places = [name];
+  switch (kind) {
+    case "incident":
+      return { ...always, kind, lane: name, s: Math.round(s * 10) / 10, length: 5 };
+    case "signal_outage":
+      return { ...always, kind, junction: name, shows: "off" };
+    case "roadworks":
+      return { ...always, kind, places, speed: SLOW, closed_lanes: [], width: null };
+    case "speed_limit":
+      return { ...always, kind, places, speed: SLOW };
+    case "permission":
+      return { ...always, kind, places, allowed: ["bus", "bicycle"], banned: [] };
+    case "closure":
+      return { ...always, kind, places };
+  }
+}
+
+function freeId(kind: Measure["kind"], measures: readonly { id: string }[]): string {
+  const taken = new Set(measures.map(({ id }) => id));
+  const stem = kind.replace("_", "-");
+  for (let n = 1; ; n++) if (!taken.has(`${stem}-${n}`)) return `${stem}-${n}`;
+}
+
+/** The measure with a place added, or taken out if it was there; null if it would have none. */
+export function withPlace(measure: Measure, { name, s }: Picked): Measure | null {
+  if (measure.kind === "incident") return { ...measure, lane: name, s: Math.round(s * 10) / 10 };
+  if (measure.kind === "signal_outage") return { ...measure, junction: name };
+  const places = measure.places.includes(name)
+    ? measure.places.filter((one) => one !== name)
+    : [...measure.places, name];
+  return places.length > 0 ? { ...measure, places } : null;
+}

@@ -1,11 +1,19 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
-import { placesOf } from "./measures";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
-export type Step = "map" | "region" | "environment" | "actors" | "traffic" | "run";
-export const STEPS: readonly Step[] = ["map", "region", "environment", "actors", "traffic", "run"];
+export const STEPS = [
+  "map",
+  "region",
+  "environment",
+  "actors",
+  "traffic",
+  "transit",
+  "measures",
+  "run",
+] as const;
+export type Step = (typeof STEPS)[number];
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(
@@ -22,27 +30,6 @@ export function segmentStyles(
   // With no region yet everything may be chosen: nothing is highlighted.
   if (growing && roi.length > 0) for (const id of candidates) put(id, "eligible");
   if (growing) roi.forEach((id, n) => put(id, n === 0 ? "base" : "member"));
-  return styles;
-}
-
-/** Segments with places of measures: of a lane those that it lies in, of a turn all that it names. */
-export function measureStyles(
-  graph: Graph,
-  measures: ScenarioDocument["measures"],
-): Map<number, SegmentStyle> {
-  const styles = new Map<number, SegmentStyle>();
-  for (const measure of measures)
-    for (const name of placesOf(measure)) {
-      const place = graph.place(`${name}.0`);
-      if (place) {
-        const [first, end] = graph.lanePlaces(place);
-        for (let i = first; i < end; i++) styles.set(graph.vehiclePlace(i).segment, "measure");
-      }
-      for (const part of name.split(">")) {
-        const row = graph.segmentRow.get(part);
-        if (row !== undefined) styles.set(row, "measure");
-      }
-    }
   return styles;
 }
 
@@ -172,7 +159,7 @@ export function segmentsBounds(graph: Graph, ids: readonly string[]): Bounds | n
   return boxes.length > 0 ? boxes.reduce(join) : null;
 }
 
-const join = (a: Bounds, b: Bounds): Bounds => [
+export const join = (a: Bounds, b: Bounds): Bounds => [
   Math.min(a[0], b[0]),
   Math.min(a[1], b[1]),
   Math.max(a[2], b[2]),

@@ -3,7 +3,10 @@ import type { RefObject } from "react";
 import type { Actor, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import type { MapHandle } from "../map/MapCanvas";
+import type { Heads } from "../signals/heads";
+import type { Measure } from "./measures";
 import { boundsOfPlaces, boundsOfProblem, segmentsBounds } from "./scene";
+import { boundsOfMeasure } from "./sceneParts";
 
 /** Brings parts of the map into sight. */
 export interface Sights {
@@ -12,12 +15,25 @@ export interface Sights {
   start: (one: Actor | Flow) => void;
   /** A start together with all goals that can be reached from it. */
   goals: (one: Actor | Flow, goals: readonly Place[]) => void;
+  /** Nodes, all of them. */
+  nodes: (nodes: readonly string[]) => void;
+  /** All places of a measure. */
+  measure: (measure: Measure) => void;
   problem: (problem: Problem, document: ScenarioDocument) => void;
   /** Acts on what is in the middle, as a click there does. */
   pickMiddle: () => void;
 }
 
-export function sightsOf(handle: RefObject<MapHandle | null>, graph: Graph): Sights {
+/** Metres around what is shown. */
+const MARGIN = 25;
+
+const around = ([x0, y0, x1, y1]: Bounds): Bounds => [x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN];
+
+export function sightsOf(
+  handle: RefObject<MapHandle | null>,
+  graph: Graph,
+  lights: () => Heads | null,
+): Sights {
   const show = (bounds: Bounds | null): void => {
     if (bounds) handle.current?.show(bounds);
   };
@@ -31,6 +47,14 @@ export function sightsOf(handle: RefObject<MapHandle | null>, graph: Graph): Sig
     goals: (one, goals) => {
       const start = graph.place(one.spawn);
       if (start) show(boundsOfPlaces([start, ...goals]));
+    },
+    nodes: (nodes) => {
+      const places = nodes.flatMap((id) => graph.place(id) ?? []);
+      if (places.length > 0) show(around(boundsOfPlaces(places)));
+    },
+    measure: (measure) => {
+      const bounds = boundsOfMeasure(graph, measure, lights());
+      if (bounds) show(around(bounds));
     },
     problem: (problem, document) => show(boundsOfProblem(problem, graph, document)),
     pickMiddle: () => handle.current?.pickMiddle(),

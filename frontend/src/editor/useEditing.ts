@@ -9,6 +9,7 @@ import { useGoals, useRegion } from "./asked";
 import { changesOf } from "./changes";
 import { handlerFor } from "./handlers";
 import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
+import { usePick } from "./pick";
 import { everyone } from "./placing";
 import { firstStep, ofProblem, type Step } from "./scene";
 import { type Sights, sightsOf } from "./sights";
@@ -69,11 +70,15 @@ export function useEditing(
   );
   const { goals, route } = useGoals(name, one, roiKey, graph);
   const { inside, starts, actors, flows } = useShown(loaded, document, assets, selection, problems);
-  const sights = useMemo(() => sightsOf(handle, graph), [graph]);
+  const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const changes = useMemo(() => changesOf({ ones, starts, edit, say: tell }), [ones, starts, edit]);
 
+  const pick = usePick();
   const goTo = (next: Step): void => {
-    if (next !== step) setHover(null);
+    if (next !== step) {
+      setHover(null);
+      pick.stop();
+    }
     setStep(next);
   };
   const arm = (next: Tool | null): void => {
@@ -101,6 +106,7 @@ export function useEditing(
       setLight(junction);
     },
     changes,
+    pick,
     select,
     openStep: (next) => {
       goTo(next);
@@ -141,5 +147,7 @@ export function useEditing(
 /** Where a problem is solved that is not about one road user. */
 function stepOf({ where }: Problem): Step | null {
   if (where.startsWith("roi")) return "region";
+  if (where.startsWith("measures")) return "measures";
+  if (where.startsWith("transit")) return "transit";
   return where.startsWith("demand") ? "traffic" : null;
 }

@@ -2,14 +2,19 @@ import { useMemo } from "react";
 
 import type { Scene } from "../map/scene";
 import { laneFacts } from "./placeWords";
-import { measureStyles, segmentStyles } from "./scene";
+import { segmentStyles, type Step } from "./scene";
+import { measureShapes, transitPins } from "./sceneParts";
 import type { EditorNow } from "./useEditing";
+
+/** Steps in which measures are drawn, and stops and lines. */
+const MEASURED: ReadonlySet<Step> = new Set<Step>(["traffic", "measures", "run"]);
+const SERVED: ReadonlySet<Step> = new Set<Step>(["traffic", "transit", "run"]);
 
 /** What the map shows of the editor as it is now. */
 export function useScene(now: EditorNow): Scene {
   const {
     graph,
-    document: { roi, measures },
+    document: { roi, measures, transit },
     region: { candidates },
     step,
     handler: { walks, badge },
@@ -20,15 +25,21 @@ export function useScene(now: EditorNow): Scene {
     goals,
     one,
     route,
+    lights,
+    pick,
   } = now;
+  const shapes = useMemo(() => measureShapes(graph, measures, lights), [graph, measures, lights]);
+  const stops = useMemo(() => transitPins(graph, transit), [graph, transit]);
   return useMemo<Scene>(() => {
     const placing = step === "actors";
+    const pointing = placing || pick.now !== null;
+    const measured = MEASURED.has(step);
+    const served = SERVED.has(step);
     const place = hover?.is === "place" ? hover.place : null;
     return {
-      segments:
-        step === "traffic" || step === "run"
-          ? measureStyles(graph, measures)
-          : segmentStyles(graph, roi, candidates, step === "region"),
+      segments: measured ? shapes.segments : segmentStyles(graph, roi, candidates, step === "region"),
+      lanes: measured ? shapes.rings : [],
+      pins: [...(measured ? shapes.pins : []), ...(served ? stops : [])],
       hoverSegment: hover?.is === "segment" ? hover.row : null,
       nodes: {
         vehicles: step !== "region" && (!placing || walks !== true),
@@ -40,9 +51,26 @@ export function useScene(now: EditorNow): Scene {
       goals: placing ? (goals ?? []) : [],
       chosenGoal: placing && one?.goal ? (graph.place(one.goal) ?? null) : null,
       route: placing ? route : [],
-      hover: placing ? place : null,
+      hover: pointing ? place : null,
       hoverText: placing && place ? laneFacts(graph, place.id) : null,
       hoverCategory: badge,
     };
-  }, [graph, roi, measures, candidates, step, hover, walks, badge, inside, actors, flows, goals, one, route]);
+  }, [
+    graph,
+    roi,
+    shapes,
+    stops,
+    candidates,
+    step,
+    hover,
+    walks,
+    badge,
+    inside,
+    actors,
+    flows,
+    goals,
+    one,
+    route,
+    pick,
+  ]);
 }

@@ -14,6 +14,7 @@ export const GOAL = "#5AC3FF";
 export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
 export const MEASURE = "#B45309";
+export const TRANSIT = "#364FC7";
 
 export interface Palette {
   land: string;

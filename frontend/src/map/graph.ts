@@ -113,7 +113,7 @@ export function strips(columns: GraphColumns): Strip[] {
 }
 
 /** The strip through nodes `from` to `end`, lengthened by half a spacing at both ends. */
-function ringOf(c: GraphColumns, from: number, end: number): Float64Array {
+export function ringOf(c: GraphColumns, from: number, end: number): Float64Array {
   const n = end - from + 2;
   const ring = new Float64Array(4 * n);
   const half = c.spacing / 2;

@@ -1,7 +1,17 @@
 import { nth } from "../lists";
-import { FLOW, GOAL, type Palette, PEDESTRIAN_NODE, PROBLEM, ROI_BASE, VEHICLE_NODE } from "./colors";
+import {
+  FLOW,
+  GOAL,
+  MEASURE,
+  type Palette,
+  PEDESTRIAN_NODE,
+  PROBLEM,
+  ROI_BASE,
+  TRANSIT,
+  VEHICLE_NODE,
+} from "./colors";
 import type { Graph, Place } from "./graph";
-import type { Scene, SceneActor, SceneFlow } from "./scene";
+import type { Scene, SceneActor, SceneFlow, ScenePin } from "./scene";
 import type { View } from "./view";
 import type { Category } from "../api/types";
 
@@ -202,6 +212,29 @@ export function badge(
   context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
   context.fill(glyph, "evenodd");
   context.restore();
+}
+
+/** A round sign with a name below it: orange for measures, dark blue for public transport. */
+export function drawPin(
+  context: CanvasRenderingContext2D,
+  [x, y]: [number, number],
+  pin: ScenePin,
+  named: boolean,
+): void {
+  const measure = pin.sign === "!" || pin.sign === "off";
+  context.beginPath();
+  context.arc(x, y, 10, 0, 2 * Math.PI);
+  context.fillStyle = measure ? MEASURE : TRANSIT;
+  context.fill();
+  context.lineWidth = 2;
+  context.strokeStyle = "#ffffff";
+  context.stroke();
+  context.font = `700 ${pin.sign.length > 1 ? 9 : 12}px system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = "#ffffff";
+  context.fillText(pin.sign, x, y + 0.5);
+  if (named) tag(context, pin.text, x, y + 21);
 }
 
 export function tag(context: CanvasRenderingContext2D, text: string, x: number, y: number): void {

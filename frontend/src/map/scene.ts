@@ -30,9 +30,22 @@ export interface SceneFlow {
   problem: boolean;
 }
 
+/** A sign at a point: a stop, an incident, a light that is off. */
+export interface ScenePin {
+  x: number;
+  y: number;
+  /** What is written in it. */
+  sign: string;
+  /** What is written below it. */
+  text: string;
+}
+
 /** Everything of a scenario that is drawn on the map, ready to draw. */
 export interface Scene {
   segments: ReadonlyMap<number, SegmentStyle>;
+  /** Lanes that measures act on, as rings: x and y in turn. */
+  lanes: readonly Float64Array[];
+  pins: readonly ScenePin[];
   hoverSegment: number | null;
   /** Which places are shown when near. */
   nodes: { vehicles: boolean; walks: boolean; inside: ReadonlySet<number> | null };
@@ -50,6 +63,8 @@ export interface Scene {
 
 export const EMPTY_SCENE: Scene = {
   segments: new Map(),
+  lanes: [],
+  pins: [],
   hoverSegment: null,
   nodes: { vehicles: true, walks: true, inside: null },
   actors: [],

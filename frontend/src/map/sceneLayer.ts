@@ -22,6 +22,7 @@ import {
   drawGoal,
   drawLane,
   drawOffset,
+  drawPin,
   drawRoute,
   drawWalkEdges,
   spot,
@@ -38,6 +39,9 @@ const EDGES_FROM = 7;
 const MANY = 300;
 /** More names than these would lie on top of each other. */
 const FEW = 3;
+/** Signs are named from so many pixels a metre on, or where they are few. */
+const NAMED_FROM = 1;
+const FEW_PINS = 12;
 /** Least length of the arrow at the pointer, pixels. */
 const ARROW = 26;
 /** No body reaches further from its middle, metres. */
@@ -106,6 +110,8 @@ export class SceneLayer {
         spot(context, at(actor.x, actor.y), CATEGORY_COLOR[actor.category]);
       } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette, named);
     }
+    const namedPins = view.scale >= NAMED_FROM || scene.pins.length <= FEW_PINS;
+    for (const pin of scene.pins) drawPin(context, at(pin.x, pin.y), pin, namedPins);
     for (const flow of scene.flows) drawFlow(context, at(flow.x, flow.y), flow, palette);
     if (scene.hover && scene.hoverText) {
       const [x, y] = at(scene.hover.x, scene.hover.y);
@@ -122,6 +128,13 @@ export class SceneLayer {
       if (!path || !bounds || !overlaps(bounds, seen)) continue;
       context.globalAlpha = SEGMENT[style].alpha;
       context.fillStyle = SEGMENT[style].fill;
+      context.fill(path);
+    }
+    context.globalAlpha = SEGMENT.measure.alpha;
+    context.fillStyle = SEGMENT.measure.fill;
+    for (const ring of scene.lanes) {
+      const path = new Path2D();
+      addRing(path, ring);
       context.fill(path);
     }
     context.globalAlpha = 1;

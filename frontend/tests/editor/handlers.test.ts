@@ -8,6 +8,7 @@ import { flowTool } from "../../src/editor/handlers/flow";
 import type { Editing, Tool } from "../../src/editor/handlers/handler";
 import { moveTool } from "../../src/editor/handlers/move";
 import { placeTool } from "../../src/editor/handlers/place";
+import type { Picked, PickBy, PlacePick } from "../../src/editor/pick";
 import { everyone, Starts } from "../../src/editor/placing";
 import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor/scene";
 import type { Pointed } from "../../src/map/MapCanvas";
@@ -27,6 +28,13 @@ class Log {
 }
 
 const picker = new Picker(graph);
+const NOT_PICKING: PlacePick = {
+  now: null,
+  start: () => undefined,
+  stop: () => undefined,
+  begin: () => undefined,
+  taker: { current: () => undefined },
+};
 
 function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = {}): Editing {
   const ones = everyone(document);
@@ -56,6 +64,7 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
         return Promise.resolve(null);
       },
     }),
+    pick: NOT_PICKING,
     select: (ids) => log.selected.push(ids),
     openStep: (step) => log.steps.push(step),
     openActors: () => log.steps.push("actors"),
@@ -326,4 +335,43 @@ test("a click on a traffic light shows its program, unless something is placed o
   handlerFor("actors", placeTool("car"), free).pick(at(x, y));
   expect(log.lights).toEqual(["10"]);
   expect(log.selected).toContainEqual(["a"]);
+});
+
+/** What is picked by clicks of a kind, of a turn with its first segment; and what was said. */
+function picked(
+  by: PickBy,
+  points: [number, number][],
+  more: Partial<Editing> = {},
+  from: string | null = null,
+) {
+  const found: Picked[] = [];
+  const begun: string[] = [];
+  const pick: PlacePick = {
+    ...NOT_PICKING,
+    now: { key: "k", by, from },
+    begin: (segment) => begun.push(segment),
+    taker: { current: (one) => found.push(one) },
+  };
+  const { log, handler } = using(null, scenario([], ["a"]), { pick, ...more }, "measures");
+  for (const [x, y] of points) handler.pick(at(x, y));
+  return { found, begun, said: log.said };
+}
+
+test("a segment, a lane, a point of it and a node are picked by where the click is", () => {
+  expect(picked("segment", [[2, 0]]).found).toEqual([{ name: "b", s: 0 }]);
+  expect(picked("lane", [[2, 0]]).found).toEqual([{ name: "1.0.-1", s: 2 }]);
+  expect(picked("point", [[4, 0]]).found).toEqual([{ name: "1.0.-1", s: 4 }]);
+  expect(picked("node", [[0, 0]]).found).toEqual([{ name: "1.0.-1.0", s: 0 }]);
+});
+
+test("a node outside the region is not picked, nor a lane where there is none", () => {
+  const outside = picked("node", [[900, 900]]);
+  expect(outside.found).toEqual([]);
+  expect(outside.said).toEqual(["There is no lane of the region here, or it lies in a junction."]);
+  expect(picked("lane", [[900, 900]]).said).toEqual(["There is no lane here."]);
+});
+
+test("a turn is picked by two roads, one after the other", () => {
+  expect(picked("turn", [[0, 0]])).toMatchObject({ begun: ["a"], found: [] });
+  expect(picked("turn", [[4, 0]], {}, "a").found).toEqual([{ name: "a>c", s: 0 }]);
 });

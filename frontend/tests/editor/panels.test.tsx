@@ -125,6 +125,8 @@ test("only the open step shows its form; every step can be opened at any time", 
         environment: text("Weather and time", false),
         actors: text("Road users", false),
         traffic: text("Traffic", false),
+        transit: text("Public transport", false),
+        measures: text("Measures", false),
         run: text("Run", false),
       }}
     />,

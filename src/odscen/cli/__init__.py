@@ -36,6 +36,7 @@ from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.sweep_command import sweep
 from odscen.cli.transit_commands import app as transit
+from odscen.cli.variant_command import variant
 
 _AGAIN = 0.05
 """Wall seconds after which an interruption that Python has only shown comes again."""
@@ -64,6 +65,7 @@ app.add_typer(signals, name="signals")
 app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
 app.command()(generate)
+app.command()(variant)
 app.command()(check)
 app.command()(export)
 app.command()(replay)

@@ -100,7 +100,7 @@ def fingerprint(
 
 
 _NOT_ACTING = (
-    "format", "version", "name", "description", "map", "seed", "parameters", "formulas",
+    "format", "version", "name", "description", "map", "variant", "seed", "parameters", "formulas",
 )  # fmt: skip
 """Parts of a scenario that say nothing of traffic, or nothing that others do not say."""
 

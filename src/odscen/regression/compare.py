@@ -11,13 +11,15 @@ from odscen.app.confident_runs import FIGURE, confidence_of
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError, in_file
 from odscen.regression.measure import FigureKey, measure
+from odscen.regression.variant_words import made_by_edits
 from odscen.results.measures.comparison import CONFIDENCE, compare_figure
 from odscen.results.measures.registry import SEGMENT_FIGURES
 from odscen.results.measures.traffic_files import read_tables
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.report.place_shapes import place_shapes
+from odscen.scenario.document.json_form import loads
 from odscen.sumo.folder.finished_run import Run
-from odscen.sumo.folder.layout import FIGURES_FOLDER, SUMMARY_FILE
+from odscen.sumo.folder.layout import FIGURES_FOLDER, SCENARIO_FILE, SUMMARY_FILE
 from odscen.sumo.folder.run_sums import whole_summary
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from odscen.regression.measure import Measured
     from odscen.results.measures.comparison import Difference, Finding
     from odscen.results.report.place_shapes import PlaceShapes
+    from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.store import Workspace
 
 FORMAT = "odscen-comparison"
@@ -51,7 +54,8 @@ class RunSet:
     """Runs of one side by seed; ``versions`` and ``scenario`` as in their summaries.
 
     ``networks`` are their tables of the whole network over time, where they have them; ``shapes``
-    those of the map, if a workspace that has it was given.
+    those of the map, if a workspace that has it was given. ``document`` is the scenario of the
+    first run, if its folder has it.
     """
 
     name: str
@@ -61,6 +65,7 @@ class RunSet:
     places: bool
     networks: tuple[pl.DataFrame, ...] = ()
     shapes: PlaceShapes | None = None
+    document: Scenario | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +244,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
         places,
         tuple(networks),
         None if workspace is None else _shapes(workspace, maps),
+        _document(folders[0]),
     )
 
 
@@ -259,6 +265,11 @@ def _summary(folder: Path) -> dict[str, Any]:
         msg = f"the run has not completed, it is {status!r}"
         raise InputError(msg, file=str(folder / SUMMARY_FILE))
     return summary
+
+
+def _document(folder: Path) -> Scenario | None:
+    path = folder / SCENARIO_FILE
+    return loads(path.read_text(encoding="utf-8"), file=str(path)) if path.is_file() else None
 
 
 def _shapes(workspace: Workspace, maps: set[tuple[str, str]]) -> PlaceShapes | None:
@@ -305,8 +316,8 @@ def _most_changed(rows: list[Row], a: RunSet, b: RunSet) -> tuple[Row, ...]:
 
 
 def _notes(a: RunSet, b: RunSet) -> tuple[str, ...]:
-    notes = []
-    if a.scenario != b.scenario:
+    notes = list(made_by_edits(a.document, b.document))
+    if a.scenario != b.scenario and not notes:
         notes.append(f"the scenarios have different names: {a.scenario} and {b.scenario}")
     if a.versions != b.versions:
         notes.append(f"made with different versions: {'; '.join(a.versions)} and "

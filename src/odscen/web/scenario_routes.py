@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
+from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
 from odscen.lanegraph.shortest_paths import Router
@@ -25,7 +26,7 @@ from odscen.scenario.placing.region import name_of, place_of
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.runner.network_fit import place_fit
-from odscen.web.edit_messages import EditRequest, apply_edit
+from odscen.web.edit_requests import EditRequest
 from odscen.web.large.large_documents import LargeDocumentRoute
 from odscen.web.messages import (
     CopyName,

@@ -6,6 +6,7 @@ import type { SceneActor, SceneFlow } from "../../map/scene";
 import type { Heads } from "../../signals/heads";
 import type { Region } from "../asked";
 import type { Changes } from "../changes";
+import type { PlacePick } from "../pick";
 import type { Starts } from "../placing";
 import type { Step } from "../scene";
 
@@ -74,6 +75,8 @@ export interface Editing {
   /** Shows the program of the light of a junction. */
   showLight: (junction: string) => void;
   changes: Changes;
+  /** Places that are picked for a form. */
+  pick: PlacePick;
   select: (ids: readonly string[]) => void;
   openStep: (step: Step) => void;
   /** Opens the step of the road users; the map stays where it is. */

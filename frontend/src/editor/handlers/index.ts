@@ -1,18 +1,24 @@
 import type { Step } from "../scene";
-import type { Editing, Handler, Tool } from "./handler";
+import { type Editing, type Handler, LOOKING, type Tool } from "./handler";
 import { withLights } from "./lights";
+import { pickingHandler } from "./picking";
 import { regionHandler } from "./region";
 import { selectHandler } from "./select";
 import { trafficHandler } from "./traffic";
+
+const lookingHandler = (): Handler => LOOKING;
 
 /** Steps in which the map is pointed at in a way of their own. */
 const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   region: regionHandler,
   traffic: trafficHandler,
+  transit: lookingHandler,
+  measures: lookingHandler,
 };
 
 /** Who is in charge of the map; lights can be asked for their programs unless places are chosen. */
 export function handlerFor(step: Step, tool: Tool | null, editing: Editing): Handler {
+  if (editing.pick.now) return pickingHandler(editing);
   const handler = (OF_STEP[step] ?? tool?.handler ?? selectHandler)(editing);
   return handler.aim ? handler : withLights(handler, editing);
 }

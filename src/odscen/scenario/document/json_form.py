@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 OPTIONAL = (
-    "drivers", "demand", "transit", "signals", "measures", "study", "rules", "parameters",
+    "variant", "drivers", "demand", "transit", "signals", "measures", "study", "rules",
+    "parameters",
     "formulas",
 )  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
@@ -102,9 +104,17 @@ def without_defaults(scenario: Scenario, field: str) -> Any:
         return scenario.model_dump(mode="json", include={field}, exclude_defaults=True).get(
             field, {}
         )
+    if value is None:
+        return None
     if isinstance(value, tuple):
         return [part.model_dump(mode="json", exclude_defaults=True) for part in value]
     return value.model_dump(mode="json", exclude_defaults=True)
+
+
+def content_sha256(scenario: Scenario) -> str:
+    """SHA-256 of the content of a scenario: all but its seed, its name, and its parent."""
+    same = {"seed": 0, "name": "content", "variant": None}
+    return hashlib.sha256(dumps(scenario.model_copy(update=same)).encode()).hexdigest()
 
 
 def schema() -> dict[str, Any]:
@@ -152,7 +162,7 @@ def _layout(key: str, value: object) -> str:
             for name, one in value.items()
         )
         return "{\n" + ",\n".join(fields) + "\n  }"
-    if key in ("demand", "transit", "study") and isinstance(value, dict):
+    if key in ("demand", "transit", "study", "variant") and isinstance(value, dict):
         fields = (f"    {json.dumps(name)}: {_parts(part)}" for name, part in value.items())
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key == "signals" and isinstance(value, dict) and _has_programs(value):

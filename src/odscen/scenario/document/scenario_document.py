@@ -22,6 +22,7 @@ from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.study_document import Study
 from odscen.scenario.document.transit_document import Transit
+from odscen.scenario.document.variants_document import Variant
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
@@ -280,6 +281,8 @@ class Scenario(Part):
         For people.
     map
         Name and SHA-256 of the map, and metres between the nodes of its lane graph.
+    variant
+        Parent and edits, if the scenario was made as a variant of another.
     seed
         Random seed of whatever is drawn in a run, 0 to 2^31 - 1.
     roi
@@ -320,6 +323,7 @@ class Scenario(Part):
     name: Annotated[str, Field(min_length=1, max_length=120, pattern=PRINTABLE)]
     description: Prose = ""
     map: MapReference
+    variant: Variant | None = None
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
     roi: tuple[Label, ...]
     environment: Environment = Environment()

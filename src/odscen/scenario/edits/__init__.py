@@ -26,6 +26,7 @@ from odscen.scenario.edits.demand_edits import (
     set_zone,
 )
 from odscen.scenario.edits.flow_edits import add_flow, change_flow, remove_flow
+from odscen.scenario.edits.measure_edits import remove_measure, set_measure
 from odscen.scenario.edits.roi_edits import (
     eligible_segments,
     grow_roi,
@@ -61,6 +62,7 @@ __all__ = [
     "remove_actors",
     "remove_demand",
     "remove_flow",
+    "remove_measure",
     "remove_transit",
     "rename",
     "set_background",
@@ -73,6 +75,7 @@ __all__ = [
     "set_input",
     "set_line",
     "set_matrix",
+    "set_measure",
     "set_profile",
     "set_routes",
     "set_seed",

@@ -52,8 +52,8 @@ GOAL = "goal"
 """Relation, and key, of the edge from a spawn to its goal."""
 
 _JSON = (
-    "roi", "environment", "drivers", "demand", "transit", "signals", "measures", "simulation",
-    "study", "rules", "parameters", "formulas",
+    "variant", "roi", "environment", "drivers", "demand", "transit", "signals", "measures",
+    "simulation", "study", "rules", "parameters", "formulas",
 )  # fmt: skip
 """Graph attributes that hold JSON."""
 

@@ -1,36 +1,37 @@
 """Edits by name: every entry of :mod:`odscen.scenario.edits.edit_registry` as a message.
 
 The messages are made from the functions' signatures, so that there is no second list to keep: kind
-is the function's name, the other fields are its arguments. What the server knows itself (the
-scenario, the graph, the lights) is not among them.
+is the function's name, the other fields are its arguments. What is known from the scenario's map
+(the graph, the lights) is not among them. The server and variants take them.
 """
 
 from __future__ import annotations
 
 import inspect
+import json
 import operator
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, create_model
 
+from odscen.base.errors import ScenarioError
 from odscen.scenario.document import document_parts, scenario_document, signals_document
+from odscen.scenario.document.validation import validation_problems
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
-    from odscen.app.maps import LoadedMap
     from odscen.scenario.document.document_parts import Part
     from odscen.scenario.document.scenario_document import Scenario
 
 _KNOWN = {"scenario": "Scenario", "graph": "MapGraph", "lights": "Light", "usable": "Usable"}
-"""Arguments that the server has itself, and the names of their types, which need no message."""
+"""Arguments that come with the map, and the names of their types, which need no message."""
 _JSON = {"Iterable": list, "Sequence": list, "Mapping": dict}
 """JSON has lists and objects; an Iterable would be read only when it is used."""
-
-MOST_EDITS = 5000
-"""Edits in one request."""
+_LONGEST = 160
+"""Characters of the arguments of an edit that are shown."""
 
 
 class EditBase(BaseModel):
@@ -46,23 +47,23 @@ class EditBase(BaseModel):
         return {name: getattr(self, name) for name in self.model_fields_set - {"kind"}}
 
     @property
+    def data(self) -> dict[str, Any]:
+        """The edit as JSON data, with what was given; :func:`read_edit` reads it."""
+        return self.model_dump(mode="json", exclude_unset=True)
+
+    @property
+    def words(self) -> str:
+        """The edit in one line: what undo calls it, and its arguments."""
+        given = json.dumps(
+            {name: one for name, one in self.data.items() if name != "kind"}, ensure_ascii=False
+        )
+        shown = given if len(given) <= _LONGEST else given[:_LONGEST] + "..."
+        return f"{self.label} ({self.kind} {shown})"
+
+    @property
     def label(self) -> str:
         """The edit in words, for undo and redo."""
         return EDIT_ENTRIES[self.kind].label.format(**self.arguments)
-
-
-def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenario:
-    """Return the scenario that the edit makes of another.
-
-    Raises
-    ------
-    InputError
-        If a rule forbids it.
-    """
-    function = EDIT_ENTRIES[edit.kind].function
-    known = {"graph": loaded.sumo.graph, "lights": loaded.lights, "usable": loaded.usable}
-    ours = {name: known[name] for name in inspect.signature(function).parameters if name in known}
-    return function(scenario, **ours, **edit.arguments)
 
 
 def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
@@ -111,23 +112,22 @@ else:
     AnyEdit = Annotated[reduce(operator.or_, MESSAGES), Field(discriminator="kind")]
 
 
-class EditRequest(BaseModel):
-    """Edits of one version: all of them or none, and one step for undo.
+_READER: TypeAdapter[EditBase] = TypeAdapter(AnyEdit)
 
-    ``label`` says in words what they do together; needed only where there are several.
+
+def read_edit(data: Mapping[str, Any]) -> EditBase:
+    """Read an edit from JSON data: ``kind`` and its arguments.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such kind, or an argument is not possible.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    version: Annotated[int, Field(ge=0, lt=2**53)]
-    edits: Annotated[list[AnyEdit], Field(min_length=1, max_length=MOST_EDITS)]
-    label: Annotated[str, Field(min_length=1, max_length=80)] | None = None
-
-    @property
-    def words(self) -> str:
-        """What undo and redo call this."""
-        if self.label is not None:
-            return self.label
-        first = self.edits[0].label
-        more = len(self.edits) - 1
-        return f"{first} and {more} more" if more else first
+    try:
+        return _READER.validate_python({"kind": None, **data})
+    except ValidationError as err:
+        problems = validation_problems(err)
+        if data.get("kind") not in EDIT_ENTRIES:
+            problems = (f"kind: {data.get('kind')!r} is none of {', '.join(EDIT_ENTRIES)}",)
+        msg = f"this edit cannot be read: {problems[0]}"
+        raise ScenarioError(msg, problems=problems[1:]) from err

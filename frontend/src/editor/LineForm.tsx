@@ -1,0 +1,212 @@
+import { ActionIcon, Button, Group, Select, Text, Tooltip } from "@mantine/core";
+
+import { type FieldsOf, CATEGORIES } from "../api/types";
+import { isKey, nth } from "../lists";
+import { IconTrash } from "../ui/icons";
+import { CATEGORY_WORD, clock, count } from "../ui/words";
+import { Committed } from "./Committed";
+import { PartCard, WindowFields } from "./DemandParts";
+import { useTaking } from "./pick";
+import { placeWord } from "./placeWords";
+import { type CardProps, OpenAndShow } from "./StopForm";
+import { type Line, servedOf, type Stop, stopWord, timetableWord } from "./transit";
+
+/** A line: how often it runs, where it begins and ends, and its stops. */
+export function LineCard({
+  line,
+  stops,
+  graph,
+  open,
+  pick,
+  onOpen,
+  onEdit,
+  onRemove,
+  onShow,
+}: CardProps & { line: Line; stops: readonly Stop[] }) {
+  const { id } = line;
+  const key = `line ${id}`;
+  const change = (fields: FieldsOf<"set_line", "line">): void =>
+    onEdit({ kind: "set_line", line: id, ...fields });
+  const word = CATEGORY_WORD[line.category].toLowerCase();
+  return (
+    <PartCard
+      name={id}
+      what="Line"
+      note={`${word}, ${timetableWord(line)}, ${count(line.stops.length, "stop")}`}
+      onRemove={() => onRemove(id)}
+    >
+      <OpenAndShow part={id} open={open} onShow={onShow} onOpen={() => onOpen(open ? null : key)} />
+      {open && (
+        <>
+          <TimetableFields line={line} onChange={change} />
+          <Ends line={line} graph={graph} pick={pick} onChange={change} />
+          <Served line={line} stops={stops} onChange={change} />
+        </>
+      )}
+    </PartCard>
+  );
+}
+
+type Change = (fields: FieldsOf<"set_line", "line">) => void;
+
+function TimetableFields({ line, onChange }: { line: Line; onChange: Change }) {
+  return (
+    <>
+      {line.headway === null ? (
+        <Text size="sm">Departs at {line.departures.map((time) => clock(time)).join(", ")} of the run</Text>
+      ) : (
+        <>
+          <Committed
+            label="A trip every"
+            suffix=" min"
+            min={0.2}
+            max={1440}
+            digits={1}
+            value={line.headway / 60}
+            onCommit={(value) => {
+              if (value !== null) onChange({ headway: value * 60 });
+            }}
+          />
+          <WindowFields begin={line.begin} end={line.end} onChange={onChange} />
+        </>
+      )}
+      <Group grow align="flex-start">
+        {typeof line.dwell === "number" ? (
+          <Committed
+            label="Dwell time"
+            suffix=" s"
+            min={0}
+            max={3600}
+            digits={0}
+            value={line.dwell}
+            onCommit={(value) => onChange({ dwell: { kind: "constant", value: value ?? 20 } })}
+          />
+        ) : (
+          <Text size="sm">Dwell time by a distribution: {String(line.dwell.kind)}</Text>
+        )}
+        <Select
+          label="Vehicles"
+          allowDeselect={false}
+          data={CATEGORIES.filter((one) => one !== "pedestrian").map((value) => ({
+            value,
+            label: CATEGORY_WORD[value],
+          }))}
+          value={line.category}
+          onChange={(category) => {
+            if (isKey(CATEGORY_WORD, category)) onChange({ category, model: null });
+          }}
+        />
+      </Group>
+    </>
+  );
+}
+
+function Ends({ line, graph, pick, onChange }: Omit<EndProps, "end">) {
+  return (
+    <>
+      <End end="start" line={line} graph={graph} pick={pick} onChange={onChange} />
+      <End end="goal" line={line} graph={graph} pick={pick} onChange={onChange} />
+    </>
+  );
+}
+
+interface EndProps extends Pick<CardProps, "graph" | "pick"> {
+  end: "start" | "goal";
+  line: Line;
+  onChange: Change;
+}
+
+function End({ end, line, graph, pick, onChange }: EndProps) {
+  const key = `${end} of ${line.id}`;
+  const active = useTaking(pick, key, ({ name }) => {
+    onChange({ [end]: name });
+    pick.stop();
+  });
+  const node = line[end];
+  const word = end === "start" ? "Begins" : "Ends";
+  return (
+    <Group gap={6} justify="space-between" wrap="nowrap">
+      <Text size="sm">
+        {word}: {node === null ? "at an end of the region" : placeWord(graph, node)}
+      </Text>
+      <Button
+        size="compact-sm"
+        style={{ flexShrink: 0 }}
+        variant={active ? "filled" : "default"}
+        aria-pressed={active}
+        aria-label={active ? "Stop choosing" : `Choose where it ${word.toLowerCase()}`}
+        onClick={() => (active ? pick.stop() : pick.start(key, "node"))}
+      >
+        {active ? "Stop choosing" : "Choose"}
+      </Button>
+    </Group>
+  );
+}
+
+/** Stops in their order, each with its scheduled departure; more are added at the end. */
+function Served({ line, stops, onChange }: { line: Line; stops: readonly Stop[]; onChange: Change }) {
+  const onServed = (served: Line["stops"]): void => onChange({ stops: servedOf(served) });
+  const known = new Map(stops.map((stop) => [stop.id, stop]));
+  const put = (n: number, fields: Partial<Line["stops"][number]>): void =>
+    onServed(line.stops.map((one, k) => (k === n ? { ...one, ...fields } : one)));
+  const swap = (n: number): void => {
+    const next = [...line.stops];
+    [next[n - 1], next[n]] = [nth(next, n), nth(next, n - 1)];
+    // The times belong to the places in the order, not to the stops.
+    onServed(next.map((one, k) => ({ ...one, after: nth(line.stops, k).after })));
+  };
+  return (
+    <section aria-label={`Stops of line ${line.id}`}>
+      {line.stops.map(({ stop, after }, n) => {
+        const name = known.get(stop);
+        return (
+          <Group key={`${n} ${stop}`} gap={6} align="flex-end" wrap="nowrap" mb={6}>
+            <div style={{ flex: 1 }}>
+              <Committed
+                label={`${n + 1}. ${name ? stopWord(name) : stop}, departs after`}
+                suffix=" s"
+                min={0}
+                max={1e6}
+                digits={0}
+                placeholder="no timetable"
+                value={after ?? ""}
+                onCommit={(value) => put(n, { after: value })}
+              />
+            </div>
+            <Tooltip label="Earlier in the order">
+              <ActionIcon
+                variant="default"
+                size="lg"
+                disabled={n === 0}
+                aria-label={`Serve ${stop} earlier`}
+                onClick={() => swap(n)}
+              >
+                <span aria-hidden="true">↑</span>
+              </ActionIcon>
+            </Tooltip>
+            <ActionIcon
+              variant="subtle"
+              color="gray"
+              size="lg"
+              disabled={line.stops.length === 1}
+              aria-label={`Leave out ${stop}`}
+              onClick={() => onServed(line.stops.filter((_, k) => k !== n))}
+            >
+              <IconTrash />
+            </ActionIcon>
+          </Group>
+        );
+      })}
+      <Select
+        label="Serve one more stop"
+        placeholder="Choose a stop"
+        value={null}
+        searchable
+        data={stops.map((stop) => ({ value: stop.id, label: stopWord(stop) }))}
+        onChange={(stop) => {
+          if (stop) onServed([...line.stops, { stop, after: null, dwell: null }]);
+        }}
+      />
+    </section>
+  );
+}

@@ -1,0 +1,155 @@
+import { Button, Group, SegmentedControl, Select, Stack, Text, TextInput } from "@mantine/core";
+import { useState } from "react";
+
+import type { Edit } from "../api/types";
+import { isKey } from "../lists";
+import { MeasureCard } from "./MeasureForm";
+import { KIND, type Measure, newMeasure, picksOf } from "./measures";
+import { type PlacePick, type PickBy, type Picked, useTaking } from "./pick";
+
+const NEW = "new measure";
+
+export const PICK_WORD: Record<PickBy, string> = {
+  segment: "Road",
+  lane: "Lane",
+  turn: "Turn",
+  point: "Point of a lane",
+  light: "Traffic light",
+  node: "Point of a lane",
+};
+
+/** Closures, roadworks and the like: a list with a form for each, and the places on the map. */
+export function MeasuresStep({
+  measures,
+  lights,
+  pick,
+  onEdit,
+  onShow,
+}: {
+  measures: readonly Measure[];
+  /** Junctions with a traffic light. */
+  lights: readonly string[];
+  pick: PlacePick;
+  onEdit: (edit: Edit | readonly Edit[], label?: string) => void;
+  onShow: (measure: Measure) => void;
+}) {
+  const [open, setOpen] = useState<string | null>(null);
+  return (
+    <>
+      <Text size="sm">What traffic may do is changed for a time; the map stays as it is.</Text>
+      {measures.map((measure) => (
+        <MeasureCard
+          key={measure.id}
+          measure={measure}
+          taken={measures.map(({ id }) => id)}
+          open={open === measure.id}
+          pick={pick}
+          onOpen={setOpen}
+          onEdit={onEdit}
+          onShow={() => onShow(measure)}
+        />
+      ))}
+      <NewMeasure
+        measures={measures}
+        lights={lights}
+        pick={pick}
+        onAdd={(measure) => {
+          onEdit({ kind: "set_measure", measure }, `Add ${measure.id}`);
+          pick.stop();
+          setOpen(measure.id);
+        }}
+      />
+    </>
+  );
+}
+
+/** A new measure begins with its kind and its first place, picked or typed. */
+function NewMeasure({
+  measures,
+  lights,
+  pick,
+  onAdd,
+}: {
+  measures: readonly Measure[];
+  lights: readonly string[];
+  pick: PlacePick;
+  onAdd: (measure: Measure) => void;
+}) {
+  const [kind, setKind] = useState<Measure["kind"]>("closure");
+  const [by, setBy] = useState<PickBy>("segment");
+  const [typed, setTyped] = useState("");
+  const choices = picksOf(kind);
+  const chosen = choices.includes(by) ? by : (choices[0] ?? "segment");
+  const add = (picked: Picked): void => {
+    onAdd(newMeasure(kind, picked, measures));
+    setTyped("");
+  };
+  const active = useTaking(pick, NEW, add);
+  const arm = (choice: PickBy): void => {
+    if (active) pick.start(NEW, choice);
+  };
+  const type = (): void => {
+    if (typed.trim()) add({ name: typed.trim(), s: 0 });
+  };
+  return (
+    <section className="fold" aria-label="New measure">
+      <Select
+        label="Kind of measure"
+        data={Object.entries(KIND).map(([value, label]) => ({ value, label }))}
+        value={kind}
+        allowDeselect={false}
+        onChange={(next) => {
+          if (!isKey(KIND, next)) return;
+          setKind(next);
+          arm(picksOf(next)[0] ?? "segment");
+        }}
+      />
+      {choices.length > 1 && (
+        <SegmentedControl
+          fullWidth
+          size="xs"
+          aria-label="What it is about"
+          data={choices.map((choice) => ({ value: choice, label: PICK_WORD[choice] }))}
+          value={chosen}
+          onChange={(next) => {
+            const choice = choices.find((one) => one === next) ?? chosen;
+            setBy(choice);
+            arm(choice);
+          }}
+        />
+      )}
+      <Stack gap={6}>
+        <Button aria-pressed={active} onClick={() => (active ? pick.stop() : pick.start(NEW, chosen))}>
+          {active ? "Stop choosing" : "Choose it on the map"}
+        </Button>
+        {kind === "signal_outage" ? (
+          <Select
+            label="or its junction"
+            data={[...lights]}
+            value={null}
+            searchable
+            onChange={(name) => {
+              if (name) add({ name, s: 0 });
+            }}
+          />
+        ) : (
+          <Group gap={6} align="flex-end" wrap="nowrap">
+            <TextInput
+              style={{ flex: 1 }}
+              label="or type its name"
+              placeholder={kind === "incident" ? "12.0.-2" : "r12, 12.0.-2 or r12>r8"}
+              value={typed}
+              onChange={(event) => setTyped(event.currentTarget.value)}
+              onKeyDown={(event) => {
+                if (event.key === "Enter") type();
+              }}
+            />
+            <Button variant="default" disabled={!typed.trim()} onClick={type}>
+              Add
+            </Button>
+          </Group>
+        )}
+      </Stack>
+    </section>
+  );
+}

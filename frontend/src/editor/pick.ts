@@ -1,0 +1,52 @@
+import { type RefObject, useEffect, useMemo, useRef, useState } from "react";
+
+/** What a click on the map names while a place is picked. */
+export type PickBy = "segment" | "lane" | "turn" | "point" | "light" | "node";
+
+/** A place that was pointed at: its name, and of a point of a lane how far along the road it is. */
+export interface Picked {
+  name: string;
+  s: number;
+}
+
+interface Picking {
+  /** For whom: the same key is the same form. */
+  key: string;
+  by: PickBy;
+  /** The first segment of a turn that is half picked. */
+  from: string | null;
+}
+
+/** Places picked on the map for a form. */
+export interface PlacePick {
+  now: Picking | null;
+  start: (key: string, by: PickBy) => void;
+  stop: () => void;
+  /** Keeps the first segment of a turn. */
+  begin: (from: string) => void;
+  taker: RefObject<(picked: Picked) => void>;
+}
+
+export function usePick(): PlacePick {
+  const [now, setNow] = useState<Picking | null>(null);
+  const taker = useRef<(picked: Picked) => void>(() => undefined);
+  return useMemo(
+    () => ({
+      now,
+      start: (key, by) => setNow({ key, by, from: null }),
+      stop: () => setNow(null),
+      begin: (from) => setNow((old) => old && { ...old, from }),
+      taker,
+    }),
+    [now],
+  );
+}
+
+/** Takes what is picked for `key`, always with what the form knows now. */
+export function useTaking(pick: PlacePick, key: string, take: (picked: Picked) => void): boolean {
+  const active = pick.now?.key === key;
+  useEffect(() => {
+    if (active) pick.taker.current = take;
+  });
+  return active;
+}
