@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 OPTIONAL = (
     "variant", "drivers", "demand", "transit", "signals", "measures", "study", "rules",
-    "parameters",
-    "formulas",
+    "parameters", "formulas",
 )  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
