@@ -129,7 +129,8 @@ def _lane(part: LaneChange, one: ActingActor) -> float:
 
 
 def _offset(part: LateralMove, one: ActingActor) -> float:
-    line = one.view.lane_line(one.actor.id, 0)
+    # Far beside its lane SUMO has it on another one: what follows is about the lane it came from.
+    line = one.channel.line or one.view.lane_line(one.actor.id, 0)
     if line is None:
         msg = "it is on no lane"
         raise CannotAct(msg)
