@@ -19,7 +19,13 @@ STEADY = "steady"
 """Id of the driver set of scenes: constant speed, no change of lane of one's own accord."""
 STEADY_DRIVER = {
     "id": STEADY,
-    "parameters": {"sigma": 0.0, "lcSpeedGain": 0.0, "lcKeepRight": 0.0, "lcCooperative": 0.0},
+    "parameters": {
+        "sigma": 0.0,
+        "lcSpeedGain": 0.0,
+        "lcKeepRight": 0.0,
+        "lcCooperative": 0.0,
+        "lcOvertakeRight": 1.0,
+    },
 }
 LEFT, RIGHT = 1, -1
 CHILD = 5.0 / 3.6

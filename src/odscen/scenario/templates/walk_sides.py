@@ -32,9 +32,10 @@ class RoadCrossing(NamedTuple):
 
     Attributes
     ----------
-    start, end, goal
-        Ids of pedestrian nodes: where the walk begins, where it is over the road, and where it
-        leads then.
+    start, goal
+        Pedestrian nodes: where the walk begins, and where it leads in the end.
+    end
+        Where it is over the road: a node, or x and y if no path leads on from there.
     meets
         Where it crosses the lane's centre line, OpenDRIVE frame, m.
     along
@@ -44,7 +45,7 @@ class RoadCrossing(NamedTuple):
     """
 
     start: str
-    end: str
+    end: str | list[float]
     goal: str
     meets: tuple[float, float]
     along: float
@@ -107,23 +108,30 @@ class WalkSides:
         if self._near_crosswalk(meets):
             msg = f"have a crosswalk within {_FROM_CORNER:.0f} m"
             raise Unfit(msg)
-        start_id, end_id = (walk_node_id(self._graph, row) for row in (start, end))
         goal = self._goal(start, end)
-        rounded = round(meets[0], 3), round(meets[1], 3)
+        there: str | list[float] = walk_node_id(self._graph, end)
+        if goal is None:  # nothing joins the two sides: it stays where it gets to
+            goal = self._goal(start, start)
+            there = [round(float(at[end]), 3) for at in (walks.x, walks.y)]
+        if goal is None:
+            msg = "have a sidewalk from which no path leads on"
+            raise Unfit(msg)
         return RoadCrossing(
-            start_id, end_id, goal, rounded, float(stretch.along[place]) + met, across
+            walk_node_id(self._graph, start),
+            there,
+            walk_node_id(self._graph, goal),
+            (round(meets[0], 3), round(meets[1], 3)),
+            float(stretch.along[place]) + met,
+            across,
         )
 
-    def _goal(self, start: int, end: int) -> str:
-        """Where to go on the far side: the nearest place that walks from the start may lead to."""
+    def _goal(self, start: int, behind: int) -> int | None:
+        """Nearest place behind a node that walks from the start may lead to."""
         goals: Int32Array = self._router.goal_candidates(start)
-        metres = self._router.distances(end)[goals]
-        goals = goals[np.isfinite(metres) & (metres > _ON) & self._usable[goals]]
-        if not len(goals):
-            msg = "have sidewalks that no path on foot joins"
-            raise Unfit(msg)
-        metres = np.round(self._router.distances(end)[goals], 3)
-        return walk_node_id(self._graph, int(goals[np.lexsort((goals, metres))[0]]))
+        metres = np.round(self._router.distances(behind)[goals], 3)
+        fits = np.isfinite(metres) & (metres > _ON) & self._usable[goals]
+        order = np.lexsort((goals[fits], metres[fits]))
+        return int(goals[fits][order[0]]) if len(order) else None
 
     def _near_crosswalk(self, place: tuple[float, float]) -> bool:
         if self._crosswalks is None:
