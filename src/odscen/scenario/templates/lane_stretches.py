@@ -97,10 +97,11 @@ class LaneStretches:
         behind = self.router.distances(by)
         goals = self.router.goal_candidates(spawn)
         detour = np.abs(from_spawn[goals] - from_spawn[by] - behind[goals])
-        goals = goals[(detour < _SAME) & (behind[goals] > ONWARD)]
-        if not len(goals):
-            return by
-        return int(goals[np.lexsort((goals, np.round(behind[goals], 3)))[0]])
+        goals = goals[(detour < _SAME) & np.isfinite(behind[goals])]
+        far = goals[behind[goals] > ONWARD]
+        if len(far):
+            return int(far[np.lexsort((far, np.round(behind[far], 3)))[0]])
+        return int(goals[np.argmax(behind[goals])]) if len(goals) else by
 
     @cached_property
     def router(self) -> Router:
