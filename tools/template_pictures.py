@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 ROOT = Path(__file__).parents[1]
-PICTURES = ROOT / "frontend" / "public" / "templates"
+PAGE, DOCS = ROOT / "frontend" / "public" / "templates", ROOT / "docs" / "images"
 SHOWN = {
     "cut-in": ("motorway_weave", "cut-in"),
     "lead-brakes": ("rural_hills", "brake"),
@@ -155,8 +155,9 @@ def main() -> None:
         for template, (map_name, _) in SHOWN.items():
             loaded = load_map(workspace.map(map_name))
             scenario = template_scenario(workspace, template, map_name, name=template)
-            path = PICTURES / f"{template}.svg"
-            path.write_text(picture(loaded, scenario, Path(name) / template), encoding="utf-8")
+            svg = picture(loaded, scenario, Path(name) / template)
+            for path in (PAGE / f"{template}.svg", DOCS / f"template-{template}.svg"):
+                path.write_text(svg, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -242,7 +242,7 @@ def _bus(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
 BUS_LEAVES = SceneTemplate(
     name="bus-leaves",
     title="Bus leaves its stop",
-    summary="A bus stands in the lane at the kerb and pulls out into the ego's lane.",
+    summary="A bus is stopped in the lane at the kerb and pulls out into the ego's lane.",
     source="No protocol: the numbers are odscen's choice.",
     needs="two lanes of one direction",
     parameters=(

@@ -89,7 +89,7 @@ def _within(
         if parked_lane is not None:
             actors.append(_parked(site, parked_lane, crossing.along - values["clearance"]))
             rules.append(at_once("parked", "parked", {"stop": {}}))
-            seen = " It is hidden by a vehicle that stands in the lane at the kerb."
+            seen = " It is hidden by a vehicle stopped in the lane at the kerb."
         rules.append(_crosses(walker, crossing, distance, walking))
         duration = values["approach"] + crossing.metres / walking + 20.0
         return TemplateScene(
@@ -156,7 +156,7 @@ _SPEEDS = (
 HIDDEN_CHILD = SceneTemplate(
     name="hidden-child",
     title="Child from behind a parked car",
-    summary="A child comes out in front of a vehicle that stands at the kerb, into the ego's path.",
+    summary="A child comes out in front of a vehicle stopped at the kerb, into the ego's path.",
     source="Euro NCAP AEB VRU, CPNCO-50 (nearside child from obstruction): child at 5 km/h, hit at "
     "50 % of the width; the ego at 10 to 60 km/h, here at 40 or less.",
     needs="two lanes of one direction, a sidewalk on either side",
@@ -164,7 +164,7 @@ HIDDEN_CHILD = SceneTemplate(
         *_SPEEDS,
         TemplateParameter(
             "clearance", 1, 0.3, 5, "m",
-            "least distance from the front of the standing vehicle to the child's path",
+            "least distance from the front of the stopped vehicle to the child's path",
         ),
     ),
     place=_child,
