@@ -17,7 +17,7 @@ import polars as pl
 from markupsafe import Markup
 
 from odscen.app.maps import load_map
-from odscen.app.templates import template_scenario
+from odscen.app.template_scenarios import template_scenario
 from odscen.base.markup import element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.results.records.run_records import Plan

@@ -24,7 +24,13 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
         {offered.value.map((one) => (
           <li key={one.name}>
             <Card withBorder padding={0} className="card">
-              <img className="card-picture" src={`templates/${one.name}.svg`} alt="" loading="lazy" />
+              <img
+                className="card-picture"
+                style={{ height: "auto" }}
+                src={`templates/${one.name}.svg`}
+                alt=""
+                loading="lazy"
+              />
               <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
                 <Title order={3} size="h4">
                   {one.title}

@@ -53,7 +53,7 @@ def new(
     if not template:
         _list(as_json=as_json)
         return
-    from odscen.app.templates import write_template
+    from odscen.app.template_scenarios import write_template
     from odscen.scenario.templates.template_registry import find_template
     from odscen.workspace.store import Workspace
 

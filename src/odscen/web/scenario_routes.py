@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
-from odscen.app.templates import template_scenario
+from odscen.app.template_scenarios import template_scenario
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
 from odscen.lanegraph.shortest_paths import Router

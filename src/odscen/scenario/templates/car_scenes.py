@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
+from odscen.scenario.templates.no_place import Unfit
 from odscen.scenario.templates.scene_actors import (
     LEFT,
     RIGHT,
@@ -23,12 +24,7 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import (
-    SceneTemplate,
-    TemplateParameter,
-    TemplateScene,
-    Unfit,
-)
+from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ import numpy as np
 
 from odscen.lanegraph.graphs import Relation
 from odscen.lanegraph.shortest_paths import Router
-from odscen.scenario.templates.scene_template import NoPlaceError, Unfit
+from odscen.scenario.templates.no_place import NoPlaceError, Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

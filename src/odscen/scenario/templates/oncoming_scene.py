@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
+from odscen.scenario.templates.no_place import Unfit
 from odscen.scenario.templates.scene_actors import (
     apart,
     at_once,
@@ -22,12 +23,7 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import (
-    SceneTemplate,
-    TemplateParameter,
-    TemplateScene,
-    Unfit,
-)
+from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -12,6 +12,7 @@ from shapely import LineString
 
 from odscen.lanegraph.query import node_id
 from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
+from odscen.scenario.templates.no_place import Unfit
 from odscen.scenario.templates.scene_actors import (
     at_once,
     kmh,
@@ -20,12 +21,7 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import (
-    SceneTemplate,
-    TemplateParameter,
-    TemplateScene,
-    Unfit,
-)
+from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -43,7 +39,7 @@ _LONGEST = 120.0
 """Metres from the runner's start to the stop line, at most."""
 
 
-class _Meeting(NamedTuple):
+class _CrossingPaths(NamedTuple):
     """Two movements through a light that cross: paths with their ends at the far side."""
 
     light: Light
@@ -67,7 +63,9 @@ def _red_light(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene
     return first_fit(candidates, why, place, what=what, map_name=map_name)
 
 
-def _at_light(site: TemplateSite, found: _Meeting, values: Mapping[str, float]) -> TemplateScene:
+def _at_light(
+    site: TemplateSite, found: _CrossingPaths, values: Mapping[str, float]
+) -> TemplateScene:
     graph = site.region.graph
     mine, theirs = _where_they_meet(site, found)
     ego, fast = values["ego_speed"], values["speed"]
@@ -116,7 +114,7 @@ def _at_light(site: TemplateSite, found: _Meeting, values: Mapping[str, float]) 
     )  # fmt: skip
 
 
-def _meetings(site: TemplateSite, why: Counter[str]) -> Iterator[_Meeting]:
+def _meetings(site: TemplateSite, why: Counter[str]) -> Iterator[_CrossingPaths]:
     """Pairs of movements straight through a light from different legs, in the map's order."""
     names = {name: row for row, name in enumerate(map(str, site.region.graph.lanes.lanes.keys))}
     for light in site.lights:
@@ -127,7 +125,7 @@ def _meetings(site: TemplateSite, why: Counter[str]) -> Iterator[_Meeting]:
                 if path is not None:
                     paths.append((movement, *path))
         pairs = [
-            _Meeting(light, one[1], other[1], one[0], one[2], other[2])
+            _CrossingPaths(light, one[1], other[1], one[0], one[2], other[2])
             for one in paths
             for other in paths
             if one[0].approach != other[0].approach
@@ -172,7 +170,7 @@ def _followers(site: TemplateSite, node: int, out: str) -> list[int]:
     return [int(one) for one in path[1:]] if len(path) < int(100.0 / lanes.spacing) else []
 
 
-def _where_they_meet(site: TemplateSite, found: _Meeting) -> tuple[int, int]:
+def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, int]:
     """Nodes of both paths next to where they cross.
 
     Raises

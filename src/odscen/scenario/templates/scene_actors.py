@@ -9,7 +9,7 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.lanegraph.query import node_id
 from odscen.scenario.templates.lane_stretches import LaneStretch
-from odscen.scenario.templates.scene_template import Unfit
+from odscen.scenario.templates.no_place import Unfit
 
 if TYPE_CHECKING:
     from odscen.scenario.templates.scene_template import TemplateSite

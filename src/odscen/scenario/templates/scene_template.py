@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.base.errors import InputError, ScenarioError
+from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -74,7 +74,7 @@ class SceneTemplate:
     parameters
         Its numbers.
     place
-        Places it, or raises :class:`NoPlaceError`.
+        Places it, or raises :class:`~odscen.scenario.templates.no_place.NoPlaceError`.
     """
 
     name: str
@@ -104,11 +104,3 @@ class SceneTemplate:
                 raise InputError(msg)
         usual = {one.name: one.default for one in self.parameters if one.default is not None}
         return usual | dict(given)
-
-
-class NoPlaceError(ScenarioError):
-    """No place of a map has room for a template; the message says where was looked and why not."""
-
-
-class Unfit(Exception):  # noqa: N818 (no error: the next place is tried)
-    """A place does not fit; the reason reads on from "of so many places"."""

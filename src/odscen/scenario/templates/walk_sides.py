@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from odscen.lanegraph.query import walk_node_id
-from odscen.scenario.templates.scene_template import Unfit
+from odscen.scenario.templates.no_place import Unfit
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, Int32Array, IntArray

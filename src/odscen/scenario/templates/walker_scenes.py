@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Category
 from odscen.scenario.templates.lane_stretches import first_fit
+from odscen.scenario.templates.no_place import NoPlaceError, Unfit
 from odscen.scenario.templates.scene_actors import (
     CHILD,
     at_once,
@@ -20,13 +21,7 @@ from odscen.scenario.templates.scene_actors import (
     rule,
     vehicle,
 )
-from odscen.scenario.templates.scene_template import (
-    NoPlaceError,
-    SceneTemplate,
-    TemplateParameter,
-    TemplateScene,
-    Unfit,
-)
+from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

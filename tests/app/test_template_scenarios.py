@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from odscen.app.scenarios import check_scenario, read_scenario
-from odscen.app.templates import template_scenario, write_template
+from odscen.app.template_scenarios import template_scenario, write_template
 from odscen.base.errors import ConflictError, InputError, NotFoundError
-from odscen.scenario.templates.scene_template import NoPlaceError
+from odscen.scenario.templates.no_place import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.workspace.store import Workspace
 
