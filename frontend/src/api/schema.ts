@@ -251,7 +251,7 @@ export interface paths {
         put?: never;
         /**
          * Create
-         * @description Start an empty scenario on a map.
+         * @description Start a scenario on a map: an empty one, or a template where the map has room for it.
          */
         post: operations["create_api_scenarios_post"];
         delete?: never;
@@ -1087,6 +1087,26 @@ export interface paths {
          * @description Delete an item for good.
          */
         delete: operations["delete_item_api_trash__item__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/templates": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Templates
+         * @description All templates, in the order in which they are offered.
+         */
+        get: operations["list_templates_api_templates_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -3355,12 +3375,23 @@ export interface components {
         /**
          * NewScenario
          * @description Start a scenario on a map; a free name is found if none is given.
+         *
+         *     With a ``template`` it is not empty; ``values`` are numbers that differ from the template's.
          */
         NewScenario: {
             /** Map */
             map: string;
             /** Name */
             name?: string | null;
+            /** Template */
+            template?: string | null;
+            /**
+             * Values
+             * @default {}
+             */
+            values?: {
+                [key: string]: number;
+            };
         };
         /**
          * Normal
@@ -5626,6 +5657,42 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * TemplateInfo
+         * @description A scene that can be placed on maps.
+         */
+        TemplateInfo: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /** Summary */
+            summary: string;
+            /** Source */
+            source: string;
+            /** Needs */
+            needs: string;
+            /** Numbers */
+            numbers: components["schemas"]["TemplateNumber"][];
+        };
+        /**
+         * TemplateNumber
+         * @description A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says.
+         */
+        TemplateNumber: {
+            /** Name */
+            name: string;
+            /** Usual */
+            usual: number | null;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /** Unit */
+            unit: string;
+            /** Meaning */
+            meaning: string;
+        };
         /**
          * Touching
          * @description The body of an actor touches that of another one, or of any that a rule names.
@@ -15036,6 +15103,116 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RemovedInfo"];
+                };
+            };
+            /** @description The request cannot be read. */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The token is missing. */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The request comes from a foreign page, or for another host. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The rest of the request did not come in time. */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description It is taken, in use, damaged, or has changed meanwhile. */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description Too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description What was sent cannot be used; the message says why. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The workspace cannot be read or written now, or memory is short. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+            /** @description The disk is full. */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ErrorAnswer"];
+                };
+            };
+        };
+    };
+    list_templates_api_templates_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TemplateInfo"][];
                 };
             };
             /** @description The request cannot be read. */

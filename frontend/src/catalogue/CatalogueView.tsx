@@ -17,6 +17,7 @@ import { Conversion } from "./Conversion";
 import { MapCard } from "./MapCard";
 import { arranged, type Order, ORDERS, type Wish, WISHES } from "./order";
 import { Scenarios } from "./Scenarios";
+import { Templates } from "./Templates";
 import { Wastebasket } from "./Wastebasket";
 
 /** The first screen: choose a map, or open a scenario. */
@@ -143,6 +144,7 @@ export function CatalogueView() {
           <AddMap empty={all.length === 0} onAdded={reload} onReport={setReported} />
         </div>
       )}
+      <Templates maps={all} />
       <Scenarios list={scenarios.value ?? []} onRemove={(name) => setRemoving({ kind: "scenario", name })} />
       <Button
         mt="xl"

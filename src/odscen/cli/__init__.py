@@ -35,6 +35,7 @@ from odscen.cli.scenario_commands import check, export, generate, replay
 from odscen.cli.serve_command import serve
 from odscen.cli.signal_commands import app as signals
 from odscen.cli.sweep_command import sweep
+from odscen.cli.template_command import NewCommand, new
 from odscen.cli.transit_commands import app as transit
 from odscen.cli.variant_command import variant
 
@@ -66,6 +67,7 @@ app.add_typer(transit, name="transit")
 app.add_typer(trash, name="trash")
 app.command()(generate)
 app.command()(variant)
+app.command(cls=NewCommand)(new)
 app.command()(check)
 app.command()(export)
 app.command()(replay)

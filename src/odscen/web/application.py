@@ -133,6 +133,7 @@ def create_app(
         removal_routes,
     ):
         app.include_router(routes.router)
+    app.include_router(scenario_routes.templates)
 
     @app.get("/api", include_in_schema=False)
     @app.get("/api/{path:path}", include_in_schema=False)

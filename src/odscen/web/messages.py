@@ -147,10 +147,37 @@ class ScenarioState(Answer):
 
 
 class NewScenario(RequestBody):
-    """Start a scenario on a map; a free name is found if none is given."""
+    """Start a scenario on a map; a free name is found if none is given.
+
+    With a ``template`` it is not empty; ``values`` are numbers that differ from the template's.
+    """
 
     map: Name
     name: Name | None = None
+    template: Name | None = None
+    values: Annotated[dict[Name, float], Field(max_length=40)] = {}
+
+
+class TemplateNumber(Answer):
+    """A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says."""
+
+    name: str
+    usual: float | None
+    low: float
+    high: float
+    unit: str
+    meaning: str
+
+
+class TemplateInfo(Answer):
+    """A scene that can be placed on maps."""
+
+    name: str
+    title: str
+    summary: str
+    source: str
+    needs: str
+    numbers: list[TemplateNumber]
 
 
 class OfVersion(RequestBody):

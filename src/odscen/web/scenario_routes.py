@@ -10,6 +10,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
+from odscen.app.template_scenarios import template_scenario
 from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
@@ -23,6 +24,7 @@ from odscen.scenario.edits.roi_edits import eligible_segments, removable_segment
 from odscen.scenario.forms.graph_form import to_graphml
 from odscen.scenario.placing.region import NodePlace as GraphPlace
 from odscen.scenario.placing.region import name_of, place_of
+from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.route_paths import each_path
 from odscen.sumo.runner.network_fit import place_fit
@@ -39,6 +41,8 @@ from odscen.web.messages import (
     RoiInfo,
     ScenarioRow,
     ScenarioState,
+    TemplateInfo,
+    TemplateNumber,
 )
 from odscen.web.services import Services, Shared, region_of
 from odscen.web.wire.media_types import Responses
@@ -49,6 +53,7 @@ if TYPE_CHECKING:
     from odscen.web.drafts import Draft
 
 router = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
+templates = APIRouter(prefix="/api/templates")
 
 _FILE: Responses = {
     200: {
@@ -67,11 +72,45 @@ def list_scenarios(shared: Shared) -> list[ScenarioRow]:
     return shared.drafts.rows()
 
 
+@templates.get("")
+def list_templates() -> list[TemplateInfo]:
+    """All templates, in the order in which they are offered."""
+    return [
+        TemplateInfo(
+            name=one.name,
+            title=one.title,
+            summary=one.summary,
+            source=one.source,
+            needs=one.needs,
+            numbers=[
+                TemplateNumber(
+                    name=number.name,
+                    usual=number.default,
+                    low=number.low,
+                    high=number.high,
+                    unit=number.unit,
+                    meaning=number.meaning,
+                )
+                for number in one.parameters
+            ],
+        )
+        for one in TEMPLATES.values()
+    ]
+
+
 @router.post("", status_code=201)
 def create(wish: NewScenario, shared: Shared) -> ScenarioState:
-    """Start an empty scenario on a map."""
+    """Start a scenario on a map: an empty one, or a template where the map has room for it."""
     if wish.name is not None:
         check_name(wish.name, what="scenario")
+    if wish.template is not None:
+        stem = f"{wish.template}-{wish.map}"
+        with shared.search:
+            scenario = template_scenario(
+                shared.workspace, wish.template, wish.map, values=wish.values, name=wish.name
+            )
+        draft = shared.drafts.create(scenario, wish.name, stem=stem, label="New from template")
+        return state_of(shared, draft)
     entry = shared.workspace.map(wish.map)
     scenario = new_scenario(load_map(entry).sumo.graph, name=wish.name or wish.map)
     draft = shared.drafts.create(scenario, wish.name, stem=wish.map, label="New scenario")

@@ -47,9 +47,10 @@ def move_aside(part: LateralMove, one: ActingActor) -> float:
     CannotAct
         If the actor is on no lane.
     """
-    line = one.view.lane_line(one.actor.id, 0)
-    if line is None and one.channel.side is not None:
-        line = one.channel.line  # it is beside the lane that it was led along until now
+    # Far beside its lane SUMO has it on another one, or none: what follows is about the lane that it
+    # was led along until now.
+    led = one.channel.line if one.channel.side is not None else None
+    line = led or one.view.lane_line(one.actor.id, 0)
     if line is None:
         msg = "it is on no lane"
         raise CannotAct(msg)

@@ -1,0 +1,126 @@
+import { Alert, Button, Card, Group, Modal, NumberInput, Select, Stack, Text, Title } from "@mantine/core";
+import { useState } from "react";
+
+import { type Template, templates } from "../api/templates";
+import type { MapInfo } from "../api/types";
+import { go } from "../ui/address";
+import { reasonOf } from "../ui/reason";
+import { useLoaded } from "../ui/useLoaded";
+
+/** A gallery of scenes; one is placed on any map that has room for it. */
+export function Templates({ maps }: { maps: MapInfo[] }) {
+  const offered = useLoaded(templates.all);
+  const [chosen, setChosen] = useState<Template | null>(null);
+  if (!offered.value || maps.length === 0) return null;
+  return (
+    <section aria-labelledby="templates" style={{ marginTop: 34 }}>
+      <Title order={2} size="h3" id="templates">
+        Start from a template
+      </Title>
+      <Text c="dimmed" mb="sm">
+        Scenes with a story, placed on a map that has room for them.
+      </Text>
+      <ul className="cards" aria-labelledby="templates">
+        {offered.value.map((one) => (
+          <li key={one.name}>
+            <Card withBorder padding={0} className="card">
+              <img
+                className="card-picture"
+                style={{ height: "auto" }}
+                src={`templates/${one.name}.svg`}
+                alt=""
+                loading="lazy"
+              />
+              <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
+                <Title order={3} size="h4">
+                  {one.title}
+                </Title>
+                <Text size="sm" mt={4} mb="sm" style={{ flex: 1 }}>
+                  {one.summary}
+                </Text>
+                <Button
+                  fullWidth
+                  variant="default"
+                  onClick={() => setChosen(one)}
+                  aria-label={`Place ${one.title}`}
+                >
+                  Place on a map
+                </Button>
+              </div>
+            </Card>
+          </li>
+        ))}
+      </ul>
+      <Modal opened={chosen !== null} onClose={() => setChosen(null)} title={chosen?.title} size="lg">
+        {chosen && <Placing key={chosen.name} template={chosen} maps={maps} />}
+      </Modal>
+    </section>
+  );
+}
+
+/** Which map, and the numbers of a template. */
+function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
+  const [map, setMap] = useState<string | null>(null);
+  const [values, setValues] = useState<Record<string, number>>({});
+  const [busy, setBusy] = useState(false);
+  const [refused, setRefused] = useState<string | null>(null);
+  const place = (): void => {
+    if (map === null) return;
+    setBusy(true);
+    setRefused(null);
+    templates.place(template.name, map, values).then(
+      (made) => go({ view: "editor", scenario: made.name }),
+      (error: unknown) => {
+        setBusy(false);
+        setRefused(reasonOf(error));
+      },
+    );
+  };
+  const change = (name: string, value: string | number): void => {
+    const others = Object.fromEntries(Object.entries(values).filter(([other]) => other !== name));
+    setValues(typeof value === "number" ? { ...others, [name]: value } : others);
+  };
+  return (
+    <Stack gap="sm">
+      <Text size="sm">
+        {template.summary} It needs {template.needs}.
+      </Text>
+      <Text size="xs" c="dimmed">
+        {template.source}
+      </Text>
+      <Select
+        label="Map"
+        placeholder="Choose a map"
+        searchable
+        data={maps.map((one) => one.name)}
+        value={map}
+        onChange={setMap}
+      />
+      <div style={{ display: "grid", gap: 12, gridTemplateColumns: "1fr 1fr", alignItems: "end" }}>
+        {template.numbers.map((one) => (
+          <NumberInput
+            key={one.name}
+            label={`${one.name.replace(/_/g, " ")} (${one.unit})`}
+            description={one.meaning}
+            placeholder="by the others"
+            min={one.low}
+            max={one.high}
+            decimalScale={3}
+            defaultValue={one.usual ?? ""}
+            onChange={(value) => change(one.name, value)}
+          />
+        ))}
+      </div>
+      {refused && (
+        <Alert color="red" title="It cannot be placed">
+          {refused}
+        </Alert>
+      )}
+      <Group justify="flex-end">
+        <Button onClick={place} loading={busy} disabled={map === null}>
+          Place it
+        </Button>
+      </Group>
+    </Stack>
+  );
+}

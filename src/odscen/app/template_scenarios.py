@@ -1,0 +1,87 @@
+"""Templates: offered, and placed on maps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from odscen.app.maps import load_map
+from odscen.app.scenarios import SUFFIX, write_scenario
+from odscen.base.errors import ConflictError
+from odscen.scenario.templates.template_registry import find_template, place_template
+from odscen.workspace.store import check_name
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.workspace.store import Workspace
+
+
+def template_scenario(
+    workspace: Workspace,
+    template: str,
+    map_name: str,
+    *,
+    values: Mapping[str, float] | None = None,
+    name: str | None = None,
+) -> Scenario:
+    """Place a template on a map.
+
+    Parameters
+    ----------
+    template
+        Its name.
+    map_name
+        Map of the workspace.
+    values
+        Numbers that differ from the template's, by the names of its parameters.
+    name
+        Of the scenario; made of those of template and map if not given.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such template or map.
+    InputError
+        If a number is unknown or out of its range.
+    NoPlaceError
+        If the map has no room; says where was looked and why not.
+    """
+    found = find_template(template)
+    loaded = load_map(workspace.map(map_name))
+    return place_template(
+        found,
+        loaded.sumo.graph,
+        loaded.usable,
+        loaded.lights,
+        values=values or {},
+        name=name or f"{template}-{map_name}",
+    )
+
+
+def write_template(
+    workspace: Workspace,
+    template: str,
+    map_name: str,
+    *,
+    values: Mapping[str, float] | None = None,
+    name: str | None = None,
+    out: Path | None = None,
+) -> Path:
+    """Place a template on a map and write its scenario, into the workspace if not elsewhere.
+
+    Raises
+    ------
+    ConflictError
+        If the file is there already.
+    OdscenError
+        As in :func:`template_scenario`.
+    """
+    scenario = template_scenario(workspace, template, map_name, values=values, name=name)
+    check_name(scenario.name, what="scenario")
+    file = (out or workspace.scenarios) / f"{scenario.name}{SUFFIX}"
+    if file.exists():
+        msg = f"{file} is there already; give the scenario another name"
+        raise ConflictError(msg)
+    return write_scenario(scenario, file)

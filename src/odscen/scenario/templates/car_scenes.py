@@ -1,0 +1,253 @@
+"""Scenes of vehicles that drive the same way: cut-in, braking lead vehicle, bus at its stop."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from odscen.base.categories import Category
+from odscen.base.errors import InputError
+from odscen.scenario.templates.lane_stretches import LaneStretch, first_fit
+from odscen.scenario.templates.no_place import Unfit
+from odscen.scenario.templates.scene_actors import (
+    LEFT,
+    RIGHT,
+    apart,
+    at_once,
+    beside,
+    body_length,
+    driven,
+    kmh,
+    metres_at,
+    near_side,
+    node_near,
+    rule,
+    vehicle,
+)
+from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.scenario.templates.scene_template import TemplateSite
+
+_REAR = 6.0
+"""Metres from the beginning of a stretch to the middle of the first vehicle."""
+_AFTER = 4.0
+"""Seconds of the run that a stretch has room for after the scene."""
+_STRAIGHT = 0.1
+"""Radians that a stretch may bend."""
+INTRUSION = 0.3
+"""Metres over the lane's border at which UN R157 counts a vehicle as in the lane (5.2.5.2)."""
+
+
+def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    ego, speed, over = values["ego_speed"], values["speed"], values["over"]
+    closing = ego - speed
+    if closing < 1.0:
+        msg = f"ego_speed must be at least 1 m/s above speed ({speed:g} m/s), not {ego:g} m/s"
+        raise InputError(msg)
+    # UN R157, 5.2.5.2: TTC at the intrusion above v_rel / (2 * 6 m/s2) + 0.35 s
+    intrusion = values.get("ttc", closing / 12.0 + 0.35)
+    length, width = body_length(site, Category.CAR), site.usable.bodies[Category.CAR].width
+    lead = length + (intrusion + over + values["approach"]) * closing
+    metres = _REAR + lead + speed * (values["approach"] + over + _AFTER)
+
+    def place(stretch: LaneStretch) -> TemplateScene:
+        near = near_side(site, stretch)
+        lane = _either(site, stretch, near)
+        centre = apart(site, int(stretch.nodes[0]), int(lane.nodes[0]))
+        border = site.region.graph.lanes.width[lane.nodes[0]] / 2.0 - width / 2.0 + INTRUSION
+        # half-cosine: offset = centre (1 - cos(pi t / over)) / 2
+        delay = over / math.pi * math.acos(1.0 - 2.0 * min(border / centre, 1.0))
+        begins = intrusion + delay
+        start = node_near(site, stretch, _REAR)
+        ahead = length + (begins + values["approach"]) * closing
+        other = node_near(site, lane, _REAR + ahead)
+        last = int(stretch.nodes[-1])
+        side = LEFT if _is_left(site, lane, stretch) else RIGHT
+        return TemplateScene(
+            actors=(
+                vehicle(site, "ego", start, last, speed=ego, ego=True),
+                vehicle(site, "challenger", other, int(lane.nodes[-1]), speed=speed),
+            ),
+            rules=(
+                driven("cruise", "challenger", speed),
+                rule(
+                    "cut-in",
+                    "challenger",
+                    {"ttc": {"of": "ego", "to": "challenger", "below": round(begins, 4)}},
+                    {"lane": {"by": side, "over": over}},
+                ),
+            ),
+            duration=math.ceil(values["approach"] + over + 10.0),
+            wanted=(
+                f"Ego {kmh(ego)}, challenger {kmh(speed)}. The challenger begins to change lanes "
+                f"at a time to collision of {begins:.2f} s, so that it is {INTRUSION:g} m over "
+                f"the border of the ego's lane at {intrusion:.2f} s."
+            ),
+        )
+
+    found, why = site.stretches.of_length(metres, bend=_STRAIGHT)
+    return first_fit(found, why, place, what="a cut-in", map_name=site.region.graph.map_name)
+
+
+def _either(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
+    try:
+        return beside(site, stretch, near)
+    except Unfit:
+        pass
+    try:
+        return beside(site, stretch, -near)
+    except Unfit:
+        msg = "have no second lane of the same direction all along"
+        raise Unfit(msg) from None
+
+
+def _is_left(site: TemplateSite, lane: LaneStretch, of: LaneStretch) -> bool:
+    """Whether the stretch ``of`` is on the left of a lane."""
+    lanes = site.region.graph.lanes
+    return int(lanes.left_lane[lane.nodes[0]]) == int(lanes.lane[of.nodes[0]])
+
+
+CUT_IN = SceneTemplate(
+    name="cut-in",
+    title="Cut-in",
+    summary="A slower vehicle in the next lane changes into the ego's lane close ahead of it.",
+    source="UN Regulation No. 157 (ALKS), 5.2.5.2: a collision has to be avoided if the time to "
+    "collision is above v_rel / (2 x 6 m/s2) + 0.35 s when the vehicle is 0.3 m over the lane's "
+    "border. Speeds: the ego's is the limit of 60 km/h of the regulation's first version; the "
+    "other one's and the time of the lane change are odscen's choice.",
+    needs="two lanes of one direction",
+    parameters=(
+        TemplateParameter("ego_speed", 60 / 3.6, 2, 60, "m/s", "speed of the ego"),
+        TemplateParameter("speed", 40 / 3.6, 1, 58, "m/s", "speed of the vehicle that cuts in"),
+        TemplateParameter(
+            "ttc", None, 0.1, 10, "s",
+            "time to collision when it is 0.3 m over the border; default: the limit of UN R157",
+        ),
+        TemplateParameter("over", 3, 1, 10, "s", "duration of the lane change"),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+    ),
+    place=_cut_in,
+)  # fmt: skip
+
+
+def _lead_brakes(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    speed, gap, rate = values["speed"], values["gap"], values["deceleration"]
+    length, settle = body_length(site, Category.CAR), values["approach"]
+    ahead = gap + length
+    metres = _REAR + ahead + speed * settle + speed**2 / (2.0 * rate) + length
+
+    def place(stretch: LaneStretch) -> TemplateScene:
+        start, lead = (node_near(site, stretch, at) for at in (_REAR, _REAR + ahead))
+        last = int(stretch.nodes[-1])
+        return TemplateScene(
+            actors=(
+                vehicle(site, "ego", start, last, speed=speed, ego=True),
+                vehicle(site, "lead", lead, last, speed=speed),
+            ),
+            rules=(
+                driven("cruise", "lead", speed),
+                at_once(
+                    "follow",
+                    "ego",
+                    {"keep_gap": {"to": "lead", "metres": gap, "lasting": settle}},
+                    {"release": {}},
+                ),
+                rule(
+                    "brake",
+                    "lead",
+                    {"all": [{"rule": {"id": "follow"}}, {"rule": {"id": "cruise"}}]},
+                    {"brake": {"by": rate}},
+                ),
+            ),
+            duration=math.ceil(settle + speed / rate + 8.0),
+            wanted=(
+                f"Both at {kmh(speed)}, {gap:g} m apart. After {settle:g} s the lead vehicle "
+                f"brakes with {rate:g} m/s2 to a standstill, and the ego drives itself."
+            ),
+        )
+
+    found, why = site.stretches.of_length(metres, bend=1.0)
+    what = "a lead vehicle that brakes"
+    return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
+
+
+LEAD_BRAKES = SceneTemplate(
+    name="lead-brakes",
+    title="Lead vehicle brakes",
+    summary="The vehicle ahead brakes to a standstill; the ego follows at a set gap.",
+    source="Euro NCAP car-to-car rear braking (CCRb): both vehicles at 50 km/h, 12 or 40 m apart, "
+    "braking with 2 or 6 m/s2.",
+    needs="a lane between junctions",
+    parameters=(
+        TemplateParameter("speed", 50 / 3.6, 2, 60, "m/s", "speed of both"),
+        TemplateParameter("gap", 40, 2, 200, "m", "free gap"),
+        TemplateParameter("deceleration", 6, 0.5, 12, "m/s2", "of the lead vehicle"),
+        TemplateParameter("approach", 4, 3, 20, "s", "time before it, in which the gap settles"),
+    ),
+    place=_lead_brakes,
+)
+
+
+def _bus(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    speed, ttc = values["ego_speed"], values["ttc"]
+    halves = (body_length(site, Category.CAR) + body_length(site, Category.BUS)) / 2.0
+    ahead = halves + (ttc + values["approach"]) * speed
+    metres = _REAR + ahead + 60.0
+
+    def place(stretch: LaneStretch) -> TemplateScene:
+        near = near_side(site, stretch)
+        lane = beside(site, stretch, near)
+        start, stop = node_near(site, stretch, _REAR), node_near(site, lane, _REAR + ahead)
+        last = int(stretch.nodes[-1])
+        bus = vehicle(
+            site, "bus", stop, int(lane.nodes[-1]), speed=values["speed"],
+            category=Category.BUS, moving=False,
+        )  # fmt: skip
+        rate = values["acceleration"]
+        starts = {"speed": {"to": 3.0, "rate": rate}}
+        pulls_out = [
+            {"lane": {"by": -near, "over": values["over"]}},
+            {"speed": {"to": round(values["speed"], 4), "rate": rate}},
+        ]
+        when = {"ttc": {"of": "ego", "to": "bus", "below": ttc}}
+        return TemplateScene(
+            actors=(vehicle(site, "ego", start, last, speed=speed, ego=True), bus),
+            rules=(
+                at_once("stop", "bus", {"stop": {}}),
+                rule(
+                    "leave", "bus", {"all": [{"rule": {"id": "stop"}}, when]},
+                    starts, {"together": pulls_out},
+                ),
+            ),
+            duration=math.ceil(values["approach"] + 30.0),
+            wanted=(
+                f"Ego {kmh(speed)}. The bus leaves its stop when the ego's time to collision with "
+                f"it, if they were in one lane, is {ttc:g} s; its front is "
+                f"{metres_at(lane, stop) - metres_at(stretch, start):.0f} m ahead then at most."
+            ),
+        )  # fmt: skip
+
+    found, why = site.stretches.of_length(metres, bend=_STRAIGHT)
+    what = "a bus that leaves its stop"
+    return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
+
+
+BUS_LEAVES = SceneTemplate(
+    name="bus-leaves",
+    title="Bus leaves its stop",
+    summary="A bus is stopped in the lane at the kerb and pulls out into the ego's lane.",
+    source="No protocol: the numbers are odscen's choice.",
+    needs="two lanes of one direction",
+    parameters=(
+        TemplateParameter("ego_speed", 40 / 3.6, 2, 60, "m/s", "speed of the ego"),
+        TemplateParameter("ttc", 5, 1, 20, "s", "time to collision at which the bus starts"),
+        TemplateParameter("speed", 30 / 3.6, 3, 20, "m/s", "speed that the bus reaches"),
+        TemplateParameter("acceleration", 1.2, 0.3, 3, "m/s2", "of the bus"),
+        TemplateParameter("over", 5, 2, 12, "s", "duration of the lane change"),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+    ),
+    place=_bus,
+)

@@ -1,0 +1,160 @@
+"""Actors and rules of scenes, as parts of a document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.base.categories import Category
+from odscen.lanegraph.query import node_id
+from odscen.scenario.templates.lane_stretches import LaneStretch
+from odscen.scenario.templates.no_place import Unfit
+
+if TYPE_CHECKING:
+    from odscen.scenario.templates.scene_template import TemplateSite
+    from odscen.scenario.templates.walk_sides import RoadCrossing
+
+STEADY = "steady"
+"""Id of the driver set of scenes: constant speed, no change of lane of one's own accord."""
+STEADY_DRIVER = {
+    "id": STEADY,
+    "parameters": {
+        "sigma": 0.0,
+        "lcSpeedGain": 0.0,
+        "lcKeepRight": 0.0,
+        "lcCooperative": 0.0,
+        "lcOvertakeRight": 1.0,
+    },
+}
+LEFT, RIGHT = 1, -1
+CHILD = 5.0 / 3.6
+"""Walking speed of the pedestrians of Euro NCAP's crossing tests, m/s (5 km/h)."""
+
+
+def kmh(speed: float) -> str:
+    """A speed (m/s) in words."""
+    return f"{speed * 3.6:.0f} km/h"
+
+
+def body_length(site: TemplateSite, category: Category) -> float:
+    """Metres of a vehicle of the category."""
+    return site.usable.bodies[category].length
+
+
+def near_side(site: TemplateSite, stretch: LaneStretch) -> int:
+    """Side of the road on which the lane lies: right where traffic keeps right."""
+    lanes = site.region.graph.lanes
+    row = int(lanes.lane[stretch.nodes[0]])
+    keeps_right = bool(lanes.lanes.forward[row]) == (lanes.lanes.keys[row].lane < 0)
+    return RIGHT if keeps_right else LEFT
+
+
+def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
+    """Node of a stretch about so many metres on, on which a vehicle can be placed.
+
+    Raises
+    ------
+    Unfit
+        If there is none within a node's spacing.
+    """
+    spacing = site.region.graph.lanes.spacing
+    order = np.argsort(np.abs(stretch.along - along), kind="stable")
+    for place in order[:3].tolist():
+        if abs(stretch.along[place] - along) > 1.5 * spacing:
+            break
+        if site.stretches.spawnable[stretch.nodes[place]]:
+            return int(stretch.nodes[place])
+    msg = "have no node for a vehicle where it is to start"
+    raise Unfit(msg)
+
+
+def metres_at(stretch: LaneStretch, node: int) -> float:
+    """Metres of a node along its stretch."""
+    return float(stretch.along[np.flatnonzero(stretch.nodes == node)[0]])
+
+
+def beside(site: TemplateSite, stretch: LaneStretch, side: int) -> LaneStretch:
+    """The nodes of the next lane of the same direction, abreast of those of a stretch.
+
+    Raises
+    ------
+    Unfit
+        If there is none all along, or it is not for all vehicles.
+    """
+    lanes = site.region.graph.lanes
+    rows = (lanes.left_lane if side == LEFT else lanes.right_lane)[stretch.nodes]
+    name = "left" if side == LEFT else "right"
+    if (rows < 0).any():
+        msg = f"have no lane to the {name} all along"
+        raise Unfit(msg)
+    first = lanes.lanes.first_node
+    found = np.empty(len(rows), dtype=np.int64)
+    for row in np.unique(rows).tolist():
+        mine = np.flatnonzero(rows == row)
+        its = np.arange(first[row], first[row + 1])
+        away = np.abs(lanes.s[stretch.nodes[mine]][:, None] - lanes.s[its][None, :])
+        found[mine] = its[np.argmin(away, axis=1)]
+    if not site.stretches.plain[found].all():
+        msg = f"have a lane to the {name} that is not for all vehicles"
+        raise Unfit(msg)
+    return LaneStretch(found, stretch.along, stretch.bend)
+
+
+def apart(site: TemplateSite, one: int, other: int) -> float:
+    """Metres between the centre lines of two lanes at two nodes abreast."""
+    lanes = site.region.graph.lanes
+    dx, dy = lanes.x[other] - lanes.x[one], lanes.y[other] - lanes.y[one]
+    hdg = lanes.hdg[one]
+    return float(abs(dy * np.cos(hdg) - dx * np.sin(hdg)))
+
+
+def vehicle(
+    site: TemplateSite,
+    name: str,
+    spawn: int,
+    by: int,
+    *,
+    speed: float,
+    category: Category = Category.CAR,
+    moving: bool = True,
+    **fields: Any,
+) -> dict[str, Any]:
+    """Make a vehicle that drives from ``spawn`` by the node ``by`` at a constant speed (m/s)."""
+    graph = site.region.graph
+    start = {"initial_speed": round(speed, 4)} if moving else {}
+    return {
+        "id": name,
+        "category": str(category),
+        "spawn": node_id(graph, spawn),
+        "goal": node_id(graph, site.stretches.goal(spawn, by)),
+        "speed": round(speed, 4),
+        "style": STEADY,
+        **start,
+        **fields,
+    }
+
+
+def pedestrian(name: str, crossing: RoadCrossing) -> dict[str, Any]:
+    """Make a pedestrian who stands at the beginning of a crossing line."""
+    return {
+        "id": name,
+        "category": str(Category.PEDESTRIAN),
+        "spawn": crossing.start,
+        "goal": crossing.goal,
+    }
+
+
+def rule(name: str, actor: str, when: dict[str, Any], *then: dict[str, Any]) -> dict[str, Any]:
+    """Make a rule."""
+    return {"id": name, "actor": actor, "when": when, "then": list(then)}
+
+
+def at_once(name: str, actor: str, *then: dict[str, Any]) -> dict[str, Any]:
+    """Make a rule that fires at the start."""
+    return rule(name, actor, {"time": {"after": 0}}, *then)
+
+
+def driven(name: str, actor: str, speed: float) -> dict[str, Any]:
+    """Make a rule that keeps an actor at a speed (m/s) from the start."""
+    return at_once(name, actor, {"speed": {"to": round(speed, 4), "shape": "step"}})

@@ -1,0 +1,89 @@
+"""All templates, and how one becomes a scenario."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from odscen.base.errors import NotFoundError
+from odscen.lanegraph.query import largest_part
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.edits.settings_edits import new_scenario
+from odscen.scenario.placing.region import Region
+from odscen.scenario.templates.car_scenes import BUS_LEAVES, CUT_IN, LEAD_BRAKES
+from odscen.scenario.templates.lane_stretches import LaneStretches
+from odscen.scenario.templates.oncoming_scene import ONCOMING
+from odscen.scenario.templates.red_light_scene import RED_LIGHT
+from odscen.scenario.templates.scene_actors import STEADY_DRIVER
+from odscen.scenario.templates.scene_template import TemplateSite
+from odscen.scenario.templates.walk_sides import WalkSides
+from odscen.scenario.templates.walker_scenes import HIDDEN_CHILD, MID_BLOCK
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.scenario.signals.light import Light
+    from odscen.scenario.templates.scene_template import SceneTemplate
+
+TEMPLATES: dict[str, SceneTemplate] = {
+    one.name: one
+    for one in (CUT_IN, LEAD_BRAKES, HIDDEN_CHILD, MID_BLOCK, RED_LIGHT, ONCOMING, BUS_LEAVES)
+}
+"""By name, in the order in which they are offered."""
+
+
+def find_template(name: str) -> SceneTemplate:
+    """Template of that name.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
+    if name not in TEMPLATES:
+        what = "template"
+        raise NotFoundError(what, name, list(TEMPLATES))
+    return TEMPLATES[name]
+
+
+def place_template(
+    template: SceneTemplate,
+    graph: MapGraph,
+    usable: Usable,
+    lights: Sequence[Light],
+    *,
+    values: Mapping[str, float],
+    name: str,
+) -> Scenario:
+    """Place a template on a map; the same map and numbers give the same document.
+
+    Parameters
+    ----------
+    values
+        Numbers that differ from the template's, by the names of its parameters.
+    name
+        Of the scenario.
+
+    Raises
+    ------
+    InputError
+        If a number is unknown or out of its range.
+    NoPlaceError
+        If the map has no room; says where was looked and why not.
+    """
+    wanted = template.values(values)
+    roi = largest_part(graph.segments)
+    region = Region.of(graph, roi)
+    site = TemplateSite(
+        region, usable, lights, LaneStretches(region, usable), WalkSides(region, usable)
+    )
+    scene = template.place(site, wanted)
+    words = f"{template.summary} {scene.wanted} Source: {template.source}"
+    data = json.loads(dumps(new_scenario(graph, name=name, roi=roi, description=words)))
+    data["drivers"] = {"sets": [STEADY_DRIVER]}
+    data["actors"], data["rules"] = list(scene.actors), list(scene.rules)
+    data["simulation"] = {"duration": scene.duration}
+    return loads(json.dumps(data))
