@@ -47,8 +47,8 @@ def move_aside(part: LateralMove, one: ActingActor) -> float:
     CannotAct
         If the actor is on no lane.
     """
-    # Far beside its lane SUMO has it on another one, or none: what follows is about the lane that it
-    # was led along until now.
+    # Far beside its lane SUMO has it on another one, or none: what follows is about the lane that
+    # it was led along until now.
     led = one.channel.line if one.channel.side is not None else None
     line = led or one.view.lane_line(one.actor.id, 0)
     if line is None:
