@@ -45,7 +45,7 @@ from odscen.regression.scatter import (
     seeds_needed,
 )
 from odscen.regression.seed_sizing import PILOT, PROBE, with_longer_headway
-from odscen.regression.suite import Case, Suite, read_suite
+from odscen.regression.suites.suite import Case, Suite, read_suite
 from odscen.regression.tolerance import Tolerances, usual
 from odscen.regression.verdict import hold_against
 from odscen.sumo.realize.driving import HEADWAY

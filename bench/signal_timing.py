@@ -24,10 +24,10 @@ import numpy as np
 import polars as pl
 
 from odscen.app.demands import add_background
-from odscen.app.green_waves import coordinate_signals
 from odscen.app.maps import load_map
 from odscen.app.runs import run
-from odscen.app.signal_optimisation import time_signals
+from odscen.app.signals.green_waves import coordinate_signals
+from odscen.app.signals.signal_optimisation import time_signals
 from odscen.base.categories import Category
 from odscen.lanegraph.query import node_id
 from odscen.scenario import edits

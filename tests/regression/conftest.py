@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from odscen.regression.gates import Update, run_suite
-from odscen.regression.suite import read_suite
+from odscen.regression.suites.suite import read_suite
 from odscen.workspace.store import Workspace
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ from lxml import etree
 
 from odscen.regression.gates import Update, run_suite
 from odscen.regression.junit import junit_xml
-from odscen.regression.suite import read_suite
-from odscen.regression.suite_words import NOWHERE
+from odscen.regression.suites.suite import read_suite
+from odscen.regression.suites.suite_words import NOWHERE
 from tests.regression.conftest import ROOT
 
 SLOW = bool(os.environ.get("ODSCEN_SLOW"))

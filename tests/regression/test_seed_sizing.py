@@ -9,11 +9,11 @@ from odscen.base.errors import InputError
 from odscen.regression.gates import Update, run_suite
 from odscen.regression.junit import junit_xml
 from odscen.regression.seed_sizing import with_longer_headway
-from odscen.regression.suite import read_suite
-from odscen.regression.suite_page import suite_page
-from odscen.regression.suite_parts import read_parts, results_json
-from odscen.regression.suite_summary import suite_summary
-from odscen.regression.suite_words import headline, seed_words, to_dict
+from odscen.regression.suites.suite import read_suite
+from odscen.regression.suites.suite_page import suite_page
+from odscen.regression.suites.suite_parts import read_parts, results_json
+from odscen.regression.suites.suite_summary import suite_summary
+from odscen.regression.suites.suite_words import headline, seed_words, to_dict
 from odscen.scenario.document.drivers_document import Drivers
 from tests.regression.conftest import ROOT, copy_suite, write_tiny
 

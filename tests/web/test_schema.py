@@ -19,7 +19,7 @@ from schemathesis.specs.openapi.checks import (
 )
 
 from odscen.app.scenarios import generate, read_scenario
-from odscen.app.signal_plans import lights_of
+from odscen.app.signals.signal_plans import lights_of
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app
 from odscen.workspace.store import Workspace

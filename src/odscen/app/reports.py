@@ -24,8 +24,8 @@ from odscen.results.records.light_programs import programs_from_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import Plan, events_from_json, rounded
 from odscen.results.report.place_shapes import place_shapes
-from odscen.results.report.report_signals import LightsOfRun
 from odscen.results.report.run_report import render_report
+from odscen.results.report.signals.report_signals import LightsOfRun
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.recorded import (

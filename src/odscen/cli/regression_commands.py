@@ -92,9 +92,9 @@ def gate(
     largest that a scenario has is that of the suite.
     """
     from odscen.regression.gates import Update, run_suite
-    from odscen.regression.suite import read_suite
-    from odscen.regression.suite_parts import read_parts
-    from odscen.regression.suite_words import to_dict
+    from odscen.regression.suites.suite import read_suite
+    from odscen.regression.suites.suite_parts import read_parts
+    from odscen.regression.suites.suite_words import to_dict
     from odscen.workspace.store import Workspace
 
     read, store = read_suite(suite), Workspace.open(workspace)
@@ -132,9 +132,9 @@ def _write(
 ) -> None:
     from odscen.base.text_files import write_text
     from odscen.regression.junit import junit_xml
-    from odscen.regression.suite_page import suite_page
-    from odscen.regression.suite_parts import results_json
-    from odscen.regression.suite_summary import suite_summary
+    from odscen.regression.suites.suite_page import suite_page
+    from odscen.regression.suites.suite_parts import results_json
+    from odscen.regression.suites.suite_summary import suite_summary
 
     if junit is not None:
         write_text(junit, junit_xml(result))
@@ -151,7 +151,7 @@ def _write(
 
 
 def _show(result: SuiteResult, *, as_json: bool) -> None:
-    from odscen.regression.suite_words import lines
+    from odscen.regression.suites.suite_words import lines
 
     if not as_json:
         rows = [

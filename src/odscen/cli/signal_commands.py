@@ -47,8 +47,8 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show signal groups, stages and plans of the lights of a scenario."""
-    from odscen.app.signal_plans import lights_of
-    from odscen.app.signal_views import chosen_lights
+    from odscen.app.signals.signal_plans import lights_of
+    from odscen.app.signals.signal_views import chosen_lights
     from odscen.workspace.store import Workspace
 
     space = Workspace.open(workspace)
@@ -74,7 +74,7 @@ def show(
 
 def _draw(workspace: Workspace, scenario: Path, junctions: Sequence[str], out: Path) -> list[Path]:
     """Write a sheet for each light, into ``out`` if that is a folder."""
-    from odscen.app.signal_views import signal_sheets
+    from odscen.app.signals.signal_views import signal_sheets
     from odscen.base.text_files import write_text
 
     sheets = signal_sheets(workspace, scenario, junctions=junctions)
@@ -104,7 +104,7 @@ def import_(
     A program that conflicts, or whose intergreens are too short, is refused.
     """
     from odscen.app import scenarios
-    from odscen.app.signal_plans import import_signals
+    from odscen.app.signals.signal_plans import import_signals
     from odscen.workspace.store import Workspace
 
     document, notes = import_signals(
@@ -129,7 +129,7 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write the programs of a scenario's lights as an additional file for SUMO."""
-    from odscen.app.signal_plans import export_signals
+    from odscen.app.signals.signal_plans import export_signals
     from odscen.base.text_files import write_text
     from odscen.workspace.store import Workspace
 
@@ -160,7 +160,7 @@ def webster(
 ) -> None:
     """Time lights after the demand: cycle and splits by Webster's method."""
     from odscen.app import scenarios
-    from odscen.app.signal_optimisation import time_signals
+    from odscen.app.signals.signal_optimisation import time_signals
     from odscen.workspace.store import Workspace
 
     timed = time_signals(
@@ -213,7 +213,7 @@ def coordinate(
 ) -> None:
     """Coordinate lights along a corridor: one cycle, and the offsets with the widest bands."""
     from odscen.app import scenarios
-    from odscen.app.green_waves import coordinate_signals
+    from odscen.app.signals.green_waves import coordinate_signals
     from odscen.base.text_files import write_text
     from odscen.workspace.store import Workspace
 

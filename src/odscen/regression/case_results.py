@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from odscen.regression.causes import Cause
     from odscen.regression.detection import Sizing
     from odscen.regression.measure import Measured
-    from odscen.regression.suite import Case, Suite
+    from odscen.regression.suites.suite import Case, Suite
     from odscen.regression.verdict import BaselineVerdict
     from odscen.workspace.map_entry import MapEntry
 

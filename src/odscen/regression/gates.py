@@ -19,10 +19,10 @@ from odscen.regression.case_results import CaseResult, SuiteResult
 from odscen.regression.causes import VERSIONS, Cause, causes_between, likeliest_first
 from odscen.regression.kept_maps import change_words, changes_since, keep_map
 from odscen.regression.seed_sizing import choose_seeds
-from odscen.regression.suite import missing_case
-from odscen.regression.suite_loading import LoadedCase, load_cases
-from odscen.regression.suite_parts import take_parts
-from odscen.regression.suite_runs import RunPlace, SeedRunner
+from odscen.regression.suites.suite import missing_case
+from odscen.regression.suites.suite_loading import LoadedCase, load_cases
+from odscen.regression.suites.suite_parts import take_parts
+from odscen.regression.suites.suite_runs import RunPlace, SeedRunner
 from odscen.regression.verdict import hold_against
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from odscen.changes.map_change import MapChange
     from odscen.regression.baseline import Baseline
     from odscen.regression.measure import Measured
-    from odscen.regression.suite import Case, Suite
-    from odscen.regression.suite_loading import UnusableCase
-    from odscen.regression.suite_parts import RunCase
+    from odscen.regression.suites.suite import Case, Suite
+    from odscen.regression.suites.suite_loading import UnusableCase
+    from odscen.regression.suites.suite_parts import RunCase
     from odscen.regression.verdict import Change
     from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.regression.case_results import CaseStatus
-from odscen.regression.suite_words import details, headline
+from odscen.regression.suites.suite_words import details, headline
 from odscen.sumo.folder import layout
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from odscen.app.runs import CheckedRun
     from odscen.regression.detection import Detection
-    from odscen.regression.suite import Case
-    from odscen.regression.suite_loading import LoadedCase
-    from odscen.regression.suite_runs import RunPlace, SeedRunner
+    from odscen.regression.suites.suite import Case
+    from odscen.regression.suites.suite_loading import LoadedCase
+    from odscen.regression.suites.suite_runs import RunPlace, SeedRunner
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.run_settings import RunSettings
 

@@ -11,13 +11,17 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from odscen.app.scenarios import read_scenario
-from odscen.app.signal_plans import lights_of
-from odscen.app.signal_views import chosen_lights, program_origin
+from odscen.app.signals.signal_plans import lights_of
+from odscen.app.signals.signal_views import chosen_lights, program_origin
 from odscen.base.errors import InputError, NotFoundError
 from odscen.results.records.light_programs import programs_from_json, stage_spans
-from odscen.results.report.signal_charts import plan_chart, plan_scale
-from odscen.results.report.signal_sheet import legend_picture, legend_shapes
-from odscen.results.report.stage_diagrams import JunctionPictures, detector_label, stage_words
+from odscen.results.report.signals.signal_charts import plan_chart, plan_scale
+from odscen.results.report.signals.signal_sheet import legend_picture, legend_shapes
+from odscen.results.report.signals.stage_diagrams import (
+    JunctionPictures,
+    detector_label,
+    stage_words,
+)
 from odscen.scenario.signals.program_design import seconds_of_day
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import read_calls, read_light_states

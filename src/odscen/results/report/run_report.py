@@ -31,7 +31,6 @@ from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_measures import measure_section
 from odscen.results.report.report_service import service_section
-from odscen.results.report.report_signals import signal_section
 from odscen.results.report.report_tables import (
     actor_table,
     event_list,
@@ -40,6 +39,7 @@ from odscen.results.report.report_tables import (
 from odscen.results.report.report_transit import transit_section
 from odscen.results.report.report_walking import walking_section
 from odscen.results.report.report_words import duration, starting_at
+from odscen.results.report.signals.report_signals import signal_section
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Event, Plan
     from odscen.results.report.place_shapes import PlaceShapes
     from odscen.results.report.report_corridor import CorridorTraces
-    from odscen.results.report.report_signals import LightsOfRun
+    from odscen.results.report.signals.report_signals import LightsOfRun
 
 
 def render_report(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from odscen.app.signal_views import ProgramOrigin
+from odscen.app.signals.signal_views import ProgramOrigin
 from odscen.web.messages import Answer
 
 

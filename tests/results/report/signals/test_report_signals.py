@@ -12,9 +12,9 @@ from odscen.results.records.light_programs import (
     ShownGroup,
     ShownPlan,
 )
-from odscen.results.report.report_signals import LightsOfRun, signal_section
-from odscen.results.report.signal_charts import program_bars, shown_bars
-from odscen.results.report.stage_diagrams import stage_diagram
+from odscen.results.report.signals.report_signals import LightsOfRun, signal_section
+from odscen.results.report.signals.signal_charts import program_bars, shown_bars
+from odscen.results.report.signals.stage_diagrams import stage_diagram
 
 GROUPS = (
     ShownGroup(

@@ -15,10 +15,10 @@ from odscen.drawing.map_shapes import map_drawing
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.results.records.light_programs import stage_spans
-from odscen.results.report.signal_charts import phase_spans, plan_chart, plan_scale
-from odscen.results.report.signal_sheet import signal_sheet
-from odscen.results.report.signal_tables import detector_rows, split_rows
-from odscen.results.report.stage_diagrams import JunctionPictures
+from odscen.results.report.signals.signal_charts import phase_spans, plan_chart, plan_scale
+from odscen.results.report.signals.signal_sheet import signal_sheet
+from odscen.results.report.signals.signal_tables import detector_rows, split_rows
+from odscen.results.report.signals.stage_diagrams import JunctionPictures
 from odscen.sumo.realize.light_realization import realized_lights
 from tests.signal_case import MAP, crossing, program, scenario
 

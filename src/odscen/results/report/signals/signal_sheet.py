@@ -6,21 +6,21 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from odscen.base.markup import Markup, element, number
-from odscen.results.report.signal_charts import plan_chart, plan_height
-from odscen.results.report.signal_tables import (
+from odscen.results.report.signals.signal_charts import plan_chart, plan_height
+from odscen.results.report.signals.signal_tables import (
     DETECTOR_HEADS,
     SPLIT_HEADS,
     detector_rows,
     split_rows,
 )
-from odscen.results.report.stage_diagrams import SIDE, SITE, JunctionPictures
+from odscen.results.report.signals.stage_diagrams import SIDE, SITE, JunctionPictures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.results.records.light_programs import LightProgram, ShownPlan
-    from odscen.results.report.stage_diagrams import StagePicture
+    from odscen.results.report.signals.stage_diagrams import StagePicture
 
 WIDTH = 1120.0
 """Pixels of a sheet."""

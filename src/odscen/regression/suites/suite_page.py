@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from odscen.base.errors import OdscenError
 from odscen.base.markup import Markup, element, join
 from odscen.regression.case_results import CaseStatus
-from odscen.regression.suite_map import change_maps, ranked_places
-from odscen.regression.suite_words import details, headline, seed_words, sizing_words
+from odscen.regression.suites.suite_map import change_maps, ranked_places
+from odscen.regression.suites.suite_words import details, headline, seed_words, sizing_words
 from odscen.regression.verdict import Effect
 from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.sumo.folder.layout import REPORT_FILE

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from odscen.regression.suite_page import suite_page
-from odscen.regression.suite_summary import suite_summary
-from odscen.regression.suite_words import to_dict
+from odscen.regression.suites.suite_page import suite_page
+from odscen.regression.suites.suite_summary import suite_summary
+from odscen.regression.suites.suite_words import to_dict
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.base.markup import Markup, element, number
 from odscen.results.records.light_programs import stage_spans
 from odscen.results.report.page_templates import html_table
-from odscen.results.report.stage_diagrams import detector_label, detector_purpose
+from odscen.results.report.signals.stage_diagrams import detector_label, detector_purpose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

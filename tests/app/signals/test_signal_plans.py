@@ -13,7 +13,7 @@ from odscen.app.export import export
 from odscen.app.networks import bring_in
 from odscen.app.runs import run
 from odscen.app.scenarios import read_scenario, write_scenario
-from odscen.app.signal_plans import export_signals, import_signals, lights_of
+from odscen.app.signals.signal_plans import export_signals, import_signals, lights_of
 from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.results.records.light_programs import programs_from_json, stage_spans

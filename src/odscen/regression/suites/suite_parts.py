@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from odscen.regression.baseline import Fingerprint
     from odscen.regression.case_results import CaseResult, SuiteResult
-    from odscen.regression.suite_loading import LoadedCase, UnusableCase
+    from odscen.regression.suites.suite_loading import LoadedCase, UnusableCase
 
 FORMAT = "odscen-suite-results"
 VERSION = 1

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from odscen.regression.baseline import Baseline, Fingerprint
     from odscen.regression.case_results import SeedResult
     from odscen.regression.detection import Sizing
-    from odscen.regression.suite import Case, Suite
+    from odscen.regression.suites.suite import Case, Suite
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.workspace.map_entry import MapEntry
     from odscen.workspace.store import Workspace

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from odscen.regression.case_results import CaseStatus
-from odscen.regression.suite_words import headline, sizing_words
+from odscen.regression.suites.suite_words import headline, sizing_words
 
 if TYPE_CHECKING:
     from odscen.regression.case_results import CaseResult, SuiteResult

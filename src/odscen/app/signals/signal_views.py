@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
-from odscen.app.signal_plans import lights_of
+from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def signal_sheets(
     ScenarioError
         With every problem of the signals.
     """
-    from odscen.results.report.signal_sheet import signal_sheet
+    from odscen.results.report.signals.signal_sheet import signal_sheet
 
     scenario = given_scenario(scenario)
     drawing = map_of(workspace, scenario).drawing

@@ -8,10 +8,10 @@ from odscen.base.markup import Markup, element, join, number
 from odscen.results.measures.figure import ReportSection
 from odscen.results.report.page_templates import html_table, report_section
 from odscen.results.report.report_figures import card_grid, figure_cards
-from odscen.results.report.signal_charts import bar_chart, plan_chart, shown_bars
-from odscen.results.report.signal_sheet import legend_picture, legend_shapes
-from odscen.results.report.signal_tables import detector_table, split_table
-from odscen.results.report.stage_diagrams import JunctionPictures, stage_diagram
+from odscen.results.report.signals.signal_charts import bar_chart, plan_chart, shown_bars
+from odscen.results.report.signals.signal_sheet import legend_picture, legend_shapes
+from odscen.results.report.signals.signal_tables import detector_table, split_table
+from odscen.results.report.signals.stage_diagrams import JunctionPictures, stage_diagram
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

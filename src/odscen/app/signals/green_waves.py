@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
-from odscen.app.signal_optimisation import chosen_lights
+from odscen.app.signals.signal_optimisation import chosen_lights
 from odscen.base.errors import InputError, NotFoundError
 from odscen.drawing.time_space import DiagramBand, DiagramLight, time_space_svg
 from odscen.scenario.checks.signal_timing import signal_problems

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.errors import InputError
-    from odscen.regression.suite import Suite
-    from odscen.regression.suite_loading import LoadedCase
+    from odscen.regression.suites.suite import Suite
+    from odscen.regression.suites.suite_loading import LoadedCase
     from odscen.sumo.folder.finished_run import Run
     from odscen.sumo.runner.run_jobs import RunJob
     from odscen.sumo.worker.protocol import Progress

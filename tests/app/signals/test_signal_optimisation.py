@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from odscen.app.signal_optimisation import time_signals
-from odscen.app.signal_plans import lights_of
+from odscen.app.signals.signal_optimisation import time_signals
+from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.sumo.realize.realization import realize

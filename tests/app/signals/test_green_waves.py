@@ -6,9 +6,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from odscen.app.green_waves import coordinate_signals
 from odscen.app.maps import load_map
-from odscen.app.signal_plans import lights_of
+from odscen.app.signals.green_waves import coordinate_signals
+from odscen.app.signals.signal_plans import lights_of
 from odscen.base.errors import InputError
 from odscen.scenario import edits
 from odscen.scenario.document.scenario_document import Scenario

@@ -10,7 +10,7 @@ import numpy as np
 from odscen.app.maps import load_map
 from odscen.base.markup import Markup, element
 from odscen.regression.place_map import place_map
-from odscen.regression.suite_loading import map_before
+from odscen.regression.suites.suite_loading import map_before
 from odscen.regression.verdict import FEWEST
 from odscen.results.report.place_shapes import place_shapes
 from odscen.results.report.plots import legend

@@ -1,0 +1,1 @@
+"""Suites: what they hold, their runs, and how their results are shown."""

@@ -1,0 +1,1 @@
+"""Traffic lights in reports: tables, charts, diagrams, sheets."""
