@@ -17,6 +17,8 @@ from odscen.app.export import export
 from odscen.base.errors import InputError
 from odscen.interchange.openscenario.dialect import VERSIONS
 from odscen.lanegraph.query import node_index
+from odscen.scenario.story.action_kinds import ACTIONS
+from odscen.scenario.story.condition_kinds import CONDITIONS
 from tests.sumo.story_case import document, loaded, node_at, walk_node_at, workspace
 
 if TYPE_CHECKING:
@@ -204,6 +206,20 @@ def test_actions_have_their_numbers(tree: Any) -> None:
     ahead = float(the(tree, '//ScenarioObject[@name="van"]//BoundingBox/Center').get("x"))
     first = event(tree, "reaches.then[0]").xpath(".//Vertex//WorldPosition")[0]
     assert float(first.get("x")) == pytest.approx(250.0 - ahead, abs=1e-5)
+
+
+def test_what_is_written_is_what_the_table_of_rules_names(folder: Path) -> None:
+    latest = etree.parse(written("1.3", folder)[0])
+    for rule in scenario().rules:
+        if rule.id in ("horn", "after"):
+            continue
+        for index, item in enumerate(rule.then):
+            tags = {one.tag for one in event(latest, f"{rule.id}.then[{index}]").iter()}
+            for part in item.parts:
+                assert tags & set(re.findall(r"[A-Z]\w+", ACTIONS[part.kind].openscenario))
+        if (kind := rule.when.kind) in CONDITIONS:
+            tags = {one.tag for one in event(latest, f"{rule.id}.then[0]").iter()}
+            assert tags & set(re.findall(r"[A-Z]\w+", CONDITIONS[kind].openscenario))
 
 
 def test_what_cannot_be_said_is_listed_with_its_place_and_what_waits_for_it(folder: Path) -> None:
