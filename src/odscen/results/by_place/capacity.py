@@ -27,8 +27,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from odscen.scenario.signals.webster import CRITICAL_GAP, FOLLOW_UP, SATURATION_FLOW
 
 if TYPE_CHECKING:
@@ -243,6 +241,7 @@ def _link_capacities(
     facts: NetFacts,
 ) -> pl.DataFrame:
     """``via``, ``begin`` and ``capacity``, as if each connection had its lane for itself."""
+    import numpy as np
     import polars as pl
 
     col = pl.col
@@ -287,6 +286,8 @@ def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, f
     turns
         Interval, begin and end of each green, and vehicles that its gaps have room for.
     """
+    import numpy as np
+
     due, time = entries[:, 0], entries[:, 1]
     greens, served, room = 0, 0, 0.0
     for _, begin, end, number in turns:
@@ -319,6 +320,8 @@ def through_gaps(opposing: FloatArray, begin: float, end: float, *, most: float)
     most
         Saturation flow, veh/h: an empty road carries no more.
     """
+    import numpy as np
+
     there = opposing[(opposing > begin) & (opposing < end)]
     gaps = np.diff(np.concatenate(([begin], there, [end])))
     taken = np.floor((gaps - CRITICAL_GAP) / FOLLOW_UP) + 1.0

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     import polars as pl
 
@@ -27,6 +25,7 @@ def positions(rows: pl.DataFrame, facts: NetFacts) -> pl.Series:
     rows
         ``lane``, ``x`` and ``y`` (m, SUMO's frame).
     """
+    import numpy as np
     import polars as pl
 
     lengths = dict(facts.limits.select("lane", "length").rows())
@@ -41,6 +40,8 @@ def positions(rows: pl.DataFrame, facts: NetFacts) -> pl.Series:
 
 def _along(shape: FloatArray, points: FloatArray) -> FloatArray:
     """Share of a line ``(K, 2)`` up to the place on it that is nearest to each point."""
+    import numpy as np
+
     starts, steps = shape[:-1], np.diff(shape, axis=0)
     metres = np.hypot(*steps.T)
     squares = np.maximum(metres**2, 1e-12)
