@@ -117,13 +117,13 @@ def test_parts_that_chose_their_seeds_make_the_same_baseline_together(store, cho
 
 
 def test_too_few_seeds_are_used_as_they_are_and_said_to_catch_less(store, tmp_path):
-    text = 'usable = false\ndetect = { change = "0.1 %", seeds_max = 17 }'
+    text = 'usable = false\ndetect = { change = "0.1 %", seeds_max = 9 }'
     file = detecting(write_tiny(tmp_path, "one"), f'redraw = "traffic"\n{text}', "seeds = [1]")
     (case,) = run_suite(store, read_suite(file), update=Update(True)).cases
     assert case.updated
-    assert len(case.runs) == 17 < case.sizing.needed
+    assert len(case.runs) == 9 < case.sizing.needed
     assert not case.sizing.enough
-    assert case.notes[-1].startswith("17 seeds, the most that the suite allows, catch a change of")
+    assert case.notes[-1].startswith("9 seeds, the most that the suite allows, catch a change of")
 
 
 def test_a_run_that_dies_in_the_pilot_is_an_error_and_writes_nothing(store, tmp_path):
