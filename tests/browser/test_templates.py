@@ -21,7 +21,7 @@ def test_a_newcomer_places_the_walker_by_mouse(
     user = open_page(served.url)
     user.open_catalogue()
     page = user.page
-    page.get_by_role("button", name="Place Pedestrian mid-block").click()
+    page.get_by_role("button", name="Place on a map: Pedestrian mid-block").click()
     dialog = page.get_by_role("dialog", name="Pedestrian mid-block")
     dialog.get_by_label("Map").first.click()
     page.get_by_role("option", name="signal_crossing").click()
@@ -38,7 +38,7 @@ def test_a_template_is_placed_by_keyboard_and_says_why_it_has_no_room(
     user = open_page(served.url)
     user.open_catalogue()
     page = user.page
-    page.get_by_role("button", name="Place Cut-in").focus()
+    page.get_by_role("button", name="Place on a map: Cut-in").focus()
     page.keyboard.press("Enter")
     dialog = page.get_by_role("dialog", name="Cut-in")
     expect(dialog).to_be_visible()

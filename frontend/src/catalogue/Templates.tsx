@@ -42,7 +42,7 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
                   fullWidth
                   variant="default"
                   onClick={() => setChosen(one)}
-                  aria-label={`Place ${one.title}`}
+                  aria-label={`Place on a map: ${one.title}`}
                 >
                   Place on a map
                 </Button>
