@@ -17,6 +17,7 @@ from odscen.lanegraph.query import node_id, node_index
 from odscen.scenario import edits
 from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import Actor, Flow, Matrix
 from odscen.scenario.edits.edit_messages import MESSAGES, EditBase
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
@@ -28,6 +29,12 @@ from odscen.workspace.shipped import shipped_maps
 from odscen.workspace.store import Workspace
 from tests.web.conftest import CROSSING
 
+RULE = {
+    "id": "halt",
+    "actor": "white",
+    "when": {"time": {"after": 4}, "delay": 1},
+    "then": [{"brake": {"by": 4, "hold": 2}}],
+}
 ALL = (
     ("grow_roi", {"segment": "j10001"}),
     ("grow_roi", {"segment": "r1"}),
@@ -73,6 +80,9 @@ ALL = (
     ("remove_transit", {"part": "7"}),
     ("set_measure", {"measure": {"id": "shut", "kind": "closure", "places": ["r1>r2"]}}),
     ("remove_measure", {"measure": "shut"}),
+    ("add_actor", {"category": "van", "spawn": "SPAWN0", "id": "white"}),
+    ("set_rule", {"rule": RULE}),
+    ("remove_rule", {"rule": "halt"}),
 )
 
 
@@ -161,6 +171,8 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         answer = post_edit(client, new, state["version"], kind, **arguments)
         assert answer.status_code == 200, (kind, answer.text)
         known = {"graph": graph, "lights": loaded.lights, "usable": loaded.usable}
+        if kind == "set_rule":  # a part of the document, not its data
+            arguments = {"rule": StoryRule.model_validate(arguments["rule"])}
         function = getattr(edits, kind)
         wanted = inspect.signature(function).parameters
         ours = function(ours, **{k: v for k, v in known.items() if k in wanted}, **arguments)

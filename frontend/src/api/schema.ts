@@ -1120,29 +1120,57 @@ export interface components {
          * Action
          * @description One kind of action, or several that run together.
          */
-        Action: {
-            speed: components["schemas"]["SpeedChange"] | null;
-            brake: components["schemas"]["Braking"] | null;
-            stop: components["schemas"]["Stopping"] | null;
+        "Action-Input": {
+            speed?: components["schemas"]["SpeedChange-Input"] | null;
+            brake?: components["schemas"]["Braking-Input"] | null;
+            stop?: components["schemas"]["Stopping-Input"] | null;
+            go?: components["schemas"]["Going"] | null;
+            lane?: components["schemas"]["LaneChange-Input"] | null;
+            offset?: components["schemas"]["LateralMove-Input"] | null;
+            keep_gap?: components["schemas"]["GapKeeping-Input"] | null;
+            walk?: components["schemas"]["Walking-Input"] | null;
+            cut_in?: components["schemas"]["CuttingIn-Input"] | null;
+            goal?: components["schemas"]["NewGoal"] | null;
+            path?: components["schemas"]["PathFollowing-Input"] | null;
+            replay?: components["schemas"]["Replaying"] | null;
+            arrive?: components["schemas"]["Arriving"] | null;
+            appear?: components["schemas"]["Appearing-Input"] | null;
+            vanish?: components["schemas"]["Vanishing"] | null;
+            signal?: components["schemas"]["SignalSwitch-Input"] | null;
+            lights?: components["schemas"]["VehicleLights-Input"] | null;
+            horn?: components["schemas"]["Honking"] | null;
+            ignore?: components["schemas"]["Ignoring-Input"] | null;
+            release?: components["schemas"]["Releasing"] | null;
+            /** Together */
+            together?: components["schemas"]["Action-Input"][] | null;
+        };
+        /**
+         * Action
+         * @description One kind of action, or several that run together.
+         */
+        "Action-Output": {
+            speed: components["schemas"]["SpeedChange-Output"] | null;
+            brake: components["schemas"]["Braking-Output"] | null;
+            stop: components["schemas"]["Stopping-Output"] | null;
             go: components["schemas"]["Going"] | null;
-            lane: components["schemas"]["LaneChange"] | null;
-            offset: components["schemas"]["LateralMove"] | null;
-            keep_gap: components["schemas"]["GapKeeping"] | null;
-            walk: components["schemas"]["Walking"] | null;
-            cut_in: components["schemas"]["CuttingIn"] | null;
+            lane: components["schemas"]["LaneChange-Output"] | null;
+            offset: components["schemas"]["LateralMove-Output"] | null;
+            keep_gap: components["schemas"]["GapKeeping-Output"] | null;
+            walk: components["schemas"]["Walking-Output"] | null;
+            cut_in: components["schemas"]["CuttingIn-Output"] | null;
             goal: components["schemas"]["NewGoal"] | null;
-            path: components["schemas"]["PathFollowing"] | null;
+            path: components["schemas"]["PathFollowing-Output"] | null;
             replay: components["schemas"]["Replaying"] | null;
             arrive: components["schemas"]["Arriving"] | null;
-            appear: components["schemas"]["Appearing"] | null;
+            appear: components["schemas"]["Appearing-Output"] | null;
             vanish: components["schemas"]["Vanishing"] | null;
-            signal: components["schemas"]["SignalSwitch"] | null;
-            lights: components["schemas"]["VehicleLights"] | null;
+            signal: components["schemas"]["SignalSwitch-Output"] | null;
+            lights: components["schemas"]["VehicleLights-Output"] | null;
             horn: components["schemas"]["Honking"] | null;
-            ignore: components["schemas"]["Ignoring"] | null;
+            ignore: components["schemas"]["Ignoring-Output"] | null;
             release: components["schemas"]["Releasing"] | null;
             /** Together */
-            together: components["schemas"]["Action"][] | null;
+            together: components["schemas"]["Action-Output"][] | null;
         };
         /**
          * Actor
@@ -1276,7 +1304,21 @@ export interface components {
          * AfterRule
          * @description Another rule has started, or has ended, at least once.
          */
-        AfterRule: {
+        "AfterRule-Input": {
+            /** Id */
+            id: string;
+            /**
+             * Has
+             * @default ended
+             * @enum {string}
+             */
+            has?: "started" | "ended";
+        };
+        /**
+         * AfterRule
+         * @description Another rule has started, or has ended, at least once.
+         */
+        "AfterRule-Output": {
             /** Id */
             id: string;
             /**
@@ -1301,7 +1343,24 @@ export interface components {
          *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
          *     speed or ``speed``.
          */
-        Appearing: {
+        "Appearing-Input": {
+            /** At */
+            at?: [
+                number,
+                number,
+                number
+            ] | null;
+            /** Speed */
+            speed?: number | null;
+        };
+        /**
+         * Appearing
+         * @description Be there from now on: the actor is not on the road before, whatever its ``depart`` is.
+         *
+         *     It appears where it is placed, or ``at`` x, y and heading of its body's centre, with its initial
+         *     speed or ``speed``.
+         */
+        "Appearing-Output": {
             /** At */
             at: [
                 number,
@@ -1459,7 +1518,17 @@ export interface components {
          * Braking
          * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
          */
-        Braking: {
+        "Braking-Input": {
+            /** By */
+            by: number;
+            /** Hold */
+            hold?: number | null;
+        };
+        /**
+         * Braking
+         * @description Brake with ``by`` m/s^2 to a standstill; after ``hold`` seconds SUMO drives on.
+         */
+        "Braking-Output": {
             /** By */
             by: number;
             /** Hold */
@@ -1700,27 +1769,67 @@ export interface components {
          *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
          *     from the instant at which it comes true, and not if it is true when it is first looked at.
          */
-        Condition: {
-            time: components["schemas"]["AfterTime"] | null;
-            ttc: components["schemas"]["PairBounded"] | null;
-            headway: components["schemas"]["PairBounded"] | null;
-            distance: components["schemas"]["DistanceBounded"] | null;
-            relative_speed: components["schemas"]["PairBounded"] | null;
-            speed: components["schemas"]["OwnBounded"] | null;
-            acceleration: components["schemas"]["OwnBounded"] | null;
-            stopped: components["schemas"]["Standing"] | null;
-            reaches: components["schemas"]["Reaching"] | null;
-            travelled: components["schemas"]["OwnBounded"] | null;
-            signal: components["schemas"]["SignalShows"] | null;
-            rule: components["schemas"]["AfterRule"] | null;
-            appeared: components["schemas"]["OneActor"] | null;
-            touched: components["schemas"]["Touching"] | null;
-            off_road: components["schemas"]["OneActor"] | null;
+        "Condition-Input": {
+            time?: components["schemas"]["AfterTime"] | null;
+            ttc?: components["schemas"]["PairBounded-Input"] | null;
+            headway?: components["schemas"]["PairBounded-Input"] | null;
+            distance?: components["schemas"]["DistanceBounded-Input"] | null;
+            relative_speed?: components["schemas"]["PairBounded-Input"] | null;
+            speed?: components["schemas"]["OwnBounded-Input"] | null;
+            acceleration?: components["schemas"]["OwnBounded-Input"] | null;
+            stopped?: components["schemas"]["Standing-Input"] | null;
+            reaches?: components["schemas"]["Reaching-Input"] | null;
+            travelled?: components["schemas"]["OwnBounded-Input"] | null;
+            signal?: components["schemas"]["SignalShows"] | null;
+            rule?: components["schemas"]["AfterRule-Input"] | null;
+            appeared?: components["schemas"]["OneActor-Input"] | null;
+            touched?: components["schemas"]["Touching-Input"] | null;
+            off_road?: components["schemas"]["OneActor-Input"] | null;
             /** All */
-            all: components["schemas"]["Condition"][] | null;
+            all?: components["schemas"]["Condition-Input"][] | null;
             /** Any */
-            any: components["schemas"]["Condition"][] | null;
-            not: components["schemas"]["Condition"] | null;
+            any?: components["schemas"]["Condition-Input"][] | null;
+            not?: components["schemas"]["Condition-Input"] | null;
+            /**
+             * Delay
+             * @default 0
+             */
+            delay?: number;
+            /**
+             * Edge
+             * @default none
+             * @enum {string}
+             */
+            edge?: "none" | "rising";
+        };
+        /**
+         * Condition
+         * @description One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
+         *
+         *     ``delay`` lets it hold so many seconds later. With ``edge`` ``rising`` it holds for one step
+         *     from the instant at which it comes true, and not if it is true when it is first looked at.
+         */
+        "Condition-Output": {
+            time: components["schemas"]["AfterTime"] | null;
+            ttc: components["schemas"]["PairBounded-Output"] | null;
+            headway: components["schemas"]["PairBounded-Output"] | null;
+            distance: components["schemas"]["DistanceBounded-Output"] | null;
+            relative_speed: components["schemas"]["PairBounded-Output"] | null;
+            speed: components["schemas"]["OwnBounded-Output"] | null;
+            acceleration: components["schemas"]["OwnBounded-Output"] | null;
+            stopped: components["schemas"]["Standing-Output"] | null;
+            reaches: components["schemas"]["Reaching-Output"] | null;
+            travelled: components["schemas"]["OwnBounded-Output"] | null;
+            signal: components["schemas"]["SignalShows"] | null;
+            rule: components["schemas"]["AfterRule-Output"] | null;
+            appeared: components["schemas"]["OneActor-Output"] | null;
+            touched: components["schemas"]["Touching-Output"] | null;
+            off_road: components["schemas"]["OneActor-Output"] | null;
+            /** All */
+            all: components["schemas"]["Condition-Output"][] | null;
+            /** Any */
+            any: components["schemas"]["Condition-Output"][] | null;
+            not: components["schemas"]["Condition-Output"] | null;
             /**
              * Delay
              * @default 0
@@ -1892,7 +2001,24 @@ export interface components {
          *
          *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
          */
-        CuttingIn: {
+        "CuttingIn-Input": {
+            /** To */
+            to: string;
+            /** Gap */
+            gap?: number | null;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
+         * CuttingIn
+         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+         *
+         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+         */
+        "CuttingIn-Output": {
             /** To */
             to: string;
             /** Gap */
@@ -2132,7 +2258,37 @@ export interface components {
          * DistanceBounded
          * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
          */
-        DistanceBounded: {
+        "DistanceBounded-Input": {
+            /** Below */
+            below?: number | null;
+            /** Above */
+            above?: number | null;
+            /** Of */
+            of?: string | null;
+            /** To */
+            to?: string | null;
+            /** Place */
+            place?: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Along
+             * @default straight
+             * @enum {string}
+             */
+            along?: "straight" | "longitudinal" | "lateral" | "lane";
+            /**
+             * Free
+             * @default true
+             */
+            free?: boolean;
+        };
+        /**
+         * DistanceBounded
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         */
+        "DistanceBounded-Output": {
             /** Below */
             below: number | null;
             /** Above */
@@ -2327,7 +2483,7 @@ export interface components {
             /** Version */
             version: number;
             /** Edits */
-            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
+            edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"])[];
             /** Label */
             label?: string | null;
         };
@@ -2547,7 +2703,26 @@ export interface components {
          * GapKeeping
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          */
-        GapKeeping: {
+        "GapKeeping-Input": {
+            /** To */
+            to: string;
+            /** Metres */
+            metres?: number | null;
+            /** Seconds */
+            seconds?: number | null;
+            /** Lasting */
+            lasting?: number | null;
+            /**
+             * Rate
+             * @default 3
+             */
+            rate?: number;
+        };
+        /**
+         * GapKeeping
+         * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+         */
+        "GapKeeping-Output": {
             /** To */
             to: string;
             /** Metres */
@@ -2701,7 +2876,23 @@ export interface components {
          * Ignoring
          * @description Heed neither red lights nor right of way, or one of the two.
          */
-        Ignoring: {
+        "Ignoring-Input": {
+            /**
+             * Red
+             * @default true
+             */
+            red?: boolean;
+            /**
+             * Right Of Way
+             * @default false
+             */
+            right_of_way?: boolean;
+        };
+        /**
+         * Ignoring
+         * @description Heed neither red lights nor right of way, or one of the two.
+         */
+        "Ignoring-Output": {
             /**
              * Red
              * @default true
@@ -2934,7 +3125,27 @@ export interface components {
          *
          *     It takes ``over`` seconds.
          */
-        LaneChange: {
+        "LaneChange-Input": {
+            /** By */
+            by?: number | null;
+            /** To */
+            to?: string | [
+                number,
+                number
+            ] | null;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
+         * LaneChange
+         * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
+         *
+         *     It takes ``over`` seconds.
+         */
+        "LaneChange-Output": {
             /** By */
             by: number | null;
             /** To */
@@ -3016,7 +3227,20 @@ export interface components {
          * LateralMove
          * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
          */
-        LateralMove: {
+        "LateralMove-Input": {
+            /** To */
+            to: number;
+            /**
+             * Over
+             * @default 3
+             */
+            over?: number;
+        };
+        /**
+         * LateralMove
+         * @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds.
+         */
+        "LateralMove-Output": {
             /** To */
             to: number;
             /**
@@ -3444,7 +3668,15 @@ export interface components {
          * OneActor
          * @description An actor, the rule's own if none is named.
          */
-        OneActor: {
+        "OneActor-Input": {
+            /** Of */
+            of?: string | null;
+        };
+        /**
+         * OneActor
+         * @description An actor, the rule's own if none is named.
+         */
+        "OneActor-Output": {
             /** Of */
             of: string | null;
         };
@@ -3452,7 +3684,19 @@ export interface components {
          * OwnBounded
          * @description A value of one actor: ``of``, or the rule's own.
          */
-        OwnBounded: {
+        "OwnBounded-Input": {
+            /** Below */
+            below?: number | null;
+            /** Above */
+            above?: number | null;
+            /** Of */
+            of?: string | null;
+        };
+        /**
+         * OwnBounded
+         * @description A value of one actor: ``of``, or the rule's own.
+         */
+        "OwnBounded-Output": {
             /** Below */
             below: number | null;
             /** Above */
@@ -3474,7 +3718,21 @@ export interface components {
          * PairBounded
          * @description A value between two actors.
          */
-        PairBounded: {
+        "PairBounded-Input": {
+            /** Below */
+            below?: number | null;
+            /** Above */
+            above?: number | null;
+            /** Of */
+            of?: string | null;
+            /** To */
+            to: string;
+        };
+        /**
+         * PairBounded
+         * @description A value between two actors.
+         */
+        "PairBounded-Output": {
             /** Below */
             below: number | null;
             /** Above */
@@ -3529,7 +3787,33 @@ export interface components {
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
          */
-        PathFollowing: {
+        "PathFollowing-Input": {
+            /** Points */
+            points: (string | [
+                number,
+                number
+            ])[];
+            /** Speed */
+            speed?: number | null;
+            /**
+             * Speeds
+             * @default []
+             */
+            speeds?: number[];
+            /**
+             * Times
+             * @default []
+             */
+            times?: number[];
+        };
+        /**
+         * PathFollowing
+         * @description Follow a line over the ground from where the actor is, through ``points``.
+         *
+         *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
+         *     the begin at which it is there; none of them leaves the speed as it is.
+         */
+        "PathFollowing-Output": {
             /** Points */
             points: (string | [
                 number,
@@ -3721,7 +4005,25 @@ export interface components {
          * Reaching
          * @description The centre of an actor's body is within so many metres of a place.
          */
-        Reaching: {
+        "Reaching-Input": {
+            /** Of */
+            of?: string | null;
+            /** Place */
+            place: string | [
+                number,
+                number
+            ];
+            /**
+             * Within
+             * @default 1
+             */
+            within?: number;
+        };
+        /**
+         * Reaching
+         * @description The centre of an actor's body is within so many metres of a place.
+         */
+        "Reaching-Output": {
             /** Of */
             of: string | null;
             /** Place */
@@ -3810,6 +4112,19 @@ export interface components {
             kind: "remove_measure";
             /** Measure */
             measure: string;
+        };
+        /**
+         * RemoveRuleEdit
+         * @description Remove a rule by its id; a rule that waits for it then has an error in the checks.
+         */
+        RemoveRuleEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "remove_rule";
+            /** Rule */
+            rule: string;
         };
         /**
          * RemoveTransitEdit
@@ -4522,7 +4837,7 @@ export interface components {
              * Rules
              * @default []
              */
-            rules: components["schemas"]["StoryRule"][];
+            rules: components["schemas"]["StoryRule-Output"][];
             /** Parameters */
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
@@ -4966,6 +5281,18 @@ export interface components {
             shares?: components["schemas"]["SharedRoutes"][];
         };
         /**
+         * SetRuleEdit
+         * @description Add a rule, or put it in the place of that with its id.
+         */
+        SetRuleEdit: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "set_rule";
+            rule: components["schemas"]["StoryRule-Input"];
+        };
+        /**
          * SetSeedEdit
          * @description Set the random seed of the open goals and of the run.
          */
@@ -5332,7 +5659,26 @@ export interface components {
          *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
          *     right of way as without lights. ``program``: the program that ran before.
          */
-        SignalSwitch: {
+        "SignalSwitch-Input": {
+            /** Light */
+            light: string;
+            /**
+             * Shows
+             * @default green
+             * @enum {string}
+             */
+            shows?: "green" | "off" | "program";
+            /** Movement */
+            movement?: string | null;
+        };
+        /**
+         * SignalSwitch
+         * @description Switch a traffic light.
+         *
+         *     ``green``: its program jumps to where ``movement`` has green, and resumes from there. ``off``:
+         *     right of way as without lights. ``program``: the program that ran before.
+         */
+        "SignalSwitch-Output": {
             /** Light */
             light: string;
             /**
@@ -5437,7 +5783,29 @@ export interface components {
          *
          *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
          */
-        SpeedChange: {
+        "SpeedChange-Input": {
+            /** To */
+            to: number;
+            /**
+             * Shape
+             * @default linear
+             * @enum {string}
+             */
+            shape?: "step" | "linear" | "cosine";
+            /** Rate */
+            rate?: number | null;
+            /** Over */
+            over?: number | null;
+            /** Within */
+            within?: number | null;
+        };
+        /**
+         * SpeedChange
+         * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
+         *
+         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         */
+        "SpeedChange-Output": {
             /** To */
             to: number;
             /**
@@ -5537,7 +5905,20 @@ export interface components {
          * Standing
          * @description An actor has been stopped for so many seconds.
          */
-        Standing: {
+        "Standing-Input": {
+            /** Of */
+            of?: string | null;
+            /**
+             * Seconds
+             * @default 0
+             */
+            seconds?: number;
+        };
+        /**
+         * Standing
+         * @description An actor has been stopped for so many seconds.
+         */
+        "Standing-Output": {
             /** Of */
             of: string | null;
             /**
@@ -5571,7 +5952,15 @@ export interface components {
          * Stopping
          * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
          */
-        Stopping: {
+        "Stopping-Input": {
+            /** Within */
+            within?: number | null;
+        };
+        /**
+         * Stopping
+         * @description Come to a standstill after exactly ``within`` metres, or at once, until `go`.
+         */
+        "Stopping-Output": {
             /** Within */
             within: number | null;
         };
@@ -5582,14 +5971,35 @@ export interface components {
          *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
          *     does is over.
          */
-        StoryRule: {
+        "StoryRule-Input": {
             /** Id */
             id: string;
             /** Actor */
             actor: string;
-            when: components["schemas"]["Condition"];
+            when: components["schemas"]["Condition-Input"];
             /** Then */
-            then: components["schemas"]["Action"][];
+            then: components["schemas"]["Action-Input"][];
+            /**
+             * Times
+             * @default 1
+             */
+            times?: number;
+        };
+        /**
+         * StoryRule
+         * @description When a condition holds, an actor does something; items of ``then`` follow one another.
+         *
+         *     A rule fires ``times`` times at most: again when its condition comes true anew after what it
+         *     does is over.
+         */
+        "StoryRule-Output": {
+            /** Id */
+            id: string;
+            /** Actor */
+            actor: string;
+            when: components["schemas"]["Condition-Output"];
+            /** Then */
+            then: components["schemas"]["Action-Output"][];
             /**
              * Times
              * @default 1
@@ -5697,7 +6107,17 @@ export interface components {
          * Touching
          * @description The body of an actor touches that of another one, or of any that a rule names.
          */
-        Touching: {
+        "Touching-Input": {
+            /** Of */
+            of?: string | null;
+            /** To */
+            to?: string | null;
+        };
+        /**
+         * Touching
+         * @description The body of an actor touches that of another one, or of any that a rule names.
+         */
+        "Touching-Output": {
             /** Of */
             of: string | null;
             /** To */
@@ -5976,7 +6396,25 @@ export interface components {
          * VehicleLights
          * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
          */
-        VehicleLights: {
+        "VehicleLights-Input": {
+            /** Indicator */
+            indicator?: ("off" | "left" | "right" | "hazard") | null;
+            /** Brake */
+            brake?: boolean | null;
+            /** Front */
+            front?: boolean | null;
+            /** High Beam */
+            high_beam?: boolean | null;
+            /** Fog */
+            fog?: boolean | null;
+            /** Emergency */
+            emergency?: boolean | null;
+        };
+        /**
+         * VehicleLights
+         * @description Set lights of a vehicle: what is not given is off; without any the driver sets them again.
+         */
+        "VehicleLights-Output": {
             /** Indicator */
             indicator: ("off" | "left" | "right" | "hazard") | null;
             /** Brake */
@@ -6026,7 +6464,28 @@ export interface components {
          * Walking
          * @description Walk straight to a place, through others if given, wherever that leads.
          */
-        Walking: {
+        "Walking-Input": {
+            /** To */
+            to: string | [
+                number,
+                number
+            ];
+            /**
+             * Through
+             * @default []
+             */
+            through?: (string | [
+                number,
+                number
+            ])[];
+            /** Speed */
+            speed?: number | null;
+        };
+        /**
+         * Walking
+         * @description Walk straight to a place, through others if given, wherever that leads.
+         */
+        "Walking-Output": {
             /** To */
             to: string | [
                 number,

@@ -13,6 +13,7 @@ import { measureNote } from "./measures";
 import { MeasuresStep } from "./MeasuresStep";
 import { MapStep, RegionStep } from "./MapSteps";
 import { actorNote, weatherNote } from "./notes";
+import { ruleNote, RulesStep } from "./RulesStep";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
@@ -197,6 +198,12 @@ export function EditorSteps({
               onShow={sights.measure}
             />
           ),
+        },
+        rules: {
+          title: "Rules",
+          done: document.rules.length > 0,
+          note: ruleNote(document.rules),
+          body: <RulesStep document={document} pick={now.pick} onEdit={changes.change} />,
         },
         run: {
           title: "Run",

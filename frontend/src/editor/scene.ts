@@ -11,6 +11,7 @@ export const STEPS = [
   "traffic",
   "transit",
   "measures",
+  "rules",
   "run",
 ] as const;
 export type Step = (typeof STEPS)[number];

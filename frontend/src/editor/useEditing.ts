@@ -148,6 +148,7 @@ export function useEditing(
 function stepOf({ where }: Problem): Step | null {
   if (where.startsWith("roi")) return "region";
   if (where.startsWith("measures")) return "measures";
+  if (where.startsWith("rules")) return "rules";
   if (where.startsWith("transit")) return "transit";
   return where.startsWith("demand") ? "traffic" : null;
 }

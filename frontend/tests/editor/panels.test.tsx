@@ -127,6 +127,7 @@ test("only the open step shows its form; every step can be opened at any time", 
         traffic: text("Traffic", false),
         transit: text("Public transport", false),
         measures: text("Measures", false),
+        rules: text("Rules", false),
         run: text("Run", false),
       }}
     />,

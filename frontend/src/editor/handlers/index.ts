@@ -14,6 +14,7 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   traffic: trafficHandler,
   transit: lookingHandler,
   measures: lookingHandler,
+  rules: lookingHandler,
 };
 
 /** Who is in charge of the map; lights can be asked for their programs unless places are chosen. */

@@ -33,6 +33,7 @@ from odscen.scenario.edits.roi_edits import (
     removable_segments,
     shrink_roi,
 )
+from odscen.scenario.edits.rule_edits import remove_rule, set_rule
 from odscen.scenario.edits.settings_edits import (
     clear_timing,
     new_scenario,
@@ -63,6 +64,7 @@ __all__ = [
     "remove_demand",
     "remove_flow",
     "remove_measure",
+    "remove_rule",
     "remove_transit",
     "rename",
     "set_background",
@@ -78,6 +80,7 @@ __all__ = [
     "set_measure",
     "set_profile",
     "set_routes",
+    "set_rule",
     "set_seed",
     "set_signal_control",
     "set_simulation",

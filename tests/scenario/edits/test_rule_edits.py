@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import pytest
+
+from odscen.base.errors import NotFoundError, ScenarioError
+from odscen.scenario import edits
+from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.document.scenario_document import Scenario
+from tests.graphs import fork
+
+GRAPH = fork()
+
+
+def scenario() -> Scenario:
+    empty = edits.new_scenario(GRAPH, name="test", roi=("r1", "j9", "r2", "r3"))
+    return edits.add_actor(empty, GRAPH, category="car", spawn="1.0.-1.10")
+
+
+def rule(name: str = "halt", *, by: float = 4, **fields: object) -> StoryRule:
+    whole = {
+        "id": name,
+        "actor": "car-1",
+        "when": {"time": {"after": 2}},
+        "then": [{"brake": {"by": by}}],
+    }
+    return StoryRule.model_validate({**whole, **fields})
+
+
+def test_a_rule_is_added_replaced_in_its_place_and_removed() -> None:
+    one = edits.set_rule(scenario(), GRAPH, rule=rule())
+    two = edits.set_rule(one, GRAPH, rule=rule("other"))
+    three = edits.set_rule(two, GRAPH, rule=rule(by=6))
+    assert three.rules == (rule(by=6), rule("other"))
+    assert edits.remove_rule(three, rule="halt").rules == (rule("other"),)
+    assert one.rules == (rule(),)
+
+
+def test_a_rule_about_what_is_not_there_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="van-7"):
+        edits.set_rule(scenario(), GRAPH, rule=rule(actor="van-7"))
+    with pytest.raises(ScenarioError, match=r"99\.0\.-1\.3"):
+        edits.set_rule(
+            scenario(), GRAPH, rule=rule(when={"reaches": {"place": "99.0.-1.3", "within": 2}})
+        )
+
+
+def test_rules_about_a_removed_actor_are_mended_one_after_another() -> None:
+    both = edits.set_rule(scenario(), GRAPH, rule=rule())
+    both = edits.set_rule(both, GRAPH, rule=rule("other"))
+    both = edits.add_actor(both, GRAPH, category="car", spawn="1.0.-1.20")
+    lost = edits.remove_actors(both, ["car-1"])
+    one = edits.set_rule(lost, GRAPH, rule=rule(actor="car-2"))
+    assert [each.actor for each in one.rules] == ["car-2", "car-1"]
+
+
+def test_a_rule_that_is_not_there_cannot_be_removed() -> None:
+    with pytest.raises(NotFoundError, match="no rule named 'halt'"):
+        edits.remove_rule(scenario(), rule="halt")
