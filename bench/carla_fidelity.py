@@ -1,8 +1,8 @@
 """Sampled scenarios on signalised maps, mirrored and held against SUMO's recording.
 
 ``python -m bench.carla_fidelity [COUNT [SECONDS]]``: 100 scenarios of 60 s if nothing is said. The
-judge is that of ``tests/carla/test_mirror_on_maps.py``; runs that fail it are named, and the exit
-code is 1 then.
+judge is that of ``tests/carla/mirror/test_mirror_on_maps.py``; runs that fail it are named, and
+the exit code is 1 then.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-import tests.carla.test_mirror_on_maps as judge
+import tests.carla.mirror.test_mirror_on_maps as judge
 from bench.common import shared_maps
 from odscen.app.scenarios import generate
 from odscen.scenario.sampling.generation_settings import GenerationSettings

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from odscen.app.scenarios import generate
+from odscen.lanegraph.query import node_index
+from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.scenario_document import Actor, MapReference, Scenario
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.workspace.store import Workspace
 
@@ -40,6 +45,30 @@ def lights_of_sumo_alone(folder: Path, steps: int) -> list[dict[str, str]]:
         check=True,
     )
     return list(json.loads(done.stdout.splitlines()[-1]))
+
+
+def scenario_of(workspace: Workspace, xodr: Path, actors: list[dict[str, Any]], out: Path) -> Path:
+    entry = workspace.add_map(xodr)
+    scenario = Scenario(
+        format="odscen-scenario",
+        version=1,
+        name="ego",
+        map=MapReference(name=entry.name, sha256=entry.sha256),
+        roi=tuple(entry.graph().segments.ids),
+        actors=tuple(Actor(**actor) for actor in actors),
+    )
+    path = out / "ego.scenario.json"
+    path.write_text(dumps(scenario), encoding="utf-8")
+    return path
+
+
+def hero_pose(workspace: Workspace, xodr: Path, node: str) -> tuple[float, float, float, float]:
+    graph = workspace.map(xodr.stem).graph()
+    i = node_index(graph, node)
+    lanes = graph.lanes
+    return (
+        float(lanes.x[i]), -float(lanes.y[i]), float(lanes.z[i]), -math.degrees(lanes.hdg[i])
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,7 @@
 """A second client, in a process of its own, that writes down all that a server shows.
 
-``python -m tests.carla.observer HOST PORT FILE`` says ``ready`` once it listens, and writes FILE
-when its standard input is closed.
+``python -m tests.carla.observer HOST PORT FILE EGO`` says ``ready`` once it listens, and writes
+FILE when its standard input is closed.
 """
 
 from __future__ import annotations
@@ -35,10 +35,13 @@ class Frame:
 
 
 class Observer:
-    """Watches a stand-in inside a ``with``; the frames are there afterwards."""
+    """Watches a stand-in inside a ``with``; the frames are there afterwards.
 
-    def __init__(self, server: StandIn, file: Path) -> None:
-        self._server, self._file = server, file
+    ``ego`` is the id of the one with the role ``hero``.
+    """
+
+    def __init__(self, server: StandIn, file: Path, *, ego: str = "ego") -> None:
+        self._server, self._file, self._ego = server, file, ego
         self.frames: list[Frame] = []
         self.boxes: dict[str, list[float]] = {}
 
@@ -46,7 +49,7 @@ class Observer:
         self._process = subprocess.Popen(
             [
                 sys.executable, "-m", "tests.carla.observer", self._server.host,
-                str(self._server.port), str(self._file),
+                str(self._server.port), str(self._file), self._ego,
             ],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT,
         )  # fmt: skip
@@ -69,8 +72,8 @@ class Observer:
 class Notes:
     """What has been seen so far."""
 
-    def __init__(self, world: Any) -> None:
-        self._world = world
+    def __init__(self, world: Any, ego: str) -> None:
+        self._world, self._ego = world, ego
         self._raw: list[Any] = []
         self._shown: list[tuple[int, dict[int, str]]] = []
         self._names: dict[int, str] = {}
@@ -107,6 +110,7 @@ class Notes:
     def _meet(self, fresh: list[int]) -> None:
         for actor in self._world.get_actors(fresh) if fresh else ():
             role = actor.attributes.get("role_name", "")
+            role = ROLE + self._ego if role == "hero" else role
             ours = role.startswith(ROLE) and role != ROLE + "measure"
             self._names[actor.id] = role.removeprefix(ROLE) if ours else ""
             if ours:
@@ -134,10 +138,10 @@ def _numbers(actor: Any) -> list[float]:
 def main() -> None:
     import carla
 
-    host, port, file = sys.argv[1:]
+    host, port, file, ego = sys.argv[1:]
     client = carla.Client(host, int(port))
     client.set_timeout(10.0)
-    notes = Notes(client.get_world())
+    notes = Notes(client.get_world(), ego)
     sys.stdout.write("ready\n")
     sys.stdout.flush()
     done = threading.Event()

@@ -40,9 +40,9 @@ class StandIn:
         self.world = World(road_map, self.streams, self.switches)
         self.world.box_offset = options["box_offset"]
         self._world_calls = WorldCalls(self.world, self.streams, self.switches, maps=maps)
-        actors, lights = ActorCalls(self.world), LightCalls(self.world)
+        actors, lights = ActorCalls(self.world, self.switches), LightCalls(self.world)
         batch = BatchCalls(actors, lights, self._world_calls)
-        self.methods = MethodTable(self._world_calls, actors, lights, batch)
+        self.methods = MethodTable(self._world_calls, actors, lights, batch, switches=self.switches)
 
     def set(self, **switches: Any) -> None:
         """Change switches."""
@@ -56,6 +56,10 @@ class StandIn:
     def reset_calls(self) -> None:
         """Count RPCs anew."""
         self.methods.calls.clear()
+
+    def generation(self) -> list[Any]:
+        """Parameters by which a world was made of an OpenDRIVE text, as they were sent."""
+        return self._world_calls.generation
 
     def load(self, name: str) -> None:
         """Load another map, as another client might."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from tests.carla_standin import wire
 from tests.carla_standin.actors import MASS, Actor, Kind, turned
 from tests.carla_standin.rpc import Returns, rpc
+from tests.carla_standin.switches import Switches
 from tests.carla_standin.world import World
 
 _NOTHING = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0]
@@ -21,8 +23,9 @@ _PHYSICS = [
 class ActorCalls:
     """Spawning, moving, steering. Methods take what is on the wire, without the metadata."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, switches: Switches) -> None:
         self._world = world
+        self._switches = switches
         self._physics_controls: dict[int, list[Any]] = {}
 
     # ------------------------------------------------------------------------------- life
@@ -58,7 +61,11 @@ class ActorCalls:
     # ------------------------------------------------------------------------------- motion
     @rpc("set_actor_transform", Returns.VOID)
     def set_transform(self, actor: int, at: list[Any]) -> None:
-        self._world[actor].put(wire.pose(at))
+        found = self._world[actor]
+        x, y, z, *turn = wire.pose(at)
+        if found.kind is Kind.VEHICLE:
+            x, z = x + self._switches.place_aside, z + self._switches.place_error
+        found.put((x, y, z, *turn))
 
     @rpc("set_actor_location", Returns.VOID)
     def set_location(self, actor: int, location: list[float]) -> None:
@@ -128,7 +135,9 @@ class ActorCalls:
         self.set_light_flags(actor, state[0])
 
     def set_light_flags(self, actor: int, flags: int) -> None:
-        self._world.of_kind(actor, Kind.VEHICLE).lights = flags
+        vehicle = self._world.of_kind(actor, Kind.VEHICLE)
+        if not self._switches.deaf_lamps:
+            vehicle.lights = flags
 
     @rpc("get_vehicle_light_state")
     def lights(self, actor: int) -> list[int]:
@@ -155,9 +164,17 @@ class ActorCalls:
         self._world.of_kind(actor, Kind.WALKER).walk_on(control)
 
     def set_walker_state(self, actor: int, at: list[Any], speed: float) -> None:
-        """Put a walker somewhere, walking ahead with a speed; only exists as a command."""
+        """Put a walker on the ground somewhere, walking ahead; only exists as a command.
+
+        The server adds half the height of the capsule itself: CarlaActor.cpp since pull request
+        6395, and the client's own walkers send the height of the ground.
+        """
         walker = self._world.of_kind(actor, Kind.WALKER)
-        walker.put(wire.pose(at))
+        if walker.dormant:
+            os._exit(139)
+        x, y, z, *turn = wire.pose(at)
+        half = walker.box[1][2] if self._switches.half_capsule else 0.0
+        walker.put((x, y, z + half, *turn))
         walker.walk_on([list(turned(walker.at, (1.0, 0.0, 0.0))), speed, False])
 
     def _described(self, actor: Actor) -> list[Any]:

@@ -40,7 +40,8 @@ class Actor:
     """One actor. Angular velocities are deg/s; ``box`` is local, as a BoundingBox on the wire.
 
     With ``physics`` an actor moves by its velocity from tick to tick; without, it stays where it
-    was put, and still reports the velocity it was given. There is no gravity and no collision.
+    was put and reports velocity 0, whatever it was given, as on a real server (issues 7143, 3683
+    and 4774 of carla-simulator/carla). There is no gravity and no collision.
     """
 
     id: int
@@ -60,6 +61,7 @@ class Actor:
     force: Vector = ZERO
     physics: bool = True
     autopilot: bool = False
+    dormant: bool = False
     lights: int = 0
     control: list[Any] = field(default_factory=lambda: list(_NO_CONTROL))
     walk: list[Any] = field(default_factory=lambda: list(_NO_WALK))
@@ -94,10 +96,26 @@ class Actor:
         parent = self.parent.id if self.parent else 0
         return [self.id, parent, self.description, self.box, bytes([self.tag]), token]
 
-    def record(self) -> bytes:
-        """Its part of the state message."""
+    def reported_velocity(self, still: float) -> Vector:
+        """What it says of its velocity: without physics ``still`` m/s, whatever it was given."""
+        if self.physics or self.parent is not None:
+            return self.velocity
+        return (still, 0.0, 0.0)
+
+    def record(self, velocity: Vector) -> bytes:
+        """Its part of the state message, with what it says of its velocity."""
+        if not self.physics and self.parent is None:
+            return wire.actor_record(
+                self.id, self.at, velocity, ZERO, ZERO, self.tail, dormant=self.dormant
+            )
         return wire.actor_record(
-            self.id, self.at, self.velocity, self.angular, self.acceleration, self.tail
+            self.id,
+            self.at,
+            velocity,
+            self.angular,
+            self.acceleration,
+            self.tail,
+            dormant=self.dormant,
         )
 
     def footprint(self) -> Box:
@@ -153,6 +171,11 @@ class Actor:
             (a, b, c), (d, e, f) = velocity, self.previous_velocity
             self.acceleration = ((a - d) / dt, (b - e) / dt, (c - f) / dt)
             self.previous_velocity = velocity
+
+    def drift(self, dt: float) -> None:
+        """Walk on from where it was put, though it has no physics."""
+        if not self.physics:
+            self._move(dt)
 
     def _move(self, dt: float) -> None:
         x, y, z, pitch, yaw, roll = self.at

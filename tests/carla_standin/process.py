@@ -34,6 +34,7 @@ class StandIn:
     """
 
     host = "127.0.0.1"
+    module = "tests.carla_standin"
 
     def __init__(
         self,
@@ -55,7 +56,7 @@ class StandIn:
     def __enter__(self) -> Self:
         path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.carla_standin"],
+            [sys.executable, "-m", self.module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=_ROOT,
@@ -95,6 +96,10 @@ class StandIn:
     def actors(self) -> list[dict[str, Any]]:
         """All actors as the server has them, in the order of their ids."""
         return list(self._ask("actors"))
+
+    def generation(self) -> list[Any]:
+        """Parameters by which a world was made of an OpenDRIVE text, as they were sent."""
+        return list(self._ask("generation"))
 
     def set(self, **switches: Any) -> None:
         """Change switches of :class:`tests.carla_standin.switches.Switches`."""
@@ -145,3 +150,25 @@ class StandIn:
             msg = f"the stand-in ended with {self._process.wait()}"
             raise RuntimeError(msg)
         return dict(json.loads(line))
+
+
+class Replay(StandIn):
+    """Server process that says again what was recorded by ``--record-protocol``.
+
+    Parameters
+    ----------
+    transcript
+        The recording.
+    tolerance
+        By how much numbers of a call may differ from those recorded, metres and degrees.
+    """
+
+    module = "tests.carla_standin.replay"
+
+    def __init__(self, transcript: Path, *, tolerance: float = 1e-4) -> None:
+        self._options = {"file": str(transcript.resolve()), "tolerance": tolerance}
+        self.port = 0
+
+    def outcome(self) -> dict[str, Any]:
+        """``differences`` in words, names of calls that are ``left``, how many were ``made``."""
+        return dict(self._ask("outcome"))

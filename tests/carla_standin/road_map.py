@@ -22,6 +22,10 @@ _SPAWN_EVERY = 25.0
 """Metres between spawn points of a lane."""
 _SPAWN_HEIGHT = 0.5
 """Metres above the road, as CARLA's own spawn points float."""
+_GROUND_EVERY = 1.0
+"""Metres between points of a lane whose heights are known."""
+_GROUND_NEAR = 2.5
+"""Metres from such a point at which its height is still that of the ground."""
 _SIGNS = {"stop": "traffic.stop", "yield": "traffic.yield"}
 
 
@@ -47,6 +51,39 @@ class RoadMap:
     spawn_points: tuple[Pose, ...]
     signs: tuple[RoadSign, ...]
     groups: tuple[tuple[frozenset[str], ...], ...]
+    ground: np.ndarray
+    """Points of all lanes, shape ``(N, 3)``."""
+    walks: np.ndarray
+    """Which of them are on sidewalks, shape ``(N,)``."""
+
+    def ground_at(self, x: float, y: float) -> np.ndarray:
+        """Heights of the ground below and above a place; several where roads cross, or none."""
+        near = np.hypot(self.ground[:, 0] - x, self.ground[:, 1] - y) < _GROUND_NEAR
+        return self.ground[near, 2]
+
+    def surface(self, x: float, y: float, z: float, kerb: float) -> tuple[float, bool] | None:
+        """Height of what is below a place, and whether that is a sidewalk, ``kerb`` metres high.
+
+        Sidewalks stand above the file's surface: pull request 2491 of carla-simulator/carla.
+        """
+        away = np.hypot(self.ground[:, 0] - x, self.ground[:, 1] - y)
+        away[self.ground[:, 2] > z] = np.inf
+        if not len(away) or away.min() >= _GROUND_NEAR:
+            return None
+        best = int(np.argmin(away))
+        walk = bool(self.walks[best])
+        return self._height(best, x, y) + (kerb if walk else 0.0), walk
+
+    def _height(self, best: int, x: float, y: float) -> float:
+        """Between a point and the next one of its lane, that way or the other."""
+        here = self.ground[best]
+        beside = self.ground[[k for k in (best - 1, best + 1) if 0 <= k < len(self.ground)]]
+        along = beside - here
+        length = np.hypot(along[:, 0], along[:, 1])
+        share = (along[:, 0] * (x - here[0]) + along[:, 1] * (y - here[1])) / length**2
+        fits = (length < 1.5 * _GROUND_EVERY) & (share >= 0.0)
+        rise = along[fits, 2] * np.minimum(share[fits], 1.0)
+        return float(here[2] + (rise[0] if len(rise) else 0.0))
 
     @classmethod
     def read(cls, file: Path, name: str) -> RoadMap:
@@ -60,7 +97,21 @@ class RoadMap:
         table = RoadTable.of(odr)
         signs = tuple(_signs(odr, table))
         lights = {sign.id for sign in signs if sign.type_id == "traffic.traffic_light"}
-        return cls(name, text, tuple(_spawn_points(odr, table)), signs, _groups(odr, lights))
+        points = tuple(_spawn_points(odr, table))
+        return cls(name, text, points, signs, _groups(odr, lights), *_ground(table))
+
+
+def _ground(table: RoadTable) -> tuple[np.ndarray, np.ndarray]:
+    rows, places = [], []
+    for row in range(len(table.lane_keys)):
+        count = max(1, int((table.lane_s1[row] - table.lane_s0[row]) // _GROUND_EVERY))
+        rows += [row] * count
+        places += [table.lane_s0[row] + number * _GROUND_EVERY for number in range(count)]
+    if not rows:
+        return np.empty((0, 3)), np.empty(0, dtype=np.bool_)
+    points = table.lane_points(np.array(rows), np.array(places))
+    walks = np.array([table.lane_type[row] == "sidewalk" for row in rows])
+    return np.column_stack([points.x, -points.y, points.z]), walks
 
 
 def _signs(odr: OpenDrive, table: RoadTable) -> list[RoadSign]:

@@ -23,6 +23,10 @@ class Switches:
         What the server says it is.
     refuse_spawn_every
         Refuse every n-th spawn with ``refusal``; 0 for none.
+    refuse_grounded
+        Refuse spawns that touch the ground, as real servers do.
+    kerb
+        Metres by which sidewalks stand above the surface of the file.
     freeze_at_tick, freeze_seconds
         Before this tick the whole process stands still.
     drop_stream_at_tick
@@ -31,16 +35,66 @@ class Switches:
         Close every new subscription at once.
     die_at_tick
         The process ends instead of answering this tick.
+    frames_per_tick, time_factor
+        By how many frames a tick leads on, and by how many times the seconds it is to last.
+    least_lift
+        Metres above the ground from which on a body is made.
+    place_error, place_aside
+        Metres by which a vehicle that is put somewhere is too high, and too far along x.
+    half_capsule
+        Whether a walker's half height is added to where it is put, as a real server does.
+    walkers_drift
+        Whether walkers also move by themselves from where they are put, by their speed.
+    still_speed
+        m/s that actors without physics report; a real server says 0.
+    speed_factor
+        By how many times actors with physics report their velocity.
+    blind_ground
+        Whether nothing is ever found below a place.
+    late_calls
+        When calls that wait for no answer are done, as a real server's worker threads may do them:
+        at once if empty, ``call`` behind the next call that waits, ``tick`` behind the next tick.
+    nameless_lights
+        How many traffic lights do not say which signal of the map they are.
+    deaf_lamps
+        Whether the lights of vehicles cannot be switched.
+    tick_seconds, ground_seconds
+        Seconds that a tick, and an answer on what is below a place, take more.
+    keeps_actors
+        Whether actors cannot be destroyed.
+    large_map
+        Whether actors that are further than ``actor_active_distance`` from all of a role with
+        ``hero`` or ``ego_vehicle`` in it, or else from the spectator, become dormant with the next
+        tick: the process ends when a dormant walker is put somewhere (CarlaActor.cpp).
     """
 
     version: str = wire.CLIENT_VERSION
     refuse_spawn_every: int = 0
     refusal: str = "Spawn failed because of a collision at spawn position"
+    refuse_grounded: bool = True
+    kerb: float = 0.0
     freeze_at_tick: int = 0
     freeze_seconds: float = 0.0
     drop_stream_at_tick: int = 0
     refuse_streams: bool = False
     die_at_tick: int = 0
+    frames_per_tick: int = 1
+    time_factor: float = 1.0
+    least_lift: float = 0.15
+    place_error: float = 0.0
+    place_aside: float = 0.0
+    half_capsule: bool = True
+    walkers_drift: bool = False
+    still_speed: float = 0.0
+    speed_factor: float = 1.0
+    blind_ground: bool = False
+    late_calls: str = ""
+    nameless_lights: int = 0
+    deaf_lamps: bool = False
+    tick_seconds: float = 0.0
+    ground_seconds: float = 0.0
+    keeps_actors: bool = False
+    large_map: bool = False
     _ticks: int = 0
     _spawns: int = 0
 

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from math import hypot
-
 import numpy as np
 import pytest
 
@@ -56,6 +54,22 @@ def test_two_vehicles_cannot_be_spawned_into_each_other(connected: Connected) ->
     connected.spawn(CAR, transform(0.0, 4.0))
 
 
+@pytest.mark.parametrize(
+    ("blueprint", "z", "made"),
+    [(CAR, 0.0, False), (CAR, 0.3, True), (WALKER, 0.93, False), (WALKER, 1.25, True)],
+)
+def test_what_touches_the_ground_is_not_made(
+    connected: Connected, blueprint: str, z: float, made: bool
+) -> None:
+    connected.server.set(refuse_grounded=True)
+    point = connected.world.get_map().get_spawn_points()[0].location
+    at = carla.Transform(carla.Location(point.x, point.y, point.z - 0.5 + z))
+    answer = connected.client.apply_batch_sync(
+        [carla.command.SpawnActor(connected.blueprint(blueprint), at)]
+    )[0]
+    assert bool(answer.error) is not made
+
+
 def test_a_destroyed_actor_is_gone_with_the_next_tick(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     connected.world.tick()
@@ -97,7 +111,7 @@ def test_a_batch_goes_on_after_a_refusal(connected: Connected) -> None:
     assert [bool(answer.error) for answer in answers] == [False, True, True, False]
 
 
-def test_without_physics_a_body_is_exactly_where_and_as_fast_as_it_was_told(
+def test_without_physics_a_body_is_exactly_where_it_was_put_and_reports_no_velocity(
     connected: Connected,
 ) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
@@ -117,8 +131,7 @@ def test_without_physics_a_body_is_exactly_where_and_as_fast_as_it_was_told(
         )
         seen = connected.world.get_snapshot().find(car.id)
         assert flat(seen.get_transform()) == flat(at)
-        assert seen.get_velocity() == velocity
-        assert seen.get_angular_velocity() == spin
+        assert seen.get_velocity() == seen.get_angular_velocity() == carla.Vector3D()
 
 
 def test_with_physics_a_body_moves_by_its_velocity(connected: Connected) -> None:
@@ -167,15 +180,19 @@ def test_a_walker_walks_straight_on(connected: Connected) -> None:
     assert walker.get_control().speed == 1.5
 
 
-def test_a_walker_is_put_with_its_speed(connected: Connected) -> None:
+def test_a_walker_is_put_on_the_ground_and_the_server_adds_half_its_height(
+    connected: Connected,
+) -> None:
     walker = connected.spawn(WALKER, transform(0.0, 0.0, 1.0))
-    at = transform(4.0, 4.0, 1.0, yaw=180.0)
     walker.set_simulate_physics(False)
+    at = transform(4.0, 4.0, 0.0, yaw=180.0)
     batch = [carla.command.ApplyWalkerState(walker.id, at, 1.25)]
     assert not connected.client.apply_batch_sync(batch, True)[0].error
-    assert flat(walker.get_transform()) == flat(at)
-    velocity = walker.get_velocity()
-    assert (velocity.x, hypot(velocity.x, velocity.y)) == pytest.approx((-1.25, 1.25))
+    half = walker.bounding_box.extent.z
+    assert half > 0.5
+    assert flat(walker.get_transform()) == pytest.approx([4.0, 4.0, half, 0.0, 180.0, 0.0])
+    assert walker.get_control().speed == 1.25
+    assert walker.get_velocity() == carla.Vector3D()
 
 
 def test_a_controller_of_walkers_starts_and_stops(connected: Connected) -> None:
@@ -197,7 +214,7 @@ def test_a_car_is_no_walker(connected: Connected) -> None:
 
 
 def test_boxes_may_lie_before_the_origin_of_their_vehicles() -> None:
-    with StandIn(MAPS / "signal_crossing.xodr", box_offset=0.25) as server:
+    with StandIn(MAPS / "signal_crossing.xodr", box_offset=0.25, refuse_grounded=False) as server:
         world = synchronize(connect(server))
         blueprint = world.get_blueprint_library().find(CAR)
         car = world.spawn_actor(blueprint, transform(0.0, 0.0))

@@ -26,7 +26,9 @@ def camera(connected: Connected, *, sensor_tick: float = 0.0) -> tuple[Any, queu
 
 
 def pixels(image: Any) -> np.ndarray:
-    return np.frombuffer(image.raw_data, dtype=np.uint8).reshape(image.height, image.width, 4)
+    # Of its own: the client's memory is taken for the next picture once this one is let go.
+    flat = np.frombuffer(image.raw_data, dtype=np.uint8).copy()
+    return flat.reshape(image.height, image.width, 4)
 
 
 def test_a_picture_comes_with_every_tick(connected: Connected) -> None:

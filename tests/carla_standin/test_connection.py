@@ -110,7 +110,9 @@ def test_weather_comes_back_with_all_its_parameters(connected: Connected) -> Non
 
 def test_another_map_can_be_loaded_and_empties_the_world() -> None:
     maps = {"Hills": MAPS / "rural_hills.xodr"}
-    with StandIn(MAPS / "signal_crossing.xodr", map_name="Crossing", other_maps=maps) as server:
+    with StandIn(
+        MAPS / "signal_crossing.xodr", map_name="Crossing", other_maps=maps, refuse_grounded=False
+    ) as server:
         client = connect(server)
         world = synchronize(client)
         blueprint = world.get_blueprint_library().find("vehicle.tesla.model3")
@@ -130,7 +132,7 @@ def test_another_map_can_be_loaded_and_empties_the_world() -> None:
 
 def test_a_map_that_somebody_else_loads_is_noticed() -> None:
     maps = {"Hills": MAPS / "rural_hills.xodr"}
-    with StandIn(MAPS / "signal_crossing.xodr", other_maps=maps) as server:
+    with StandIn(MAPS / "signal_crossing.xodr", other_maps=maps, refuse_grounded=False) as server:
         world = connect(server).get_world()
         assert world.get_map().name == "Carla/Maps/signal_crossing"
         server.load("Hills")

@@ -24,7 +24,7 @@ _EPISODE = struct.Struct("<Qdf3iI")
 _ACTOR = struct.Struct("<IB15f")
 _IMAGE = struct.Struct("<IIf")
 _SENSOR_RGB_CAMERA, _SENSOR_WORLD_OBSERVER = 13, 17
-_ACTIVE = 1
+_ACTIVE, _DORMANT = 1, 2
 
 VEHICLE_TAIL: Final = struct.Struct("<3f3?ifB?IB")
 WALKER_TAIL: Final = struct.Struct("<4f?")
@@ -85,10 +85,18 @@ def vector(values: Iterable[float]) -> Vector:
 
 
 def actor_record(
-    actor: int, at: Pose, velocity: Vector, angular: Vector, acceleration: Vector, tail: bytes
+    actor: int,
+    at: Pose,
+    velocity: Vector,
+    angular: Vector,
+    acceleration: Vector,
+    tail: bytes,
+    *,
+    dormant: bool = False,
 ) -> bytes:
     """One actor of a state message; ``tail`` is padded to the 54 bytes of the union."""
-    head = _ACTOR.pack(actor, _ACTIVE, *at, *velocity, *angular, *acceleration)
+    state = _DORMANT if dormant else _ACTIVE
+    head = _ACTOR.pack(actor, state, *at, *velocity, *angular, *acceleration)
     return head + tail.ljust(TAIL_BYTES, b"\0")
 
 

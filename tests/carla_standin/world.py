@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from math import hypot
 from typing import Any
+
+import numpy as np
 
 from odscen.scenario.placing.bodies import overlap
 from odscen.workspace.asset_catalogue import shipped_assets
@@ -27,7 +30,8 @@ ASYNC_DELTA = 0.05
 """Seconds between ticks, on the clock, while no client ticks."""
 
 _SETTINGS = [False, False, [False], True, 0.01, 10, 0.0, True, 3000.0, 2000.0, True]
-_SYNCHRONOUS, _FIXED_DELTA = 0, 2
+_SYNCHRONOUS, _FIXED_DELTA, _ACTIVE_DISTANCE = 0, 2, 9
+_HEROES = ("hero", "ego_vehicle")
 _TRIGGER = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]]
 _POINT = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 
@@ -66,6 +70,9 @@ class World:
             Actor(self._next_id, [0, "spectator", []], nowhere, [*_POINT, self._next_id])
         )
         placed = {sign.id: self._add_sign(sign) for sign in road_map.signs}
+        lights = [actor for actor in placed.values() if actor.kind is Kind.LIGHT]
+        for actor in lights[: self._switches.nameless_lights]:
+            actor.sign_id = ""
         for group in road_map.groups:
             self.lights.add_group([[placed[sign] for sign in sorted(turn)] for turn in group])
 
@@ -111,7 +118,8 @@ class World:
         if parent is not None and parent not in self.actors:
             raise wire.RefusedError("unable to attach actor: parent actor not found")
         actor = self._make(definition, description, at, parent)
-        if definition.has_body and self._is_taken(actor):
+        grounded = self._switches.refuse_grounded and self._is_grounded(actor)
+        if definition.has_body and (grounded or self._is_taken(actor)):
             raise wire.RefusedError("Spawn failed because of a collision at spawn position")
         if actor.is_camera:
             actor.stream = self._next_stream
@@ -120,7 +128,7 @@ class World:
 
     def destroy(self, actor: int) -> bool:
         """Destroy an actor; what is attached to it stays where it is."""
-        if actor not in self.actors:
+        if actor not in self.actors or self._switches.keeps_actors:
             raise wire.RefusedError("unable to destroy actor: not found")
         gone = self.actors.pop(actor)
         for other in self.actors.values():
@@ -174,15 +182,33 @@ class World:
             if other.kind in (Kind.VEHICLE, Kind.WALKER)
         )
 
+    def _is_grounded(self, actor: Actor) -> bool:
+        """Whether a body touches the ground: issues 4006, 5730 and 8313 of carla-simulator/carla.
+
+        Wheels and suspension reach below a vehicle's origin, a capsule is as low as its box.
+        """
+        x, y, z, *_ = actor.at
+        (_, _, middle), (_, _, half), *_ = actor.box
+        above = z + middle - half - self.map.ground_at(x, y)
+        return bool(np.any((above < self._switches.least_lift) & (above > -2.0 * half)))
+
+    def surface(self, x: float, y: float, z: float) -> tuple[float, bool] | None:
+        """Height of what is below a place, and whether that is a sidewalk."""
+        return self.map.surface(x, y, z, self._switches.kerb)
+
     # ------------------------------------------------------------------------------- ticks
     def tick(self) -> int:
         """Let one tick pass and show it; the number of the new frame."""
         dt = self.delta
-        self.frame += 1
-        self.elapsed += dt
+        self.frame += self._switches.frames_per_tick
+        self.elapsed += dt * self._switches.time_factor
         # A parent is older than what is attached to it, and a dictionary keeps its order.
         for actor in self.actors.values():
             actor.advance(dt)
+            if self._switches.walkers_drift and actor.kind is Kind.WALKER:
+                actor.drift(dt)
+        if self._switches.large_map:
+            self._let_sleep()
         self.lights.advance(dt)
         self.show()
         self._take_pictures()
@@ -196,9 +222,30 @@ class World:
             delta=self.delta,
             episode=self.episode,
             platform_time=time.monotonic(),
-            records=[actor.record() for actor in self.actors.values()],
+            records=[self._record(actor) for actor in self.actors.values()],
         )
         self._streams.send(wire.WORLD_OBSERVER, message)
+
+    def _record(self, actor: Actor) -> bytes:
+        reported = actor.reported_velocity(self._switches.still_speed)
+        if actor.physics and self._switches.speed_factor != 1.0:
+            reported = wire.vector(self._switches.speed_factor * part for part in reported)
+        return actor.record(reported)
+
+    def _let_sleep(self) -> None:
+        """Make actors dormant that are too far from all heroes of a large map (LargeMapManager)."""
+        reach = float(self.settings[_ACTIVE_DISTANCE])
+        heroes = [
+            actor
+            for actor in self._bodies()
+            if actor.kind is Kind.VEHICLE
+            and any(role in actor.attribute("role_name") for role in _HEROES)
+        ]
+        for actor in self._bodies():
+            actor.dormant = all(
+                hypot(actor.at[0] - one.at[0], actor.at[1] - one.at[1]) > reach
+                for one in heroes or [self.spectator]
+            )
 
     def _take_pictures(self) -> None:
         cameras = [a for a in self.actors.values() if a.is_camera and self._is_due(a)]

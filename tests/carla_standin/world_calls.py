@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -39,6 +40,7 @@ class WorldCalls:
         self._switches = switches
         self._maps = maps
         self._copied = ""
+        self.generation: list[Any] = []
 
     @rpc("version")
     def version(self) -> str:
@@ -77,8 +79,8 @@ class WorldCalls:
         world.show()
 
     @rpc("copy_opendrive_to_file", Returns.VOID)
-    def copy_opendrive(self, text: str, _parameters: list[Any]) -> None:
-        self._copied = text
+    def copy_opendrive(self, text: str, parameters: list[Any]) -> None:
+        self._copied, self.generation = text, parameters
 
     @rpc("get_map_info")
     def map_info(self) -> list[Any]:
@@ -88,6 +90,16 @@ class WorldCalls:
     @rpc("get_map_data")
     def map_data(self) -> str:
         return self._world.map.text
+
+    @rpc("project_point")
+    async def project(self, place: list[float], _direction: list[float], reach: float) -> list[Any]:
+        """What is straight below a place: a road or a sidewalk, no bodies."""
+        await asyncio.sleep(self._switches.ground_seconds)
+        x, y, z = place
+        found = self._world.surface(x, y, z)
+        if found is None or z - found[0] > reach or self._switches.blind_ground:
+            return [False, [[0.0, 0.0, 0.0], 0]]
+        return [True, [[x, y, found[0]], 2 if found[1] else 1]]
 
     @rpc("get_required_files")
     def required_files(self, _folder: str) -> list[str]:
@@ -128,6 +140,7 @@ class WorldCalls:
         await self._streams.settled()
         if self._switches.before_tick():
             self._streams.drop()
+        await asyncio.sleep(self._switches.tick_seconds)
         return self._world.tick()
 
     # ------------------------------------------------------------------------------- weather

@@ -1,0 +1,318 @@
+"""What to do in a tick so that a server shows a step of SUMO's: pure planning, no server needed.
+
+A :class:`Mirror` knows which actor on the server represents which road user. Each tick it turns
+where road users are into a :class:`~odscen.carla.server.batch.Batch`, and learns what came of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.base.frames import XodrPose, xodr_to_carla
+from odscen.carla.mirror.nearby import Nearby
+from odscen.carla.server.batch import (
+    BRAKE,
+    FOG,
+    HIGH_BEAM,
+    LEFT,
+    LIFTS,
+    LOW_BEAM,
+    RIGHT,
+    ROLE,
+    SIREN,
+    ActorPlace,
+    Batch,
+    Move,
+    Shine,
+    Spawn,
+    Velocity,
+)
+from odscen.carla.server.blueprints import Shape
+from odscen.sumo.runner.in_step import Step
+from odscen.sumo.worker.snapshots import VehicleSignal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from odscen.results.records.run_records import Plan
+
+PAUSE = 10
+"""Ticks between two more tries, once all lifts were refused."""
+JUMP = 12.0
+"""Metres that a road user moves in a step more than driving takes: a teleport, shown as one."""
+
+_NO_SHAPE = Shape((0.0, 0.0, 0.0))
+
+
+@dataclass(slots=True)
+class Refusal:
+    """A road user whom the server would not take, and why in its own words."""
+
+    actor: str
+    tries: int
+    reason: str
+
+
+class Mirror:
+    """Which actor represents which road user.
+
+    Parameters
+    ----------
+    blueprints
+        One for each actor of the plan.
+    shapes
+        Bounding boxes by blueprint.
+    nearby
+        Who is shown.
+    lights
+        Lights that every vehicle has on, by night or in fog.
+    left_out
+        Row of the plan of the one who is driven in CARLA.
+    ego_role
+        Role of the ego; as all others' if not given.
+    walkers_within
+        Metres from the ego beyond which pedestrians are not shown: actors are dormant there on
+        large maps, and a server is said to crash when a dormant walker is moved.
+    spectator
+        x and y that count as the ego's for that while there is no ego: a server without a hero goes
+        by its spectator.
+
+    Attributes
+    ----------
+    refusals
+        By row of the plan; those who were taken at last are not in it.
+    spawned
+        How many actors have been made so far.
+    shown
+        What the last batch shows: a step, or what lies between two; ``None`` before the first.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        blueprints: Sequence[str],
+        shapes: Mapping[str, Shape],
+        *,
+        nearby: Nearby | None = None,
+        lights: int = 0,
+        left_out: int | None = None,
+        ego_role: str | None = None,
+        walkers_within: float | None = None,
+        spectator: tuple[float, float] | None = None,
+    ) -> None:
+        self.refusals: dict[int, Refusal] = {}
+        self.spawned = 0
+        self.shown: Step | None = None
+        self._plan = plan
+        self._blueprints = tuple(blueprints)
+        self._walks = np.array([actor.person for actor in plan.actors], dtype=np.bool_)
+        self._ego = next((row for row, actor in enumerate(plan.actors) if actor.ego), None)
+        self._left_out = left_out
+        self._ego_role = ego_role
+        self._walkers_within = walkers_within
+        self._spectator = spectator
+        self._nearby = nearby or Nearby()
+        self._lights = lights
+        known = [shapes.get(name, _NO_SHAPE) for name in self._blueprints]
+        self._ahead = np.array([shape.centre[0] for shape in known])
+        self._aside = np.array([shape.centre[1] for shape in known])
+        self._height = np.array([shape.extent[2] - shape.centre[2] for shape in known])
+        self._actor: dict[int, int] = {}
+        self._flags: dict[int, int] = {}
+        self._wait: dict[int, int] = {}
+        self._asked: tuple[int, ...] = ()
+        self._last: Step | None = None
+
+    @property
+    def actors(self) -> Mapping[int, int]:
+        """Actor on the server for each row of the plan that is shown."""
+        return self._actor
+
+    def batches(self, step: Step, shares: Iterable[float]) -> Iterator[Batch]:
+        """Plan the ticks between the last step and this one; the last of them is exactly it.
+
+        Parameters
+        ----------
+        shares
+            How far the way to this step is in each tick; 1 in the last.
+
+        Notes
+        -----
+        After each batch :meth:`answered` is to be called before the next one is taken.
+        """
+        wanted = self._wanted(step)
+        last, self._last = self._last, step
+        for share in shares:
+            if share >= 1.0:
+                self.shown = step
+                yield self._batch(step, wanted, whole=True)
+            elif last is not None:
+                self.shown = between(last, step, share)
+                yield self._batch(self.shown, self._among(self.shown), whole=False)
+            else:
+                yield Batch()
+
+    def answered(self, answers: Sequence[int | str]) -> None:
+        """Learn what came of the spawns of the last batch: an actor's id, or why there is none."""
+        for row, answer in zip(self._asked, answers, strict=True):
+            if isinstance(answer, int):
+                self._actor[row] = answer
+                self.spawned += 1
+                self.refusals.pop(row, None)
+                continue
+            self._flags.pop(row, None)
+            refusal = self.refusals.setdefault(row, Refusal(self._plan.actors[row].id, 0, answer))
+            refusal.tries += 1
+            refusal.reason = answer
+            if refusal.tries >= len(LIFTS):
+                self._wait[row] = PAUSE
+        self._asked = ()
+
+    def _wanted(self, step: Step) -> np.ndarray:
+        centre = self._centre(step)
+        wanted = self._nearby.chosen(step.x, step.y, self._among(step), centre)
+        awake = centre or self._spectator
+        if awake is not None and self._walkers_within is not None:
+            away = np.hypot(step.x - awake[0], step.y - awake[1])
+            wanted &= ~self._walks[step.index] | (away <= self._walkers_within)
+        if self._left_out is not None:
+            wanted &= step.index != self._left_out
+        return wanted
+
+    def _among(self, step: Step) -> np.ndarray:
+        return np.array([row in self._actor for row in step.index.tolist()], dtype=np.bool_)
+
+    def _centre(self, step: Step) -> tuple[float, float] | None:
+        if self._ego is None:
+            return None
+        found = np.flatnonzero(step.index == self._ego)
+        return (float(step.x[found[0]]), float(step.y[found[0]])) if len(found) else None
+
+    def _batch(self, step: Step, here: np.ndarray, *, whole: bool) -> Batch:
+        """Plan one tick; who comes and who goes does so when the step is ``whole``."""
+        rows = step.index[here].tolist()
+        gone = sorted(self._actor.keys() - set(rows)) if whole else []
+        destroy = tuple(self._actor.pop(row) for row in gone)
+        for row in gone:
+            self._flags.pop(row, None)
+        places, velocities = self._places(step, here)
+        speeds = step.speed[here].tolist()
+        flags = self._all_flags(step.signals[here])
+        moves, shines, spawns, asked = [], [], [], []
+        for number, row in enumerate(rows):
+            actor, walks = self._actor.get(row), bool(self._walks[row])
+            at, velocity, speed = places[number], velocities[number], speeds[number]
+            own = 0 if walks else flags[number]
+            if actor is not None:
+                moves.append(Move(actor, at, velocity, speed, walks))
+                if not walks and self._flags.get(row) != own:
+                    self._flags[row] = own
+                    shines.append(Shine(actor, own))
+            elif whole and self._may_try(row):
+                self._flags[row] = own
+                asked.append(row)
+                spawns.append(
+                    Spawn(
+                        self._blueprints[row],
+                        self._role(row),
+                        at,
+                        velocity,
+                        speed,
+                        walks,
+                        self._lift(row) + (self._height[row] if walks else 0.0),
+                        own,
+                    )
+                )
+        self._asked = tuple(asked)
+        return Batch(destroy, tuple(spawns), tuple(moves), tuple(shines))
+
+    def _role(self, row: int) -> str:
+        if row == self._ego and self._ego_role is not None:
+            return self._ego_role
+        return ROLE + self._plan.actors[row].id
+
+    def _places(self, step: Step, here: np.ndarray) -> tuple[list[ActorPlace], list[Velocity]]:
+        """Origins of the actors: the box's middle is where the body centre is.
+
+        Vehicles and walkers are put on the ground; walkers are upright, and the server itself adds
+        what a walker's origin is above it.
+        """
+        index = step.index[here]
+        walks = self._walks[index]
+        pitch = np.where(walks, 0.0, step.pitch[here])
+        hdg = step.hdg[here]
+        level, ahead, aside = np.cos(pitch), self._ahead[index], self._aside[index]
+        pose = xodr_to_carla(
+            XodrPose(
+                step.x[here] - ahead * level * np.cos(hdg) - aside * np.sin(hdg),
+                step.y[here] - ahead * level * np.sin(hdg) + aside * np.cos(hdg),
+                step.z[here] - ahead * np.sin(pitch),
+                hdg,
+                pitch,
+            )
+        )
+        speed = step.speed[here]
+        columns = np.column_stack([pose.x, pose.y, pose.z, pose.pitch_deg, pose.yaw_deg])
+        velocity = np.column_stack(
+            [
+                speed * level * np.cos(hdg),
+                -speed * level * np.sin(hdg),
+                speed * np.sin(step.pitch[here]),
+            ]
+        )
+        return (
+            [ActorPlace(*values) for values in columns.tolist()],
+            [Velocity(*values) for values in velocity.tolist()],
+        )
+
+    def _all_flags(self, signals: np.ndarray) -> list[int]:
+        hazard = signals & VehicleSignal.BLINKER_EMERGENCY
+        flags = np.full(len(signals), self._lights)
+        flags += BRAKE * ((signals & VehicleSignal.BRAKE) > 0)
+        flags += RIGHT * (((signals & VehicleSignal.BLINKER_RIGHT) | hazard) > 0)
+        flags += LEFT * (((signals & VehicleSignal.BLINKER_LEFT) | hazard) > 0)
+        # Lights of the time of day are on already; a rule may switch on more.
+        flags |= LOW_BEAM * ((signals & VehicleSignal.FRONT) > 0)
+        flags |= FOG * ((signals & VehicleSignal.FOG) > 0)
+        flags += HIGH_BEAM * ((signals & VehicleSignal.HIGH_BEAM) > 0)
+        flags += SIREN * ((signals & VehicleSignal.EMERGENCY_BLUE) > 0)
+        listed: list[int] = flags.tolist()
+        return listed
+
+    def _may_try(self, row: int) -> bool:
+        left = self._wait.get(row, 0)
+        if left:
+            self._wait[row] = left - 1
+        return not left
+
+    def _lift(self, row: int) -> float:
+        refusal = self.refusals.get(row)
+        return LIFTS[refusal.tries % len(LIFTS)] if refusal else LIFTS[0]
+
+
+def between(last: Step, step: Step, share: float) -> Step:
+    """All who are in both steps, so much of the way from one to the other.
+
+    Headings turn the short way. Who has jumped stays where it was until the step is complete.
+    """
+    _, old, new = np.intersect1d(last.index, step.index, return_indices=True)
+    dx, dy = step.x[new] - last.x[old], step.y[new] - last.y[old]
+    usual = (step.speed[new] + last.speed[old]) * max(step.time - last.time, 0.0)
+    part = np.where(np.hypot(dx, dy) > usual + JUMP, 0.0, share)
+    turn = np.mod(step.hdg[new] - last.hdg[old] + np.pi, 2 * np.pi) - np.pi
+    return Step(
+        time=last.time + share * (step.time - last.time),
+        index=step.index[new],
+        ids=step.ids[new],
+        x=last.x[old] + part * dx,
+        y=last.y[old] + part * dy,
+        z=last.z[old] + part * (step.z[new] - last.z[old]),
+        hdg=last.hdg[old] + part * turn,
+        pitch=last.pitch[old] + part * (step.pitch[new] - last.pitch[old]),
+        speed=last.speed[old] + part * (step.speed[new] - last.speed[old]),
+        signals=last.signals[old],
+        lights=last.lights,
+    )

@@ -1,0 +1,423 @@
+"""Native mode on a server: spawn who is due, hand them to CARLA's own drivers, see them arrive.
+
+The Traffic Manager is a part of the client, runs in this process, and ends the process when the
+server does not answer it. So this is the business of a worker process
+(:mod:`odscen.carla.native.native_worker`), which tells of everything as it happens.
+"""
+
+from __future__ import annotations
+
+import math
+import socket
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla
+from odscen.carla.server.batch import LIFTS, ROLE
+from odscen.results.records.run_records import Event, EventKind
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.carla.native.native_plan import NativeActor
+    from odscen.carla.server.carla_server import Server
+
+ARRIVED = 2.5
+"""Metres from the goal at which a road user has arrived."""
+END_OF_ROAD = 40.0
+"""Metres of route left within which the Traffic Manager may remove a vehicle: a road that ends."""
+STRAYED = 15.0
+"""Metres from its route at which a vehicle has taken another."""
+RETRY_SECONDS = 0.5
+"""Simulated seconds between two tries to spawn a road user."""
+_SEARCH = 30
+"""Points of its route that a road user may pass in one tick, at most."""
+_TURN_AHEAD = 2
+"""Points before a change of lane at which it is commanded."""
+
+CONTROLLER = "controller.ai.walker"
+
+COLUMNS = 7
+"""Of :meth:`Traffic.rows`: row of the plan, x, y, z, hdg, pitch, speed."""
+
+
+@dataclass(slots=True, eq=False)
+class _Underway:
+    """A road user on the road: its actor on the server, and how far along its route it is."""
+
+    plan: NativeActor
+    number: int
+    since: float
+    handle: Any = None
+    guide: int | None = None
+    controller: Any = None
+    at: int = 0
+    turned: int = 0
+    speed: float = -1.0
+    strayed: bool = False
+
+
+@dataclass(slots=True)
+class _Tries:
+    next: float = 0.0
+    count: int = 0
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """What one tick has brought: events, and notes in words about single actors."""
+
+    events: list[Event] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+class Traffic:
+    """All road users of a scenario, driven by the Traffic Manager and CARLA's walkers.
+
+    Parameters
+    ----------
+    server
+        Synchronized.
+    actors
+        Who is to come, see :func:`odscen.carla.native.native_plan.native_actors`.
+    blueprints
+        By row of the plan.
+    seed
+        Of the Traffic Manager's and the walkers' random choices.
+    physics
+        Whether vehicles have their own physics. Without, the Traffic Manager moves them itself.
+
+    Attributes
+    ----------
+    has_navigation
+        Whether the world has a navigation mesh; without one walkers are led along their routes.
+    road_ends
+        Metres to the goal of each vehicle that the Traffic Manager took away where a road ends,
+        which it does as soon as it sees the end. They count as arrived.
+    """
+
+    def __init__(
+        self,
+        server: Server,
+        actors: Sequence[NativeActor],
+        blueprints: Sequence[str],
+        *,
+        seed: int,
+        physics: bool = True,
+    ) -> None:
+        self._server = server
+        self._blueprints = blueprints
+        self._waiting = sorted(actors, key=lambda actor: (actor.depart, actor.row))
+        self._tries: dict[int, _Tries] = {}
+        self._underway: dict[int, _Underway] = {}
+        self._starting: list[_Underway] = []
+        self._physics = physics
+        self._seen: dict[int, XodrPose] = {}
+        self.road_ends: list[float] = []
+        self._port = _free_port()
+        self._manager = server.client.get_trafficmanager(self._port)
+        self._manager.set_synchronous_mode(True)
+        self._manager.set_random_device_seed(seed)
+        # Where a road ends, others than OpenStreetMap's users expect a vehicle to go on.
+        self._manager.set_osm_mode(True)
+        self._manager.set_hybrid_physics_mode(not physics)
+        server.world.set_pedestrians_seed(seed)
+        self.has_navigation = server.world.get_random_location_from_navigation() is not None
+
+    @property
+    def expected(self) -> int:
+        """How many are on the road or still to come."""
+        return len(self._waiting) + len(self._underway)
+
+    @property
+    def running(self) -> int:
+        """How many are on the road."""
+        return len(self._underway)
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Actors that have been made on the server."""
+        return self._server.own
+
+    def refusals(self) -> dict[str, str]:
+        """Why the server refused a road user, by id; of those that were not spawned."""
+        return {
+            actor.id: self._tries[actor.row].reason
+            for actor in self._waiting
+            if actor.row in self._tries
+        }
+
+    def step(self, time: float, delta: float) -> Happened:
+        """Make the tick that begins at ``time``, seconds."""
+        happened = Happened()
+        new = self._spawn_due(time)
+        self._lead_walkers()
+        self._server.tick()
+        snapshot = self._server.world.get_snapshot()
+        self._start_controllers()
+        for one in new:
+            happened.events.append(self._departed(one, snapshot, time))
+            self._hand_over(one)
+        self._follow(snapshot, time + delta, happened)
+        return happened
+
+    def rows(self, delta: float) -> np.ndarray:
+        """All on the road after a tick of ``delta`` seconds, shape ``(N, 7)``.
+
+        Columns: row of the plan, x, y, z, hdg, pitch, speed; origins of the actors in the OpenDRIVE
+        frame, metres, radians, m/s.
+        """
+        snapshot = self._server.world.get_snapshot()
+        rows, seen = [], {}
+        for row, one in self._underway.items():
+            state = snapshot.find(one.number)
+            if state is None:
+                continue
+            pose = seen[row] = _pose(state)
+            speed = _length(state.get_velocity())
+            if one.plan.person or not self._physics:
+                # The walker AI, and the Traffic Manager without physics, put road users where
+                # they are to be: at no velocity.
+                last = self._seen.get(row, pose)
+                speed = math.hypot(pose.x - last.x, pose.y - last.y) / delta
+            rows.append([row, pose.x, pose.y, pose.z, pose.hdg, pose.pitch, speed])
+        self._seen = seen
+        return np.array(rows, dtype="<f8").reshape(-1, COLUMNS)
+
+    def close(self) -> None:
+        """Let go of all and end the Traffic Manager, which must not outlive the server."""
+        for one in self._underway.values():
+            self._let_go(one)
+        self._destroy(list(self._underway.values()))
+        self._underway.clear()
+        with suppress(RuntimeError):
+            self._manager.set_synchronous_mode(False)
+            self._manager.shut_down()
+
+    # ------------------------------------------------------------------------------- coming
+    def _spawn_due(self, time: float) -> list[_Underway]:
+        due = [actor for actor in self._waiting if actor.depart <= time and self._may(actor, time)]
+        new: list[_Underway] = []
+        for _ in LIFTS:  # all in this tick: a body on the ground is refused, and one above it taken
+            commands = [self._spawn_command(actor) for actor in due]
+            answers = self._server.spawn(commands) if commands else []
+            refused = []
+            for actor, answer in zip(due, answers, strict=True):
+                if isinstance(answer, int):
+                    one = _Underway(actor, answer, time)
+                    self._underway[actor.row] = one
+                    self._waiting.remove(actor)
+                    new.append(one)
+                else:
+                    tries = self._tries.setdefault(actor.row, _Tries())
+                    tries.next, tries.reason = time + RETRY_SECONDS, answer
+                    tries.count += 1
+                    refused.append(actor)
+            due = refused
+        return new
+
+    def _may(self, actor: NativeActor, time: float) -> bool:
+        tries = self._tries.get(actor.row)
+        return tries is None or tries.next <= time
+
+    def _spawn_command(self, actor: NativeActor) -> Any:
+        """At the exact place; only the height gives way, and physics lets a vehicle settle."""
+        tries = self._tries.get(actor.row)
+        lift = LIFTS[tries.count % len(LIFTS)] if tries else LIFTS[0]
+        if actor.person:
+            lift += actor.height / 2.0
+        at = xodr_to_carla(actor.at)
+        return self._server.spawn_command(
+            self._blueprints[actor.row],
+            "hero" if actor.ego else ROLE + actor.id,
+            (float(at.x), float(at.y), float(at.z) + lift),
+            pitch=float(at.pitch_deg),
+            yaw=float(at.yaw_deg),
+        )
+
+    def _departed(self, one: _Underway, snapshot: Any, time: float) -> Event:
+        state = snapshot.find(one.number)
+        if state is None:
+            return Event(time, EventKind.DEPARTED, one.plan.id)
+        pose = _pose(state)
+        planned = one.plan.at
+        error = math.hypot(float(pose.x - planned.x), float(pose.y - planned.y))
+        return Event(
+            time, EventKind.DEPARTED, one.plan.id, x=float(pose.x), y=float(pose.y), error=error
+        )
+
+    def _hand_over(self, one: _Underway) -> None:
+        """Give a road user that has just come to CARLA's drivers or walkers."""
+        one.handle = self._server.world.get_actor(one.number)
+        plan = one.plan
+        if plan.person:
+            if self.has_navigation:
+                self._give_controller(one)
+            return
+        manager, car = self._manager, one.handle
+        car.set_autopilot(True, self._port)
+        manager.auto_lane_change(car, False)
+        manager.random_left_lanechange_percentage(car, 0)
+        manager.random_right_lanechange_percentage(car, 0)
+        manager.keep_slow_lane_rule_percentage(car, 0)
+        manager.update_vehicle_lights(car, True)
+        manager.distance_to_leading_vehicle(car, plan.gap)
+        if plan.offset:
+            manager.vehicle_lane_offset(car, -plan.offset)  # CARLA's is to the right
+        if len(plan.path):
+            manager.set_path(car, [self._location(point) for point in plan.path])
+        self._set_speed(one)
+
+    def _give_controller(self, one: _Underway) -> None:
+        """Let CARLA's walker AI find the route; on its own mesh, which is not the scenario's.
+
+        A controller can be started when a tick has shown it: the next one, which is made anyway.
+        """
+        world, carla = self._server.world, self._server.package
+        blueprint = world.get_blueprint_library().find(CONTROLLER)
+        command = carla.command.SpawnActor(blueprint, carla.Transform(), one.number)
+        (controller,) = self._server.spawn([command])
+        if not isinstance(controller, int):  # then it is led, as without a mesh
+            return
+        one.guide = controller
+        self._starting.append(one)
+
+    def _start_controllers(self) -> None:
+        """Start the controllers that were made before the last tick."""
+        for one in self._starting:
+            if one.plan.row in self._underway:
+                one.controller = self._server.world.get_actor(one.guide)
+                one.controller.start()
+                one.controller.go_to_location(self._location(one.plan.route[-1]))
+                one.controller.set_max_speed(float(one.plan.speed[0]))
+        self._starting.clear()
+
+    # ------------------------------------------------------------------------------- under way
+    def _follow(self, snapshot: Any, time: float, happened: Happened) -> None:
+        gone = []
+        for one in self._underway.values():
+            state = snapshot.find(one.number)
+            if state is None:
+                if self._vanished(one, time, happened):
+                    gone.append(one)
+                continue
+            left = self._advance(one, _pose(state), happened)
+            if left <= ARRIVED:
+                gone.append(one)
+                happened.events.append(_arrival(one, time))
+            elif not one.plan.person:
+                self._set_speed(one)
+                self._change_lane(one)
+        for one in gone:
+            del self._underway[one.plan.row]
+            self._let_go(one)
+        self._destroy(gone)
+
+    def _advance(self, one: _Underway, pose: XodrPose, happened: Happened) -> float:
+        """Move on to the nearest point of the route; metres from here to the goal, straight."""
+        route = one.plan.route
+        ahead = route[one.at : one.at + _SEARCH, :2] - (float(pose.x), float(pose.y))
+        distance = np.hypot(ahead[:, 0], ahead[:, 1])
+        nearest = int(np.argmin(distance))
+        one.at += nearest
+        if distance[nearest] > STRAYED and not one.strayed:
+            one.strayed = True
+            happened.notes.append(
+                f"{one.plan.id}: left its route {_left(one):.0f} m before its goal"
+            )
+        return math.hypot(route[-1, 0] - float(pose.x), route[-1, 1] - float(pose.y))
+
+    def _vanished(self, one: _Underway, time: float, happened: Happened) -> bool:
+        """Report the outcome of one that the server has no longer; false if it is yet to come."""
+        if time - one.since < 2 * RETRY_SECONDS and one.at == 0:
+            return False
+        left = _left(one)
+        if left <= END_OF_ROAD:
+            happened.events.append(_arrival(one, time))
+            self.road_ends.append(left)
+            return True
+        happened.notes.append(
+            f"{one.plan.id}: the Traffic Manager took it away {left:.0f} m before its goal"
+        )
+        return True
+
+    def _set_speed(self, one: _Underway) -> None:
+        wanted = float(one.plan.speed[one.at])
+        if wanted != one.speed:
+            one.speed = wanted
+            self._manager.set_desired_speed(one.handle, wanted * 3.6)
+
+    def _change_lane(self, one: _Underway) -> None:
+        changes = one.plan.changes
+        while one.turned < len(changes) and one.at + _TURN_AHEAD >= changes[one.turned][0]:
+            self._manager.force_lane_change(one.handle, changes[one.turned][1])
+            one.turned += 1
+
+    def _lead_walkers(self) -> None:
+        """Without a navigation mesh: every pedestrian walks to the next point of its route."""
+        commands = []
+        carla, snapshot = self._server.package, self._server.world.get_snapshot()
+        for one in self._underway.values():
+            if not one.plan.person or one.guide is not None:
+                continue
+            state = snapshot.find(one.number)
+            if state is None:
+                continue
+            pose = _pose(state)
+            target = one.plan.route[min(one.at + 1, len(one.plan.route) - 1)]
+            dx, dy = float(target[0] - pose.x), float(target[1] - pose.y)
+            norm = math.hypot(dx, dy) or 1.0
+            speed = float(one.plan.speed[one.at])
+            control = carla.WalkerControl(carla.Vector3D(dx / norm, -dy / norm, 0.0), speed, False)
+            commands.append(carla.command.ApplyWalkerControl(one.number, control))
+        self._server.send(commands)
+
+    # ------------------------------------------------------------------------------- leaving
+    def _let_go(self, one: _Underway) -> None:
+        """Take it from the Traffic Manager before it is destroyed, or the manager would ask."""
+        if one.handle is None:
+            return
+        with suppress(RuntimeError):
+            if one.controller is not None:
+                one.controller.stop()
+            elif not one.plan.person:
+                one.handle.set_autopilot(False, self._port)
+
+    def _destroy(self, gone: Sequence[_Underway]) -> None:
+        controllers = [one.guide for one in gone if one.guide is not None]
+        self._server.destroy([*controllers, *(one.number for one in gone)])
+
+    def _location(self, point: np.ndarray) -> Any:
+        x, y, z = (float(value) for value in point)
+        return self._server.package.Location(x, -y, z)
+
+
+def _arrival(one: _Underway, time: float) -> Event:
+    return Event(time, EventKind.ARRIVED, one.plan.id, travel_time=time - one.since)
+
+
+def _left(one: _Underway) -> float:
+    """Metres of route from the last known point to the goal."""
+    rest = np.diff(one.plan.route[one.at :, :2], axis=0)
+    return float(np.sum(np.hypot(rest[:, 0], rest[:, 1])))
+
+
+def _pose(state: Any) -> XodrPose:
+    at = state.get_transform()
+    place, turn = at.location, at.rotation
+    return carla_to_xodr(CarlaPose(place.x, place.y, place.z, turn.yaw, turn.pitch))
+
+
+def _length(vector: Any) -> float:
+    return math.hypot(vector.x, vector.y, vector.z)
+
+
+def _free_port() -> int:
+    """Port for the Traffic Manager of its own: another program may have one at the usual port."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])

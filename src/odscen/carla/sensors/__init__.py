@@ -1,0 +1,1 @@
+"""What a run sees in CARLA: cameras, and their pictures as files."""

@@ -1,0 +1,1 @@
+"""Mirrored runs for the page, each in a process of its own."""

@@ -1,0 +1,67 @@
+"""The models of a CARLA server as rows of the asset catalogue (requirement R11)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.categories import Body, Category
+from odscen.workspace.asset_catalogue import Assets, Blueprint
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.carla.server.carla_server import Server
+
+SOURCE = "server"
+"""``dimensions_source`` of boxes that were measured on the server."""
+
+
+def fetch_models(server: Server, known: Assets) -> list[Blueprint]:
+    """Every vehicle and pedestrian of a server, by id, with the box that the server gives it.
+
+    One of each is made aloft and taken away again. Where the server does not say what a model is
+    (two cars of 0.9.16, and pedestrians), the catalogue's word holds, else the number of wheels.
+    Models that the server refuses to make are left out.
+
+    Raises
+    ------
+    CarlaError
+        If the server does not answer.
+    """
+    described = server.describe(("vehicle.", "walker.pedestrian."))
+    shapes = server.shapes(tuple(described))
+    return [
+        _model(name, described[name], known.blueprints.get(name), shapes[name].extent)
+        for name in sorted(shapes)
+    ]
+
+
+def _model(
+    name: str, said: dict[str, str], known: Blueprint | None, extent: tuple[float, float, float]
+) -> Blueprint:
+    length, width, height = (round(2 * half, 4) for half in extent)
+    generation: Any = said.get("generation")
+    if known is not None:
+        category, age = known.category, known.age
+    else:
+        category, age = category_of(name, said), None
+    return Blueprint(
+        id=name,
+        category=category,
+        base_type=said.get("base_type", ""),
+        special_type=said.get("special_type", ""),
+        generation=int(generation) if generation and category is not Category.PEDESTRIAN else None,
+        age=age,
+        body=Body(length, width, height),
+        dimensions_source=SOURCE,
+    )
+
+
+def category_of(name: str, said: Mapping[str, str]) -> Category:
+    """Category of a blueprint from what the server says of it."""
+    if name.startswith("walker."):
+        return Category.PEDESTRIAN
+    base_type = said.get("base_type", "").lower()
+    if base_type in set(Category):
+        return Category(base_type)
+    return Category.MOTORCYCLE if said.get("number_of_wheels") == "2" else Category.CAR

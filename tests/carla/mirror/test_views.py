@@ -1,0 +1,60 @@
+"""Cameras of a mirrored run: where they are in every tick."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odscen.carla.mirror.cosim import cosim
+from odscen.carla.mirror.cosim_options import CosimOptions
+from odscen.carla.sensors.pictures import Wish
+from odscen.carla.server.client import Address
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+from tests.carla.conftest import MAPS, scenario_of
+from tests.carla.observer import Observer
+from tests.carla_standin.process import StandIn
+
+carla = pytest.importorskip("carla", reason="co-simulation needs the package carla")
+pytest.importorskip("av", reason="pictures need the package av")
+
+WEAVE = MAPS / "motorway_weave.xodr"
+TICK, STEP = 0.05, 0.5
+EGO = {
+    "id": "ego", "category": "car", "model": "vehicle.tesla.model3", "ego": True,
+    "spawn": "2.1.-1.40", "goal": "4.1.-1.200", "speed": 25.0,
+}  # fmt: skip
+
+
+def test_the_camera_is_above_the_ego_in_every_tick_and_all_pictures_are_counted(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    path = scenario_of(workspace, WEAVE, [EGO], tmp_path)
+    with (
+        StandIn(WEAVE, map_name=WEAVE.stem) as server,
+        Observer(server, tmp_path / "seen.json") as observer,
+    ):
+        result, report = cosim(
+            workspace,
+            path,
+            CosimOptions(
+                Address(server.host, server.port),
+                tick=TICK,
+                pictures=Wish(tmp_path / "frames", width=64, height=36),
+            ),
+            out=tmp_path,
+            settings=RunSettings(until=6.0, step_length=STEP),
+        )
+    assert (result.status, report.error) == ("completed", None)
+    both = [frame.users for frame in observer.frames if {"ego", "camera"} <= frame.users.keys()]
+    places = np.array([[*seen["ego"][:2], *seen["camera"][:2]] for seen in both])
+    assert len(places) > 90
+    moved = np.hypot(*np.diff(places[:, :2], axis=0).T)
+    assert moved.max() > 0.5, "it drove"
+    assert np.hypot(*(places[:, :2] - places[:, 2:]).T).max() <= 0.05
+    written = len(list((tmp_path / "frames").iterdir()))
+    assert written == report.pictures - report.pictures_dropped
+    assert math.isclose(written, 60, abs_tol=12)

@@ -1,0 +1,56 @@
+"""Departures with CARLA alone: within one tick of the plan, and at no ticks beyond the run's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from odscen.carla.native.native_run import NativeOptions, run_native
+from odscen.carla.server.client import Address
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+from tests.carla.conftest import MAPS, scenario_of
+from tests.carla_standin.process import StandIn
+
+pytest.importorskip("carla", reason="co-simulation needs the package carla")
+
+WEAVE = MAPS / "motorway_weave.xodr"
+TICK, SECONDS = 0.05, 3.0
+DEPARTS = {"a": 0.0, "b": 0.33, "c": 0.5, "d": 1.27, "e": 2.01}
+"""Seconds, some between two ticks."""
+
+
+def test_departures_are_within_a_tick_of_the_plan_and_cost_no_ticks(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """Even where a server takes nothing less than 0.5 m above the ground."""
+    actors = [
+        {
+            "id": name, "category": "car", "depart": depart, "goal": "4.1.-1.200",
+            "spawn": f"2.1.-{1 + k % 2}.{40 + 30 * k}",
+        }
+        for k, (name, depart) in enumerate(DEPARTS.items())
+    ]  # fmt: skip
+    path = scenario_of(workspace, WEAVE, actors, tmp_path)
+    with StandIn(WEAVE, map_name=WEAVE.stem, least_lift=0.5) as server:
+        result, _ = run_native(
+            workspace,
+            path,
+            NativeOptions(Address(server.host, server.port), physics=False),
+            settings=RunSettings(until=SECONDS),
+            out=tmp_path / "runs",
+        )
+        ticks = server.calls()["tick_cue"]
+    events = json.loads((result.folder / "events.json").read_text())["events"]
+    late = {
+        event["actor"]: event["time"] - DEPARTS[event["actor"]]
+        for event in events
+        if event["kind"] == "departed"
+    }
+    assert set(late) == set(DEPARTS)
+    assert min(late.values()) >= -1e-9
+    assert max(late.values()) < TICK
+    # The client ticks once or twice by itself when it sets the length of a tick.
+    assert SECONDS / TICK <= ticks <= SECONDS / TICK + 2
