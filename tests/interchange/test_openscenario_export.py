@@ -150,7 +150,14 @@ def test_goals_are_lane_positions_and_other_fields_properties(tree: Any) -> None
         one.get("name"): one.get("value")
         for one in the(tree, '//ScenarioObject[@name="late"]//Properties')
     }
-    assert properties == {"type": "simulation", "odscen.style": "sporty"}
+    late = scenario().actors[2]
+    assert properties == {
+        "type": "simulation",
+        "odscen.style": "sporty",
+        "odscen.spawn": late.spawn,
+        "odscen.goal": late.goal,
+        "odscen.depart": "4.0",
+    }
 
 
 def test_who_departs_later_is_added_then(tree: Any) -> None:

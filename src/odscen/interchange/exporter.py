@@ -13,9 +13,38 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import polars as pl
+
+    from odscen.opendrive.road_model import OpenDrive
+    from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.workspace.asset_catalogue import Assets
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WhatHappened:
+    """What happened in a run.
+
+    Attributes
+    ----------
+    users
+        Everybody who was planned, with size and height of the ground at departure.
+    rows
+        Trajectories of body centres, see :meth:`~odscen.sumo.folder.finished_run.Run.trajectories`.
+    states
+        What lights showed, see :func:`~odscen.sumo.folder.recorded.read_light_states`.
+    until
+        When the simulation ended, s.
+    step
+        Between two records, s.
+    """
+
+    users: tuple[PlannedActor, ...]
+    rows: pl.DataFrame
+    states: pl.DataFrame | None
+    until: float
+    step: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +67,10 @@ class ExportSource:
         Size of models and parameters of weather.
     options
         What the format lets one choose, by name.
+    happened
+        Of a run that is exported instead of the scenario.
+    roads
+        The map itself, for formats that ask for it.
     """
 
     name: str
@@ -47,10 +80,12 @@ class ExportSource:
     net: Path
     assets: Assets
     options: Mapping[str, str] = field(default_factory=dict)
+    happened: WhatHappened | None = None
+    roads: OpenDrive | None = None
 
 
-ExportFiles = Mapping[str, "str | Path"]
-"""By name: the text of a file, or a file that is copied."""
+ExportFiles = Mapping[str, "str | bytes | Path"]
+"""By name: the content of a file, or a file that is copied."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,15 +99,21 @@ class Exporter:
     label
         What it is, in the help.
     files
-        Makes the files.
+        Makes the files; ``None`` for a format of runs only.
     checked
         Whether the scenario must be free of errors.
     options
         Names of what can be chosen.
+    runs
+        Makes the files of what happened in a run, if the format can say that.
+    needs_roads
+        Whether it is given the map itself.
     """
 
     name: str
     label: str
-    files: Callable[[ExportSource], ExportFiles]
+    files: Callable[[ExportSource], ExportFiles] | None = None
     checked: bool = True
     options: tuple[str, ...] = ()
+    runs: Callable[[ExportSource], ExportFiles] | None = None
+    needs_roads: bool = False

@@ -5,15 +5,23 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from odscen.base.errors import InputError
 from odscen.interchange.exporter import Exporter
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from lxml.etree import _Element
+
     from odscen.interchange.exporter import ExportFiles, ExportSource
-    from odscen.interchange.openscenario.dialect import ExportNotes
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
+    from odscen.scenario.document.scenario_document import Scenario
 
 _DATE = "2026-01-01T00:00:00"
 """Of the file's header: the same scenario gives the same file on any day."""
 LATEST = "1.2"
+LEFT_HANDED = "CARLA:"
+"""How ScenarioRunner's descriptions begin of files in CARLA's frame, which ours are not in."""
 
 
 def openscenario_files(source: ExportSource) -> ExportFiles:
@@ -24,36 +32,83 @@ def openscenario_files(source: ExportSource) -> ExportFiles:
     InputError
         If the version cannot be written.
     """
-    from lxml import etree
-
-    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes, xml
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
     from odscen.interchange.openscenario.xosc_entities import entity
     from odscen.interchange.openscenario.xosc_places import Places
+    from odscen.interchange.openscenario.xosc_signals import traffic_signals
     from odscen.interchange.openscenario.xosc_storyboard import Story
-    from odscen.interchange.openscenario.xosc_weather import environment
 
     dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
     scenario, places = source.scenario, Places(source)
-    _note_traffic(source, notes)
+    _note_traffic(source, dialect, notes)
+    story = Story(scenario, places, dialect, notes, _weather(source, dialect))
+    entities = [entity(actor, places, dialect) for actor in scenario.actors]
+    signals = traffic_signals(source, notes)
+    return _files(source, dialect, entities, story.storyboard(), notes, signals)
+
+
+def files_as_run(source: ExportSource) -> ExportFiles:
+    """What happened in a run: a file of OpenSCENARIO, its map, and what could not be said.
+
+    Raises
+    ------
+    InputError
+        If the version cannot be written, or too much or nothing was recorded.
+    """
+    from odscen.interchange.openscenario.dialect import Dialect, ExportNotes
+    from odscen.interchange.openscenario.xosc_as_run import AsRun, lines_of
+    from odscen.interchange.openscenario.xosc_places import Places
+    from odscen.interchange.openscenario.xosc_triggers import Triggers
+
+    happened = source.happened
+    if happened is None:
+        msg = "what happened is known of runs only"
+        raise InputError(msg)
+    dialect, notes = Dialect.of(source.options.get("version", LATEST)), ExportNotes()
+    triggers = Triggers(Places(source), dialect, notes, {})
+    lines = lines_of(happened)
+    made = AsRun(source, happened, dialect, triggers, _weather(source, dialect), lines)
+    for user in happened.users:
+        if user.id not in lines:
+            notes.left_out.append((user.id, "never in the simulation"))
+    return _files(source, dialect, list(made.entities()), made.storyboard(), notes)
+
+
+def _weather(source: ExportSource, dialect: Dialect) -> _Element:
+    from odscen.interchange.openscenario.xosc_weather import environment
+
+    return environment(_parameters(source), source.scenario.demand.clock, dialect)
+
+
+def _files(
+    source: ExportSource,
+    dialect: Dialect,
+    entities: Sequence[_Element],
+    storyboard: _Element,
+    notes: ExportNotes,
+    signals: _Element | None = None,
+) -> ExportFiles:
+    from lxml import etree
+
+    from odscen.interchange.openscenario.dialect import xml
+
     header = xml(
         "FileHeader",
         revMajor=1,
         revMinor=dialect.minor,
         date=_DATE,
-        description=scenario.name,
+        description=_title(source.scenario, dialect),
         author="odscen",
     )
-    weather = environment(_parameters(source), scenario.demand.clock, dialect)
-    story = Story(scenario, places, dialect, notes, weather)
-    map_name = f"{scenario.map.name}.xodr"
+    map_name = f"{source.scenario.map.name}.xodr"
     root = xml(
         "OpenSCENARIO",
         header,
         xml("ParameterDeclarations"),
         xml("CatalogLocations"),
-        xml("RoadNetwork", xml("LogicFile", filepath=map_name)),
-        xml("Entities", *(entity(actor, places, dialect) for actor in scenario.actors)),
-        story.storyboard(),
+        xml("RoadNetwork", xml("LogicFile", filepath=map_name), signals),
+        xml("Entities", *entities),
+        storyboard,
     )
     text = etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")
     said = {"approximated": notes.rows(notes.approximated), "left_out": notes.rows(notes.left_out)}
@@ -64,15 +119,42 @@ def openscenario_files(source: ExportSource) -> ExportFiles:
     }
 
 
+def _title(scenario: Scenario, dialect: Dialect) -> str:
+    """Description of the file; ScenarioRunner takes it as a name."""
+    said = "" if dialect.for_scenario_runner else scenario.description
+    return (said or scenario.name).removeprefix(LEFT_HANDED)
+
+
 def _parameters(source: ExportSource) -> dict[str, float]:
     given = source.scenario.environment
     return {**(source.assets.weather(given.preset) or {}), **given.parameters}
 
 
-def _note_traffic(source: ExportSource, notes: ExportNotes) -> None:
+def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) -> None:
     """Say what only SUMO knows: drivers, traffic, signals and measures do not travel."""
+    from odscen.lanegraph.query import largest_part
+    from odscen.scenario.document.scenario_document import STEP_WITH_RULES, Simulation
+    from odscen.scenario.templates.scene_actors import STEADY_DRIVER
+
     scenario = source.scenario
+    if scenario.environment.model_dump(exclude_defaults=True):
+        words = "sun, clouds, fog, rain and friction of the weather"
+        notes.approximated.append(("environment", words))
+    every = set(largest_part(source.sumo_map.graph.segments))
+    usual = Simulation(
+        duration=scenario.simulation.duration,
+        step_length=STEP_WITH_RULES if scenario.rules else Simulation().step_length,
+    )
     given = {
+        "seed": scenario.seed > 0,
+        "roi": set(scenario.roi) != every,
+        "drivers": [one.model_dump(exclude_unset=True) for one in scenario.drivers.sets]
+        not in ([], [STEADY_DRIVER]),
+        "simulation": scenario.simulation != usual,
+        "variant": scenario.variant is not None,
+        "parameters": bool(scenario.parameters),
+        "study": bool(scenario.study.model_dump(exclude_defaults=True)),
+        "description": scenario.description not in ("", _title(scenario, dialect)),
         "flows": bool(scenario.flows),
         "demand": bool(scenario.demand.parts),
         "transit": bool(scenario.transit.lines),
@@ -83,6 +165,9 @@ def _note_traffic(source: ExportSource, notes: ExportNotes) -> None:
         if there:
             notes.left_out.append((part, "OpenSCENARIO has no word for it"))
     for index, actor in enumerate(scenario.actors):
+        if actor.via:
+            words = "a property: OpenSCENARIO's controller finds its own route to the goal"
+            notes.approximated.append((f"actors[{index}].via", words))
         if actor.initial_speed is None and actor.speed is None and not actor.ego:
             words = "SUMO drives it, OpenSCENARIO's default controller keeps its speed of 0"
             notes.approximated.append((f"actors[{index}]", words))
@@ -93,4 +178,5 @@ EXPORTER = Exporter(
     label="OpenSCENARIO XML of actors and rules, with --version 1.0 to 1.3",
     files=openscenario_files,
     options=("version",),
+    runs=files_as_run,
 )

@@ -73,9 +73,14 @@ class Dialect:
         return cls(int(version[2:]))
 
     @property
-    def overriding(self) -> str:
-        """Priority of an event that ends others of its maneuver group."""
-        return "override" if self.minor >= 2 else "overwrite"
+    def for_scenario_runner(self) -> bool:
+        """Whether ScenarioRunner is to read it, which takes 1.0 only, and of that a part.
+
+        It refuses a file whole, so that nothing is written that it has no counterpart of. Rules:
+        ``srunner/tools/openscenario_parser.py`` and
+        ``srunner/scenarioconfigs/openscenario_configuration.py``.
+        """
+        return self.minor == 0
 
     def rule(self, *, above: bool) -> str:
         """How a value is held against its bound, which counts as met from 1.1 on."""

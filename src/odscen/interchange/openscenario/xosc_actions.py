@@ -9,6 +9,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario.dialect import xml
 from odscen.interchange.openscenario.xosc_places import GroundPose
+from odscen.interchange.openscenario.xosc_presence import (
+    BELOW,
+    add_entity,
+    delete_entity,
+    private,
+)
+from odscen.interchange.openscenario.xosc_signals import (
+    light_action,
+    lights_action,
+    signal_phase,
+    signals_of,
+)
 from odscen.interchange.openscenario.xosc_triggers import CannotSayError
 
 if TYPE_CHECKING:
@@ -21,8 +33,12 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Actor
 
 _SHAPES: Final = {"step": "step", "linear": "linear", "cosine": "sinusoidal"}
+_RATE: Final = "ScenarioRunner takes the rate as seconds"
 _WALKING: Final = 1.4
 """m/s of pedestrians whose speed is not given."""
+_USUAL_SPEED: Final = 10.0
+"""m/s of others."""
+IGNORES: Final = "left out, for only rules are obeyed there"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,26 +68,38 @@ class Actions:
         self, name: str, spots: Sequence[GroundPose], times: Sequence[float], *, timed: bool
     ) -> _Element:
         """``RoutingAction`` that leads along points; times are relative to its begin."""
-        vertices = [
-            xml("Vertex", spot.element(), time=float(time))
-            for spot, time in zip(spots, times, strict=True)
-        ]
-        shape = xml("Shape", xml("Polyline", *vertices))
-        line = xml("Trajectory", xml("ParameterDeclarations"), shape, name=name, closed=False)
-        timing = xml("Timing", domainAbsoluteRelative="relative", scale=1.0, offset=0.0)
-        follow = xml(
-            "FollowTrajectoryAction",
-            line if self.dialect.minor == 0 else None,
-            xml("TimeReference", timing if timed else xml("None")),
-            xml("TrajectoryFollowingMode", followingMode="position"),
-            None if self.dialect.minor == 0 else xml("TrajectoryRef", line),
-        )
-        return private(xml("RoutingAction", follow))
+        return follow_line(self.dialect, name, spots, times, clock="relative" if timed else None)
 
 
-def private(content: _Element) -> _Element:
-    """``PrivateAction``."""
-    return xml("PrivateAction", content)
+def follow_line(
+    dialect: Dialect,
+    name: str,
+    spots: Sequence[GroundPose],
+    times: Sequence[float],
+    *,
+    clock: str | None,
+) -> _Element:
+    """``PrivateAction`` that leads along points.
+
+    ``clock``: whether ``times`` (s) are ``absolute``, ``relative`` to its begin, or do not count.
+    """
+    vertices = [
+        xml("Vertex", spot.element(), time=float(time))
+        for spot, time in zip(spots, times, strict=True)
+    ]
+    shape = xml("Shape", xml("Polyline", *vertices))
+    line = xml("Trajectory", xml("ParameterDeclarations"), shape, name=name, closed=False)
+    timing = xml("None")
+    if clock is not None:
+        timing = xml("Timing", domainAbsoluteRelative=clock, scale=1.0, offset=0.0)
+    follow = xml(
+        "FollowTrajectoryAction",
+        line if dialect.minor == 0 else None,
+        xml("TimeReference", timing),
+        xml("TrajectoryFollowingMode", followingMode="position"),
+        None if dialect.minor == 0 else xml("TrajectoryRef", line),
+    )
+    return private(xml("RoutingAction", follow))
 
 
 def speed_action(speed: float, shape: str, dimension: str, value: float) -> _Element:
@@ -93,15 +121,19 @@ def speed_action(speed: float, shape: str, dimension: str, value: float) -> _Ele
     )
 
 
-def _speed(_made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _speed(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     given = (("rate", part.rate), ("time", part.over), ("distance", part.within))
     dimension, value = next((pair for pair in given if pair[1] is not None), ("time", 0.0))
+    if dimension == "rate" and made.dialect.for_scenario_runner:
+        made.notes.approximated.append((where, _RATE))
     return [speed_action(part.to, _SHAPES[part.shape], dimension, value)]
 
 
 def _brake(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     if part.hold is not None:
         made.notes.approximated.append((where, "what follows does not wait for the hold"))
+    if made.dialect.for_scenario_runner:
+        made.notes.approximated.append((where, _RATE))
     return [speed_action(0.0, "linear", "rate", part.by)]
 
 
@@ -148,6 +180,9 @@ def _lane(_made: Actions, part: Any, actor: str, _where: str) -> list[_Element]:
 def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     if part.gap is not None:
         made.notes.approximated.append((where, "the gap in front of it is not reached by itself"))
+    if made.dialect.for_scenario_runner:
+        words = "ScenarioRunner counts lanes from the actor's own, and changes none"
+        made.notes.approximated.append((where, words))
     return [_lane_change(part.over, xml("RelativeTargetLane", entityRef=part.to, value=0))]
 
 
@@ -166,11 +201,17 @@ def _offset(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
 
 
 def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
+    if part.seconds is not None and made.dialect.for_scenario_runner:
+        msg = "a gap in seconds, which ScenarioRunner refuses"
+        raise CannotSayError(msg)
     if part.lasting is not None:
         made.notes.approximated.append((where, "the gap is kept without end"))
     about: dict[str, object] = {}
     if made.dialect.minor >= 1:
-        about = {"coordinateSystem": "entity", "displacement": "trailingReferencedEntity"}
+        side = "leading" if part.ahead else "trailing"
+        about = {"coordinateSystem": "entity", "displacement": f"{side}ReferencedEntity"}
+    elif part.ahead:
+        made.notes.approximated.append((where, "1.0 does not say that the gap is ahead"))
     limits = xml("DynamicConstraints", maxAcceleration=part.rate, maxDeceleration=part.rate,
                  maxSpeed=70.0)  # fmt: skip
     return [
@@ -212,8 +253,12 @@ def _timed(spots: Sequence[GroundPose], speed: float) -> tuple[list[GroundPose],
 
 def _path(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     spots = [made.places.spot(place) for place in part.points]
+    made.notes.approximated.append((where, "the reference point follows it, from its first point"))
+    times = list(map(float, part.times or ()))
+    if len(spots) == 1:  # a line of one point is none
+        made.notes.approximated.append((where, "it leads there from where the actor begins"))
+        spots, times = [made.places.start(made.actors[actor]), *spots], [0.0, *times]
     if part.times:
-        times = list(map(float, part.times))
         return [made.trajectory(f"{actor}: {where}", spots, times, timed=True)]
     if part.speeds:
         made.notes.approximated.append((where, "speeds at the points are left out"))
@@ -222,6 +267,7 @@ def _path(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
 
 
 def _replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+    made.notes.approximated.append((where, "a trajectory, which odscen reads as a path"))
     back = made.places.centre_ahead(made.actors[actor])
     level = made.places.start(made.actors[actor]).z
     spots = [GroundPose(x, y, level, hdg).back(back) for _, x, y, hdg in part.rows]
@@ -230,32 +276,41 @@ def _replay(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
 
 
 def _goal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
-    return [acquire(made.places, part.to)]
+    return [acquire(made.places, part.to, made.dialect)]
 
 
-def acquire(places: Places, node: str) -> _Element:
+def acquire(places: Places, node: str, dialect: Dialect) -> _Element:
     """``PrivateAction`` that leads to a node."""
-    position = places.lane_position(node)
+    position = places.goal(node, dialect)
     return private(xml("RoutingAction", xml("AcquirePositionAction", position)))
 
 
-def _arrive(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+def _arrive(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
     master, own = (made.places.spot(place).element() for place in (part.when_at, part.at))
     master.tag, own.tag = "TargetPositionMaster", "TargetPosition"
-    return [private(xml("SynchronizeAction", master, own, masterEntityRef=part.to))]
+    final = None
+    if made.dialect.for_scenario_runner:  # which refuses one without
+        speed = made.actors[actor].speed or made.actors[actor].initial_speed or _USUAL_SPEED
+        made.notes.approximated.append((where, f"arrives at {speed:g} m/s"))
+        final = xml("FinalSpeed", xml("AbsoluteSpeed", value=float(speed)))
+    return [private(xml("SynchronizeAction", master, own, final, masterEntityRef=part.to))]
 
 
-def _vanish(_made: Actions, _part: Any, actor: str, _where: str) -> list[_Element]:
-    return [xml("GlobalAction", xml("EntityAction", xml("DeleteEntityAction"), entityRef=actor))]
+def _ignore(made: Actions, _part: Any, _actor: str, where: str) -> list[_Element]:
+    made.notes.approximated.append((where, IGNORES))
+    return []
 
 
-def appear(actor: Actor, at: GroundPose) -> _Element:
-    """``GlobalAction`` that adds an entity."""
-    added = xml("AddEntityAction", at.element())
-    return xml("GlobalAction", xml("EntityAction", added, entityRef=actor.id))
+def _vanish(made: Actions, _part: Any, actor: str, where: str) -> list[_Element]:
+    if made.dialect.for_scenario_runner:
+        made.notes.approximated.append((where.partition(".")[0], BELOW))
+    at = made.places.start(made.actors[actor])
+    return [delete_entity(actor, at, made.dialect)]
 
 
-def _appear(made: Actions, part: Any, actor: str, _where: str) -> list[_Element]:
+def _appear(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
+    if made.dialect.for_scenario_runner:
+        made.notes.approximated.append((where.partition(".")[0], BELOW))
     own = made.actors[actor]
     spot = made.places.start(own)
     if part.at is not None:
@@ -263,7 +318,8 @@ def _appear(made: Actions, part: Any, actor: str, _where: str) -> list[_Element]
             made.places.centre_ahead(own)
         )
     speed = own.initial_speed if part.speed is None else part.speed
-    return [appear(own, spot), speed_action(speed or 0.0, "step", "time", 0.0)]
+    there = add_entity(own.id, spot, made.dialect)
+    return [there, speed_action(speed or 0.0, "step", "time", 0.0)]
 
 
 _LIGHTS: Final = {
@@ -303,6 +359,22 @@ def _lights(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element
     ]
 
 
+def _signal(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+    source = made.places.source
+    if made.dialect.for_scenario_runner:
+        msg = "switching a traffic light, which ScenarioRunner refuses by the id of a signal"
+        raise CannotSayError(msg)
+    if part.shows == "off" and (signals := signals_of(source, part.light)):
+        return [light_action(signal, "off") for signal in signals]
+    found = signal_phase(source, part.light, part.movement) if part.movement else None
+    if found is None:
+        msg = f"switching the light {part.light!r} to {part.shows}"
+        raise CannotSayError(msg)
+    controller, phase = found
+    about = {"trafficSignalControllerRef": controller, "phase": phase}
+    return [lights_action(xml("TrafficSignalControllerAction", **about))]
+
+
 _MAKERS: Final[Mapping[str, Callable[[Actions, Any, str, str], list[_Element]]]] = {
     "speed": _speed,
     "brake": _brake,
@@ -321,4 +393,6 @@ _MAKERS: Final[Mapping[str, Callable[[Actions, Any, str, str], list[_Element]]]]
     "vanish": _vanish,
     "lights": _lights,
     "release": _release,
+    "ignore": _ignore,
+    "signal": _signal,
 }

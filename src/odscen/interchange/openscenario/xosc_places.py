@@ -15,12 +15,21 @@ if TYPE_CHECKING:
 
     from odscen.base.categories import Body
     from odscen.interchange.exporter import ExportSource
+    from odscen.interchange.openscenario.dialect import Dialect
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.conditions_document import RulePlace
     from odscen.scenario.document.scenario_document import Actor
 
 REAR_AXLE: Final = 0.28
 """Metres from the centre of a vehicle back to its rear axle, as a share of its length."""
+
+UNDERGROUND: Final = 100.0
+"""Metres."""
+
+
+def reference_behind(category: str, length: float) -> float:
+    """Metres from the centre of a body back to its reference point, of ``length`` metres."""
+    return 0.0 if category == Category.PEDESTRIAN else REAR_AXLE * length
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +53,10 @@ class GroundPose:
         hdg = self.hdg or 0.0
         dx, dy = -metres * math.sin(hdg), metres * math.cos(hdg)
         return GroundPose(self.x + dx, self.y + dy, self.z, self.hdg)
+
+    def below(self) -> GroundPose:
+        """Return the spot under the ground where who is not there waits for ScenarioRunner."""
+        return GroundPose(self.x, self.y, self.z - UNDERGROUND, self.hdg)
 
     def element(self) -> _Element:
         """``Position`` in world coordinates."""
@@ -93,13 +106,14 @@ class Places:
 
     def centre_ahead(self, actor: Actor) -> float:
         """Metres from the reference point, the rear axle, ahead to the centre of the body."""
-        if actor.category is Category.PEDESTRIAN:
-            return 0.0
-        return REAR_AXLE * self.body(actor).length
+        return reference_behind(actor.category, self.body(actor).length)
 
-    def lane_position(self, node: str) -> _Element:
-        """``Position`` of a lane node by road, lane and s; of others in world coordinates."""
-        if is_walk_node_id(node):
+    def goal(self, node: str, dialect: Dialect) -> _Element:
+        """``Position`` of a lane node by road, lane and s; of others in world coordinates.
+
+        ScenarioRunner asks CARLA for the lane, whose ids are numbers, and refuses one it has not.
+        """
+        if is_walk_node_id(node) or dialect.for_scenario_runner:
             return self.spot(node).element()
         lanes, index = self.graph.lanes, node_index(self.graph, node)
         key = lanes.lanes.keys[int(lanes.lane[index])]

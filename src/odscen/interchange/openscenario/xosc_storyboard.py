@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from odscen.interchange.openscenario.dialect import xml
 from odscen.interchange.openscenario.xosc_actions import (
+    IGNORES,
     Actions,
     acquire,
-    appear,
-    private,
     speed_action,
 )
+from odscen.interchange.openscenario.xosc_presence import BELOW, add_entity, private
 from odscen.interchange.openscenario.xosc_triggers import CannotSayError, Triggers
 
 if TYPE_CHECKING:
@@ -40,7 +40,10 @@ class Story:
         """``Storyboard``."""
         actors = {actor.id: actor for actor in self.scenario.actors}
         groups = [
-            group for actor in self.scenario.actors if (group := self._later(actor)) is not None
+            group
+            for actor in self.scenario.actors
+            for group in (self._later(actor), self._goal(actor))
+            if group is not None
         ]
         groups += self._rules(actors)
         duration = self.scenario.simulation.duration
@@ -60,14 +63,19 @@ class Story:
         if self.environment is not None:
             yield xml("GlobalAction", xml("EnvironmentAction", self.environment))
         for actor in actors:
+            start = self.places.start(actor)
             if actor.depart > 0 or self._appears(actor.id):
+                if self.dialect.for_scenario_runner:
+                    below = private(xml("TeleportAction", start.below().element()))
+                    yield xml("Private", below, entityRef=actor.id)
+                    self.notes.approximated.append((f"actors[{actors.index(actor)}]", BELOW))
                 continue
             actions = [
-                private(xml("TeleportAction", self.places.start(actor).element())),
+                private(xml("TeleportAction", start.element())),
                 speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
             ]
-            if actor.goal is not None:
-                actions.append(acquire(self.places, actor.goal))
+            if actor.goal is not None and not self.dialect.for_scenario_runner:
+                actions.append(acquire(self.places, actor.goal, self.dialect))
             yield xml("Private", *actions, entityRef=actor.id)
 
     def _appears(self, actor: str) -> bool:
@@ -78,20 +86,38 @@ class Story:
             for part in item.parts
         )
 
+    def _goal(self, actor: Actor) -> _Element | None:
+        """Maneuver group that gives an actor its goal.
+
+        ScenarioRunner places an actor at the last position that ``Init`` has of it.
+        """
+        if (
+            actor.goal is None
+            or actor.depart > 0
+            or self._appears(actor.id)
+            or not self.dialect.for_scenario_runner
+        ):
+            return None
+        triggers = Triggers(self.places, self.dialect, self.notes, {})
+        name = f"{actor.id} has a goal"
+        trigger = xml("StartTrigger", triggers.at_time(0.0, name))
+        action = acquire(self.places, actor.goal, self.dialect)
+        return maneuver_group(name, actor.id, [event(name, [action], trigger, 1)])
+
     def _later(self, actor: Actor) -> _Element | None:
         """Maneuver group of an actor that departs later."""
         if actor.depart <= 0 or self._appears(actor.id):
             return None
         triggers = Triggers(self.places, self.dialect, self.notes, {})
         actions = [
-            appear(actor, self.places.start(actor)),
+            add_entity(actor.id, self.places.start(actor), self.dialect),
             speed_action(actor.initial_speed or 0.0, "step", "time", 0.0),
         ]
         if actor.goal is not None:
-            actions.append(acquire(self.places, actor.goal))
+            actions.append(acquire(self.places, actor.goal, self.dialect))
         trigger = xml("StartTrigger", triggers.at_time(actor.depart, f"{actor.id} departs"))
         name = f"{actor.id} departs"
-        return self._group(name, actor.id, [self._event(name, actions, trigger, 1)])
+        return maneuver_group(name, actor.id, [event(name, actions, trigger, 1)])
 
     def _rules(self, actors: dict[str, Actor]) -> list[_Element]:
         """Maneuver groups of rules; those that cannot be said are left out, and whom they free."""
@@ -122,10 +148,16 @@ class Story:
         if rule.actor not in actors:
             msg = f"rule {rule.id!r} is of {rule.actor!r}, a vehicle of a flow"
             raise CannotSayError(msg)
+        if rule.times > 1 and self.dialect.for_scenario_runner:
+            self.notes.approximated.append((where, "ScenarioRunner lets it happen once"))
         triggers = Triggers(self.places, self.dialect, self.notes, events)
         makes = Actions(self.places, self.dialect, self.notes, actors)
-        made = []
-        for index, item in enumerate(rule.then):
+        made: list[_Element] = []
+        said = _said(rule)
+        for index in {*range(len(rule.then))} - {*said}:
+            self.notes.approximated.append((f"{where}.then", f"item {index}: {IGNORES}"))
+        for index in said:
+            item = rule.then[index]
             actions = [
                 action
                 for part in item.parts
@@ -133,39 +165,52 @@ class Story:
                     part.kind, getattr(part, part.kind), rule.actor, f"{where}.then[{index}]"
                 )
             ]
+            if not actions:
+                msg = "a rule that does nothing there"
+                raise CannotSayError(msg)
             name = _event_name(rule, index)
             trigger = (
                 triggers.trigger(rule.when, rule.actor, where)
-                if index == 0
-                else triggers.after(_event_name(rule, index - 1))
+                if index == said[0]
+                else triggers.after(_event_name(rule, said[len(made) - 1]))
             )
-            made.append(self._event(name, actions, trigger, rule.times))
-        return self._group(rule.id, rule.actor, made)
+            made.append(event(name, actions, trigger, rule.times))
+        return maneuver_group(rule.id, rule.actor, made)
 
-    def _event(
-        self, name: str, actions: Sequence[_Element], trigger: _Element, times: int
-    ) -> _Element:
-        named = [
-            xml("Action", action, name=f"{name}.{number}")
-            for number, action in enumerate(actions, start=1)
-        ]
-        return xml(
-            "Event", *named, trigger, name=name, priority="parallel", maximumExecutionCount=times
-        )
 
-    def _group(self, name: str, actor: str, events: Sequence[_Element]) -> _Element:
-        return xml(
-            "ManeuverGroup",
-            xml("Actors", xml("EntityRef", entityRef=actor), selectTriggeringEntities=False),
-            xml("Maneuver", *events, name=name),
-            name=name,
-            maximumExecutionCount=1,
-        )
+def event(name: str, actions: Sequence[_Element], trigger: _Element, times: int) -> _Element:
+    """``Event`` with each action under a name of its own."""
+    named = [
+        xml("Action", action, name=f"{name}.{number}")
+        for number, action in enumerate(actions, start=1)
+    ]
+    return xml(
+        "Event", *named, trigger, name=name, priority="parallel", maximumExecutionCount=times
+    )
+
+
+def maneuver_group(name: str, actor: str | None, events: Sequence[_Element]) -> _Element:
+    """``ManeuverGroup`` of one actor, or of none for what is global."""
+    refs = [] if actor is None else [xml("EntityRef", entityRef=actor)]
+    return xml(
+        "ManeuverGroup",
+        xml("Actors", *refs, selectTriggeringEntities=False),
+        xml("Maneuver", *events, name=name),
+        name=name,
+        maximumExecutionCount=1,
+    )
 
 
 def _names(rule: StoryRule) -> tuple[str, str]:
     """Names of the first and the last event of a rule."""
-    return _event_name(rule, 0), _event_name(rule, len(rule.then) - 1)
+    said = _said(rule)
+    return _event_name(rule, said[0]), _event_name(rule, said[-1])
+
+
+def _said(rule: StoryRule) -> list[int]:
+    """Items of a rule that do something there; all of them if none does."""
+    found = [n for n, one in enumerate(rule.then) if {p.kind for p in one.parts} != {"ignore"}]
+    return found or list(range(len(rule.then)))
 
 
 def _event_name(rule: StoryRule, index: int) -> str:

@@ -7,6 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.interchange.openscenario.dialect import xml
+from odscen.interchange.openscenario.xosc_signals import movement_of, signal_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -36,6 +37,7 @@ class Leaf:
     rising: bool
     place: str
     state: str = ""
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +70,11 @@ class Triggers:
         return xml(
             "StartTrigger",
             *(
-                xml("ConditionGroup", *(self._condition(leaf, actor) for leaf in group))
-                for group in groups
+                xml(
+                    "ConditionGroup",
+                    *(self._condition(_numbered(leaf, n), actor) for leaf in group),
+                )
+                for n, group in enumerate(groups, start=1)
             ),
         )
 
@@ -105,7 +110,7 @@ class Triggers:
             )
         else:
             value = xml("ByValueCondition", value)
-        return self._named(leaf.place, value, leaf.delay, rising=leaf.rising)
+        return self._named(leaf.name or leaf.place, value, leaf.delay, rising=leaf.rising)
 
     def _wrapped(self, name: str, value: _Element, delay: float, *, rising: bool) -> _Element:
         return self._named(name, xml("ByValueCondition", value), delay, rising=rising)
@@ -151,6 +156,14 @@ def _groups(
         )
         return [(replace(leaf, state=state),) for state in states]
     return [(leaf,)]
+
+
+def _numbered(leaf: Leaf, group: int) -> Leaf:
+    """Name a condition unlike that of the same place in another group.
+
+    ScenarioRunner takes two conditions of one name for one.
+    """
+    return leaf if group == 1 else replace(leaf, name=f"{leaf.place} ({group})")
 
 
 def _refuse_negated(leaf: Leaf) -> None:
@@ -202,7 +215,11 @@ def _distance(made: Triggers, leaf: Leaf) -> _Element:
     if part.to is None:
         about = made.dialect.distance(kind, along_route=along_route)
         position = made.places.spot(part.place).element()
-        return xml("DistanceCondition", position, freespace=part.free, **about, **bound)
+        free = part.free
+        if free and made.dialect.for_scenario_runner:
+            made.notes.approximated.append((leaf.place, "from the reference point, not the body"))
+            free = False
+        return xml("DistanceCondition", position, freespace=free, **about, **bound)
     about = {"relativeDistanceType": kind}
     if made.dialect.minor >= 1:
         about |= made.dialect.distance(kind, along_route=along_route)
@@ -249,9 +266,24 @@ def _travelled(_made: Triggers, leaf: Leaf) -> _Element:
     return xml("TraveledDistanceCondition", value=float(value))
 
 
-def _signal(_made: Triggers, _leaf: Leaf) -> _Element:
-    msg = "what a movement of a traffic light shows"
-    raise CannotSayError(msg)
+def _signal(made: Triggers, leaf: Leaf) -> _Element:
+    _refuse_negated(leaf)
+    if made.dialect.for_scenario_runner:
+        msg = "what a traffic light shows, which ScenarioRunner refuses by the id of a signal"
+        raise CannotSayError(msg)
+    found = signal_of(made.places.source, leaf.part.light, leaf.part.movement)
+    if found is None:
+        msg = f"what {leaf.part.movement!r} shows, for which the map has no signal"
+        raise CannotSayError(msg)
+    signal, shared = found
+    if shared:
+        words = "the signal is over other movements too and shows the freest of their colours"
+        made.notes.approximated.append((leaf.place, words))
+    again = movement_of(made.places.source.sumo_map, signal)
+    if again is not None and again != (leaf.part.light, leaf.part.movement):
+        words = f"the signal, which odscen reads as movement {again[1]!r}"
+        made.notes.approximated.append((leaf.place, words))
+    return xml("TrafficSignalCondition", name=signal, state=leaf.part.shows)
 
 
 def _rule(made: Triggers, leaf: Leaf) -> _Element:
@@ -260,7 +292,10 @@ def _rule(made: Triggers, leaf: Leaf) -> _Element:
         msg = f"rule {leaf.part.id!r}, which is left out"
         raise CannotSayError(msg)
     first, last = made.events[leaf.part.id]
-    return _state(first if leaf.part.has == "started" else last, leaf.state)
+    state = leaf.state
+    if state == "runningState" and made.dialect.for_scenario_runner:
+        state = "startTransition"  # ScenarioRunner refuses running, and remembers the start
+    return _state(first if leaf.part.has == "started" else last, state)
 
 
 def _touched(_made: Triggers, leaf: Leaf) -> _Element:
@@ -275,7 +310,9 @@ def _off_road(_made: Triggers, leaf: Leaf) -> _Element:
     return xml("OffroadCondition", duration=0.0)
 
 
-_BY_VALUE: Final = frozenset({"SimulationTimeCondition", "StoryboardElementStateCondition"})
+_BY_VALUE: Final = frozenset(
+    {"SimulationTimeCondition", "StoryboardElementStateCondition", "TrafficSignalCondition"}
+)
 _MAKERS: Final[Mapping[str, Callable[[Triggers, Leaf], _Element]]] = {
     "time": _time,
     "ttc": _ttc,

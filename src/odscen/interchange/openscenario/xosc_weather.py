@@ -22,6 +22,10 @@ _HEAVIEST = 50.0
 _BRIGHTEST = 100_000.0
 """Lux with the sun upright."""
 _DAY = "2026-06-21"
+_SUN = 45.0
+"""Degrees above the horizon, of a weather that does not say."""
+_HOURS = ((0.0, 0), (20.0, 18), (90.0, 12))
+"""Hour of the day up to these heights of the sun, degrees."""
 
 
 def environment(parameters: Mapping[str, float], clock: float, dialect: Dialect) -> _Element:
@@ -32,9 +36,9 @@ def environment(parameters: Mapping[str, float], clock: float, dialect: Dialect)
     parameters
         Of CARLA's weather.
     clock
-        Time of day at the start, seconds.
+        Time of day at the start, seconds; of 0, as in a scenario without one, that of the sun.
     """
-    minutes, seconds = divmod(int(clock), 60)
+    minutes, seconds = divmod(int(clock or _hour(parameters) * 3600), 60)
     time = f"{_DAY}T{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
     return xml(
         "Environment",
@@ -46,11 +50,17 @@ def environment(parameters: Mapping[str, float], clock: float, dialect: Dialect)
     )
 
 
+def _hour(parameters: Mapping[str, float]) -> int:
+    """Hour at which the sun stands about as high as the weather says, in the evening if low."""
+    height = parameters.get("sun_altitude_angle", _SUN)
+    return next(hour for limit, hour in _HOURS if height <= limit)
+
+
 def _weather(parameters: Mapping[str, float], dialect: Dialect) -> _Element:
     rain = parameters.get("precipitation", 0.0)
     cloudiness = parameters.get("cloudiness", 0.0)
     clouds = next(word for limit, word in _CLOUDS if cloudiness < limit)
-    height = math.radians(parameters.get("sun_altitude_angle", 45.0))
+    height = math.radians(parameters.get("sun_altitude_angle", _SUN))
     bright = max(0.0, math.sin(height))
     about: dict[str, Any] = {}
     light: dict[str, Any] = {"intensity": bright}

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 import pytest
 
+from odscen.app.export import export
 from odscen.app.runs import run
-from odscen.app.sweep_runs import SweepSettings, read_sweep, sweep
+from odscen.app.sweeps.sweep_folder import SweepSettings, read_sweep
+from odscen.app.sweeps.sweep_runs import sweep
 from odscen.base.errors import ConflictError, InputError
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import SweepPlan, axis_from_text
@@ -22,7 +25,7 @@ from tests.sumo.story_case import MIDDLE, RIGHT, document, node_at, workspace
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.app.sweep_runs import Sweep
+    from odscen.app.sweeps.sweep_table import Sweep
     from odscen.scenario.document.scenario_document import Scenario
 
 MOTORWAY = "motorway_weave"
@@ -133,6 +136,37 @@ def test_a_sweep_that_was_interrupted_ends_with_the_same_bytes(
     assert done == [(3, 4), (4, 4)]
     for name in ("cases.parquet", "sweep.html", "sweep.json", "scenario.json"):
         assert (folder / name).read_bytes() == (swept.folder / name).read_bytes()
+
+
+def test_a_finished_sweep_writes_its_cases_as_openscenario(
+    swept: Sweep, cut_in: Scenario, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(swept.folder, folder)
+    settings = replace(SETTINGS, openscenario="1.1")
+    sweep(workspace(), cut_in, PLAN, folder, settings=settings)
+    cases = folder / "cases"
+    assert len(list(cases.glob("*.xosc"))) == 4
+    alone = tmp_path / "alone"
+    given = {"version": "1.1"}
+    file = cases / "case-003.scenario.json"
+    for one in export(workspace(), file, alone, to="openscenario", options=given):
+        assert one.read_bytes() == (cases / one.name).read_bytes()
+    texts = {(cases / f"case-00{number}.xosc").read_bytes() for number in (1, 2, 3, 4)}
+    assert len(texts) == 4
+    page = (folder / "sweep.html").read_text(encoding="utf-8")
+    assert 'href="cases/case-003.xosc"' in page
+    table = "cases.parquet"
+    assert (folder / table).read_bytes() == (swept.folder / table).read_bytes()
+
+
+def test_an_unknown_version_of_openscenario_is_refused_before_anything_runs(
+    cut_in: Scenario, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=r"0\.9"):
+        sweep(workspace(), cut_in, PLAN, out, settings=SweepSettings(openscenario="0.9"))
+    assert not out.exists()
 
 
 def test_a_folder_with_another_sweep_is_left_alone(swept: Sweep, cut_in: Scenario) -> None:

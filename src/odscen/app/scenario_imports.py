@@ -1,0 +1,231 @@
+"""OpenSCENARIO files read from disk, with their catalogs and their map."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.app.exchange.xosc_files import FolderFiles
+from odscen.app.maps import load_map
+from odscen.app.scenarios import check_scenario, write_scenario
+from odscen.base.errors import InputError
+from odscen.base.text_files import write_text
+from odscen.interchange.openscenario.xosc_signals import movement_of
+from odscen.interchange.openscenario_import.import_report import ImportReport
+from odscen.interchange.openscenario_import.read_distributions import read_distribution
+from odscen.interchange.openscenario_import.resolved_tree import TreeResolver
+from odscen.interchange.openscenario_import.xosc_reader import XoscSource, read_openscenario
+from odscen.opendrive.geometry import PlanView
+from odscen.opendrive.parse import parse
+from odscen.workspace.store import name_from_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from lxml.etree import _Element
+
+    from odscen.app.exchange.xosc_files import XoscFiles
+    from odscen.interchange.openscenario_import.import_report import ReportRow
+    from odscen.interchange.openscenario_import.xosc_reader import EgoDriver
+    from odscen.scenario.document.problems import Problem
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.sweeps.sweep_plan import SweepPlan
+    from odscen.workspace.map_entry import MapEntry
+    from odscen.workspace.store import Workspace
+
+
+class ImportedScenario(NamedTuple):
+    """A scenario, the lists of its report, and what :func:`check_scenario` finds in it.
+
+    Attributes
+    ----------
+    plan
+        What a parameter value distribution sweeps; ``None`` of other files, and if none of its
+        parameters settles a number of the scenario.
+    plan_file
+        Where that has been written.
+    """
+
+    scenario: Scenario
+    lists: dict[str, list[ReportRow]]
+    problems: tuple[Problem, ...]
+    plan: SweepPlan | None = None
+    plan_file: Path | None = None
+
+
+class ReadScenario(NamedTuple):
+    """What files say, before it is written or checked; see :class:`ImportedScenario`."""
+
+    scenario: Scenario
+    lists: dict[str, list[ReportRow]]
+    plan: SweepPlan | None
+
+
+def import_scenario(
+    workspace: Workspace,
+    file: Path,
+    *,
+    out: Path | None = None,
+    maps: Path | None = None,
+    ego: EgoDriver = "story",
+) -> ImportedScenario:
+    """Read an OpenSCENARIO file as a scenario, and write that if ``out`` is given.
+
+    Of a parameter value distribution it is the scenario that the file names, and the plan of the
+    sweep is written beside it, with ``.sweep.json`` in the place of ``.scenario.json``.
+
+    Its map is looked for beside the file, in the folder ``maps``, and by its name in the workspace;
+    one that is found as a file is added to the workspace.
+
+    Parameters
+    ----------
+    ego
+        What drives the ego: SUMO, or the story of the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or has no map or storyboard; names element and line.
+    NotFoundError
+        If its map is not found.
+    """
+    files = FolderFiles(file, maps)
+    scenario, lists, plan = read_files(workspace, files, name=name_from_file(file), ego=ego)
+    plan_file = None
+    if out is not None:
+        write_scenario(scenario, out)
+        plan_file = None if plan is None else _write_plan(plan, out)
+    return ImportedScenario(scenario, lists, check_scenario(workspace, scenario), plan, plan_file)
+
+
+def read_files(
+    workspace: Workspace, files: XoscFiles, *, name: str, ego: EgoDriver = "story"
+) -> ReadScenario:
+    """Read an OpenSCENARIO file, from wherever it and what it names lie.
+
+    Parameters
+    ----------
+    name
+        Of the scenario.
+
+    Raises
+    ------
+    InputError, NotFoundError
+        As of :func:`import_scenario`.
+    """
+    told = _told(files)
+    entry = told.files.map(workspace, told.map_named())
+    loaded = load_map(entry).sumo
+    source = XoscSource(
+        told.root, told.values, told.report, loaded.graph, entry.name, entry.sha256,
+        _road_points(entry), partial(movement_of, loaded), told.parameters, told.varied is not None,
+    )  # fmt: skip
+    scenario = read_openscenario(source, name=name, ego=ego)
+    plan = None
+    if told.varied is not None:
+        plan = read_distribution(told.report, told.varied, scenario.parameters)
+    return ReadScenario(scenario, told.report.lists(), plan)
+
+
+def wanted_map(files: XoscFiles) -> str:
+    """The map that a file names, as it names it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or has no map or storyboard; names element and line.
+    """
+    return _told(files).map_named()
+
+
+class _Told(NamedTuple):
+    """The file that tells the story: values put in for names, and what varies them."""
+
+    files: XoscFiles
+    root: _Element
+    values: dict[str, str]
+    report: ImportReport
+    parameters: dict[str, _Element]
+    varied: _Element | None
+
+    def map_named(self) -> str:
+        logic = self.root.find("RoadNetwork/LogicFile")
+        named = "" if logic is None else logic.get("filepath", "").replace("\\", "/")
+        if not named:
+            msg = "the file names no map (RoadNetwork/LogicFile)"
+            raise InputError(msg, file=self.files.where)
+        return named
+
+
+def _told(files: XoscFiles) -> _Told:
+    root = files.tree()
+    report = ImportReport()
+    report.add(root, files.name)
+    varied = root.find("ParameterValueDistribution")
+    if varied is not None:
+        files = files.other(_scenario_file(report, root, varied))
+        root = files.tree()
+        report.add(root, files.name)
+    if root.find("Storyboard") is None and root.find("Entities") is None:
+        msg = "this file has no storyboard: distributions and catalogs are not scenarios"
+        raise InputError(msg, file=files.where)
+    resolver = TreeResolver(report, _catalogs(files))
+    values = resolver.resolve(root)
+    return _Told(files, root, values, report, resolver.parameters, varied)
+
+
+def _scenario_file(report: ImportReport, root: _Element, varied: _Element) -> str:
+    """Scenario that a parameter value distribution is about, as it names it."""
+    for element in (root, *root.iterchildren("FileHeader")):
+        report.mark(element, "taken")
+    named = report.child(varied, "ScenarioFile")
+    if named is None:
+        raise report.wrong(varied, "there is no ScenarioFile")
+    return report.word(named, "filepath")
+
+
+def _write_plan(plan: SweepPlan, out: Path) -> Path:
+    stem = out.name.removesuffix(".json").removesuffix(".scenario")
+    return write_text(out.with_name(f"{stem}.sweep.json"), plan_text(plan))
+
+
+def plan_text(plan: SweepPlan) -> str:
+    """The file of a plan."""
+    return json.dumps(plan.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _catalogs(files: XoscFiles) -> Callable[[tuple[str, ...], str], tuple[_Element, str] | None]:
+    known: dict[str, tuple[_Element, str]] = {}
+
+    def find(folders: tuple[str, ...], name: str) -> tuple[_Element, str] | None:
+        for root, file in () if name in known else files.catalogs(folders):
+            catalog = root.find("Catalog")
+            if catalog is not None:
+                known.setdefault(catalog.get("name", ""), (root, file))
+        return known.get(name)
+
+    return find
+
+
+def _road_points(
+    entry: MapEntry,
+) -> Callable[[str, float, float], tuple[float, float, float] | None]:
+    loaded: list[tuple[dict[str, int], PlanView]] = []
+
+    def at(road: str, s: float, t: float) -> tuple[float, float, float] | None:
+        if not loaded:
+            roads = list(parse(entry.read("xodr")).roads.values())
+            rows = {str(one.id): row for row, one in enumerate(roads)}
+            loaded.append((rows, PlanView.of([one.geometry for one in roads])))
+        rows, plan = loaded[0]
+        if road not in rows:
+            return None
+        found = plan.at(np.array([rows[road]]), np.array([s]))
+        x, y, hdg = float(found.x[0]), float(found.y[0]), float(found.hdg[0])
+        return x - t * float(np.sin(hdg)), y + t * float(np.cos(hdg)), hdg
+
+    return at

@@ -1,0 +1,1 @@
+"""Scenarios run with many values of their parameters."""

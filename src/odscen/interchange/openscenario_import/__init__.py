@@ -1,0 +1,1 @@
+"""OpenSCENARIO files as scenarios, with a report on each of their elements."""

@@ -1,0 +1,90 @@
+"""Where actors start: nodes of the lane graph, and how far beside them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.categories import Category
+from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.traced_numbers import TracedNumber
+from odscen.lanegraph.query import node_id, walk_node_id
+
+if TYPE_CHECKING:
+    from odscen.interchange.openscenario_import.import_report import ImportReport
+    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_positions import MapPoint, PositionReader
+
+_BESIDE: Final = 10.0
+"""Metres that an actor can be beside its lane."""
+_FAR: Final = 100_000.0
+"""Metres after which a way straight on counts as long enough."""
+
+
+class ActorPlaces:
+    """Finds them, and marks entities that start elsewhere than the file says."""
+
+    def __init__(self, report: ImportReport, positions: PositionReader) -> None:
+        self._report = report
+        self._positions = positions
+
+    def leave_room(self, entity: ReadEntity, made: dict[str, Any], taken: set[str]) -> None:
+        """Let an actor start behind one whose node it would have."""
+        graph, steps = self._positions.graph, 0
+        if made["spawn"] not in taken or entity.category is Category.PEDESTRIAN:
+            return
+        there = self._positions.of_node(made["spawn"])
+        node = None if there is None else there.node
+        while node is not None and str(node_id(graph, node)) in taken:
+            steps += 1
+            back = self._positions.along(node, -math.ceil(entity.length + 1.0))
+            node = None if back == node else back
+        if node is None:
+            return
+        made["spawn"] = str(node_id(graph, node))
+        metres = steps * math.ceil(entity.length + 1.0)
+        words = f"about {metres} m behind, as another one starts there"
+        self._report.mark(entity.element, "approximated", words)
+
+    def walker(self, centre: MapPoint) -> dict[str, Any]:
+        """Node of the pedestrian graph nearest to a point."""
+        walks = self._positions.graph.walks
+        node = int(((walks.x - centre.x) ** 2 + (walks.y - centre.y) ** 2).argmin())
+        return {"spawn": str(walk_node_id(self._positions.graph, node))}
+
+    def aside(self, entity: ReadEntity, centre: MapPoint) -> float:
+        """Metres to the left of the nearest lane that leads its way, 0 on a lane.
+
+        Raises
+        ------
+        RefusedError
+            If it is farther from all lanes than an actor can be beside its own.
+        """
+        positions, lanes = self._positions, self._positions.graph.lanes
+        left = float(positions.beside_lane(centre))
+        if abs(left) <= float(lanes.width[positions.node_near(centre)]) / 2:
+            return 0.0
+        if entity.obstacle or abs(left) > _BESIDE:
+            raise RefusedError(entity.element, f"it starts {abs(left):.1f} m beside any lane")
+        words = f"on the lane {abs(left):.1f} m beside at first, and there 0.1 s later"
+        self._report.mark(entity.element, "approximated", words)
+        return left
+
+    def vehicle(self, entity: ReadEntity, centre: MapPoint) -> dict[str, Any]:
+        """Node nearest to the centre of the body, and the offset from it to the left."""
+        graph, lanes = self._positions.graph, self._positions.graph.lanes
+        node = self._positions.node_near(centre)
+        dx, dy = centre.x - float(lanes.x[node]), centre.y - float(lanes.y[node])
+        hdg = float(lanes.hdg[node])
+        along = dx * math.cos(hdg) + dy * math.sin(hdg)
+        left = dy * math.cos(hdg) - dx * math.sin(hdg)
+        report = self._report
+        if abs(along) > 0.01 and not isinstance(along, TracedNumber):
+            words = f"it starts {abs(along):.2f} m along its lane from there, on a node"
+            report.mark(entity.element, "approximated", words)
+        goal = self._positions.along(node, _FAR)
+        return {
+            "spawn": str(node_id(graph, node)),
+            "goal": str(node_id(graph, goal)),
+            "lateral_offset": round(left, 3),
+        }

@@ -1,0 +1,359 @@
+"""Private actions as actions of rules."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.categories import Category
+from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.read_trajectories import read_trajectory
+from odscen.lanegraph.query import node_id
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lxml.etree import _Element
+
+    from odscen.interchange.openscenario_import.read_conditions import ConditionReader
+    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+
+Made = dict[str, Any]
+_SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
+_MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
+FOLLOWING: Final = "following"
+"""Key of actions that follow one another, of one action of the file."""
+_JUMP: Final = 0.1
+"""Seconds that a teleport takes."""
+_CAR_WIDTH: Final = 1.8
+_USUAL: Final = 3.0
+"""Seconds of a lateral action that gives no measure that can be turned into some."""
+IGNORED: Final = frozenset(
+    {"ControllerAction", "ActivateControllerAction", "VisibilityAction", "AppearanceAction"}
+)
+
+
+@dataclass(slots=True)
+class ActionReader:
+    """Reads actions of one entity after another.
+
+    ``speeds`` (m/s) and ``lanes`` (ids) are the last ones that each actor was asked for. ``own``
+    says whether odscen wrote the file: its controllers are what drives without rules.
+    """
+
+    conditions: ConditionReader
+    speeds: dict[str, float] = field(default_factory=dict)
+    lanes: dict[str, int] = field(default_factory=dict)
+    own: bool = False
+
+    def actions(self, element: _Element, entity: ReadEntity) -> list[Made]:
+        """Actions of a rule that a ``PrivateAction`` is; none if it is ignored.
+
+        Raises
+        ------
+        RefusedError
+            If it has no counterpart.
+        """
+        report = self.conditions.report
+        kind = report.only(element)
+        if self.own and (made := _given_back(element)):
+            report.take(element)
+            return [made]
+        if kind.tag in IGNORED:
+            report.ignore(kind, "odscen has no controllers and looks of OpenSCENARIO; see --ego")
+            return []
+        if kind.tag not in _MAKERS:
+            kind = report.only(kind)
+        make = _MAKERS.get(str(kind.tag))
+        if make is None:
+            raise RefusedError(kind, f"odscen has no {kind.tag}")
+        return [make(self, kind, entity)]
+
+    def absolute_speed(self, target: _Element) -> float:
+        """Speed that a target asks for, m/s; a relative one counts from the last one known."""
+        report = self.conditions.report
+        kind = report.only(target)
+        value = report.number(kind, "value")
+        if kind.tag == "RelativeTargetSpeed":
+            base = self.speeds.get(self.conditions.actor(kind), 0.0)
+            words = f"relative to {base:g} m/s, the last speed that the file gives"
+            report.mark(kind, "approximated", words)
+            value = base * value if kind.get("speedTargetValueType") == "factor" else base + value
+        if value < 0:
+            report.mark(kind, "approximated", f"{value:g} m/s is 0: actors do not reverse")
+        return min(max(value, 0.0), 100.0)
+
+
+def _given_back(element: _Element) -> Made | None:
+    """What gives speed, or all, back to SUMO."""
+    kind = next(element.iter("ActivateControllerAction"), None)
+    if kind is None or kind.get("longitudinal") != "true":
+        return None
+    return {"release": {}} if kind.get("lateral") == "true" else {"go": {}}
+
+
+def _speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    dynamics = report.child(kind, "SpeedActionDynamics")
+    target = report.child(kind, "SpeedActionTarget")
+    if dynamics is None or target is None:
+        raise RefusedError(kind, "a speed without dynamics or target")
+    to = read.absolute_speed(target)
+    read.speeds[entity.id] = to
+    shape, value = dynamics.get("dynamicsShape", "step"), report.number(dynamics, "value", 0.0)
+    if entity.category is Category.PEDESTRIAN and to == 0.0:
+        return {"stop": {}}
+    if shape == "step" or value == 0:
+        return {"speed": {"to": to, "shape": "step"}}
+    if shape == "cubic":
+        report.mark(dynamics, "approximated", "a cubic is a half-cosine")
+    measure = _MEASURES.get(dynamics.get("dynamicsDimension", "time"), "over")
+    value = abs(value) if measure != "rate" else min(abs(value), 100.0)
+    return {"speed": {"to": to, "shape": _SHAPES.get(shape, "linear"), measure: value}}
+
+
+def _duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
+    """Seconds of a change of lane."""
+    report = read.conditions.report
+    if dynamics is None:
+        return _USUAL
+    value = abs(report.number(dynamics, "value", 0.0))
+    measure = dynamics.get("dynamicsDimension", "time")
+    if dynamics.get("dynamicsShape") == "step" or value == 0:
+        report.mark(dynamics, "approximated", "at once is within 0.1 s")
+        return 0.1
+    if dynamics.get("dynamicsShape") != "sinusoidal":
+        report.mark(dynamics, "approximated", "the line is a half-cosine")
+    if measure == "rate":
+        seconds = 3.5 / value
+        report.mark(dynamics, "approximated", f"{seconds:.2f} s, for a lane of 3.5 m")
+    elif measure == "distance":
+        seconds = value / max(read.speeds.get(entity.id, 0.0), 1.0)
+        report.mark(dynamics, "approximated", f"{seconds:.2f} s, at the last speed of the file")
+    else:
+        seconds = value
+    return seconds
+
+
+def _lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    over = _duration(read, report.child(kind, "LaneChangeActionDynamics"), entity)
+    target = report.child(kind, "LaneChangeTarget")
+    lane = None if target is None else report.only(target)
+    if lane is None:
+        raise RefusedError(kind, "a change of lane without a target")
+    value = int(report.number(lane, "value"))
+    if lane.tag == "RelativeTargetLane":
+        other = read.conditions.actor(lane)
+        if other == entity.id and value:
+            return {"lane": {"by": value, "over": over}}
+        if other != entity.id and value == 0:
+            return {"cut_in": {"to": other, "over": over}}
+        if other == entity.id:
+            raise RefusedError(lane, "the lane in which it is")
+        road, own, side = _start_lane(read, lane, entity.id)
+        beside, its, _ = _start_lane(read, lane, other)
+        if road != beside:
+            raise RefusedError(lane, f"the lane {value:+d} beside {other!r}, of another road")
+        by = value + side * (its - own)
+        words = f"{by:+d} lanes from that in which it starts; {other!r} is taken to stay in its own"
+    else:
+        _, own, side = _start_lane(read, lane, entity.id)
+        own = read.lanes.get(entity.id, own)
+        read.lanes[entity.id] = value
+        by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
+        words = f"{by:+d} lanes from the last one that the file names for it"
+    if by == 0:
+        report.mark(lane, "approximated", "to the middle of the lane in which it is")
+        return {"offset": {"to": 0.0, "over": over}}
+    report.mark(lane, "approximated", words)
+    return {"lane": {"by": by, "over": over}}
+
+
+def _start_lane(read: ActionReader, element: _Element, actor: str) -> tuple[str, int, int]:
+    """Road and lane id where an actor starts, and 1 if ids grow to its left, -1 otherwise."""
+    positions, entities = read.conditions.positions, read.conditions.entities
+    names = [name for name, one in entities.items() if one.id == actor]
+    start = positions.starts.get(names[0]) if names else None
+    if start is None:
+        raise RefusedError(element, f"a lane that counts from {actor!r}, which has no place")
+    lanes = positions.graph.lanes
+    row = int(lanes.lane[positions.node_near(start) if start.node is None else start.node])
+    key = lanes.lanes.keys[row]
+    return key.road, key.lane, 1 if bool(lanes.lanes.forward[row]) else -1
+
+
+def _offset(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    dynamics = report.child(kind, "LaneOffsetActionDynamics")
+    target = report.child(kind, "LaneOffsetTarget")
+    to = None if target is None else report.child(target)
+    if to is None:
+        raise RefusedError(kind, "an offset without a target")
+    metres = report.number(to, "value")
+    if to.tag == "RelativeTargetLaneOffset":
+        base = _start_offset(read, to)
+        metres += base
+        words = f"counted from {base:.2f} m, the offset at which {to.get('entityRef')!r} starts"
+        report.mark(to, "approximated", words)
+    most = 0.0 if dynamics is None else report.number(dynamics, "maxLateralAcc", 0.0)
+    over = math.pi * math.sqrt(abs(metres) / (2.0 * most)) if most > 0 and metres else _USUAL
+    report.mark(kind, "approximated", f"a half-cosine of {over:.2f} s")
+    return {"offset": {"to": metres, "over": max(over, 0.1)}}
+
+
+def _abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    """Keep beside another: an offset from the own lane, where both start."""
+    report, positions = read.conditions.report, read.conditions.positions
+    other = positions.of_entity(kind)
+    names = [name for name, one in read.conditions.entities.items() if one.id == entity.id]
+    own = positions.starts.get(names[0]) if names else None
+    if own is None:
+        raise RefusedError(kind, "it has no place yet")
+    left = (own.y - other.y) * math.cos(own.hdg) - (own.x - other.x) * math.sin(own.hdg)
+    sides = {"leftToReferencedEntity": 1.0, "rightToReferencedEntity": -1.0}
+    side = sides.get(kind.get("displacement", "any"), math.copysign(1.0, left))
+    wanted = report.number(kind, "distance", abs(left))
+    if kind.get("freespace") == "true":
+        wanted += _CAR_WIDTH
+    to = min(max(positions.beside_lane(own) - left + side * wanted, -10.0), 10.0)
+    words = f"{to:.2f} m from its own lane, if the other one stays in the lane in which it starts"
+    report.mark(kind, "approximated", words)
+    return {"offset": {"to": round(to, 3), "over": _USUAL}}
+
+
+def _start_offset(read: ActionReader, element: _Element) -> float:
+    """Metres to the left of the centre of its lane at which another entity starts."""
+    positions = read.conditions.positions
+    name = read.conditions.report.word(element, "entityRef")
+    if name not in positions.starts:
+        raise RefusedError(element, f"an offset from {name!r}, which has no place")
+    return positions.beside_lane(positions.starts[name])
+
+
+def _gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    part: Made = {"to": read.conditions.actor(kind)}
+    if kind.get("displacement") == "leadingReferencedEntity":
+        part["ahead"] = True
+    if kind.get("distance") is not None:
+        part["metres"] = max(report.number(kind, "distance"), 0.01)
+    else:
+        part["seconds"] = max(report.number(kind, "timeGap"), 0.01)
+    limits = report.child(kind, "DynamicConstraints")
+    if limits is not None:
+        rate = report.number(limits, "maxAcceleration", 3.0)
+        part["rate"] = min(max(rate, 0.1), 100.0)
+        report.mark(limits, "approximated", "maxAcceleration holds for braking too")
+    if kind.get("freespace") == "false":
+        report.mark(kind, "approximated", "between bodies, not reference points")
+    elif kind.get("continuous") == "false":
+        report.mark(kind, "approximated", "kept on when it is reached")
+    return {"keep_gap": part}
+
+
+def _trajectory(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    report, positions = read.conditions.report, read.conditions.positions
+    front = 0.0 if entity.category is Category.PEDESTRIAN else entity.ahead + entity.length / 2
+    with positions.exactly():
+        found = read_trajectory(report, positions, kind)
+    vertices = [
+        (one.time, round(at.x, 4), round(at.y, 4)) for one in found for at in (one.at.moved(front),)
+    ]
+    report.mark(kind, "approximated", "followed by the front, from where the actor is")
+    return {"path": _timed(read, kind, vertices[1:])}
+
+
+def _timed(read: ActionReader, kind: _Element, vertices: list[tuple[float, float, float]]) -> Made:
+    """Points of a path, with their times where the file has timing."""
+    report = read.conditions.report
+    reference = report.child(kind, "TimeReference")
+    timing = None if reference is None else report.child(reference, "Timing", "None")
+    report.child(kind, "TrajectoryFollowingMode")
+    points = [list(vertex[1:]) for vertex in vertices]
+    if timing is None or timing.tag != "Timing":
+        return {"points": points}
+    scale, offset = report.number(timing, "scale", 1.0), report.number(timing, "offset", 0.0)
+    times = [scale * vertex[0] + offset for vertex in vertices]
+    if times[0] <= 0 or any(one >= other for one, other in itertools.pairwise(times)):
+        raise RefusedError(timing, "times of vertices that do not grow")
+    return {"points": points, "times": times}
+
+
+def _teleport(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    """Put an actor somewhere: by a recording of 0.1 s there, after which it drives on."""
+    report, positions = read.conditions.report, read.conditions.positions
+    with positions.exactly():
+        centre = positions.point(report.only(kind)).moved(entity.ahead)
+    after = centre.moved(_JUMP * read.speeds.get(entity.id, 0.0))
+    rows = [
+        [time, round(at.x, 4), round(at.y, 4), round(at.hdg, 6)]
+        for time, at in ((0.0, centre), (_JUMP, after))
+    ]
+    report.mark(kind, "approximated", f"it is led there for {_JUMP:g} s, and drives on")
+    return {"replay": {"rows": rows}}
+
+
+def _profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
+    """Speeds one after the other, each reached evenly; the first one at once if it takes none."""
+    report = read.conditions.report
+    steps: list[Made] = []
+    for entry in report.children(kind, "SpeedProfileEntry"):
+        to = min(max(report.number(entry, "speed"), 0.0), 100.0)
+        over = report.number(entry, "time", 0.0)
+        shape = {"over": over} if over > 0 else {"shape": "step"}
+        steps.append({"speed": {"to": to, **shape}})
+        read.speeds[entity.id] = to
+    if not steps:
+        raise RefusedError(kind, "a speed profile without entries")
+    words = "the speed changes evenly between entries, whatever the limits are"
+    report.mark(kind, "approximated", words)
+    for limits in kind.iterchildren("DynamicConstraints"):
+        report.ignore(limits, words)
+    return steps[0] if len(steps) == 1 else {FOLLOWING: steps}
+
+
+def _goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    positions, report = read.conditions.positions, read.conditions.report
+    places = list(kind.iterfind(".//Waypoint/Position")) or list(kind.iterchildren("Position"))
+    if not places:
+        raise RefusedError(kind, "a route without places")
+    for one in kind.iter("Route", "Waypoint"):
+        report.mark(one, "approximated", "only the last place of a route is a goal")
+    report.mark(places[-1], "taken")
+    point = positions.point(places[-1])
+    node = positions.node_near(point) if point.node is None else point.node
+    return {"goal": {"to": str(node_id(positions.graph, node))}}
+
+
+def _arrive(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+    report = read.conditions.report
+    name = kind.get("masterEntityRef", "")
+    if name not in read.conditions.entities:
+        raise RefusedError(kind, f"entity {name!r} is not among the actors")
+    found = {}
+    for field_name, tag in (("when_at", "TargetPositionMaster"), ("at", "TargetPosition")):
+        place = report.child(kind, tag)
+        if place is None:
+            raise RefusedError(kind, f"{kind.tag} without {tag}")
+        found[field_name] = read.conditions.point_or_node(place)
+    if kind.find("FinalSpeed") is not None:
+        report.mark(kind, "approximated", "the speed on arrival is not settled")
+    return {"arrive": {**found, "to": read.conditions.entities[name].id}}
+
+
+_MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {
+    "SpeedAction": _speed,
+    "LaneChangeAction": _lane,
+    "LaneOffsetAction": _offset,
+    "LongitudinalDistanceAction": _gap,
+    "FollowTrajectoryAction": _trajectory,
+    "AssignRouteAction": _goal,
+    "AcquirePositionAction": _goal,
+    "SpeedProfileAction": _profile,
+    "TeleportAction": _teleport,
+    "SynchronizeAction": _arrive,
+    "LateralDistanceAction": _abreast,
+}

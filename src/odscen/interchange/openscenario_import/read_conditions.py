@@ -1,0 +1,327 @@
+"""Triggers as conditions of rules."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.interchange.openscenario_import.import_report import RefusedError
+from odscen.interchange.openscenario_import.own_files import without_repeats
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lxml.etree import _Element
+
+    from odscen.interchange.openscenario_import.import_report import ImportReport
+    from odscen.interchange.openscenario_import.read_entities import ReadEntity
+    from odscen.interchange.openscenario_import.read_positions import PositionReader
+
+Made = dict[str, Any]
+ALWAYS: Final[Made] = {"time": {"after": 0.0}}
+NEVER: Final[Made] = {"not": ALWAYS}
+_CLOSE: Final = 0.1
+"""What counts as equal, in the unit of the value."""
+_ROAD_END: Final = 10.0
+_FAR: Final = 100_000.0
+"""Metres."""
+_ALONG: Final = {
+    "longitudinal": "longitudinal",
+    "lateral": "lateral",
+    "cartesianDistance": "straight",
+    "euclidianDistance": "straight",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionReader:
+    """Reads triggers.
+
+    Attributes
+    ----------
+    values
+        Parameters and variables of the file, as declared.
+    state
+        Condition that an element of the storyboard has reached a state.
+    movement
+        Light and movement of a signal of the map.
+    own
+        Whether odscen wrote the file.
+    """
+
+    report: ImportReport
+    positions: PositionReader
+    entities: Mapping[str, ReadEntity]
+    values: Mapping[str, str]
+    state: Callable[[_Element], Made]
+    movement: Callable[[str], tuple[str, str] | None]
+    own: bool = False
+
+    def trigger(self, trigger: _Element | None) -> Made:
+        """Condition of a trigger; one without conditions holds at once.
+
+        Raises
+        ------
+        RefusedError
+            If a condition has no counterpart.
+        """
+        if trigger is None:
+            return ALWAYS
+        groups = [
+            joined("all", [self._condition(one) for one in self.report.children(group)])
+            for group in self.report.children(trigger, "ConditionGroup")
+        ]
+        if self.own:
+            groups = without_repeats(groups)
+        return joined("any", groups) if groups else ALWAYS
+
+    def _condition(self, element: _Element) -> Made:
+        content = self.report.child(element, "ByValueCondition", "ByEntityCondition")
+        if content is None:
+            raise RefusedError(element, "a condition without content")
+        if content.tag == "ByValueCondition":
+            made = self._by_value(self.report.only(content))
+        else:
+            made = self._by_entity(content)
+        return self._when(element, made)
+
+    def _when(self, element: _Element, made: Made) -> Made:
+        edge, delay = element.get("conditionEdge", "none"), self.report.number(element, "delay", 0)
+        if edge == "falling":
+            made = {"not": made, "edge": "rising"}
+        elif edge == "risingOrFalling":
+            made = {"any": [{**made, "edge": "rising"}, {"not": made, "edge": "rising"}]}
+        elif edge == "rising" and "time" not in made and "rule" not in made:
+            made = {**made, "edge": "rising"}
+        return {**made, "delay": delay} if delay > 0 else made
+
+    def _by_value(self, kind: _Element) -> Made:
+        if kind.tag == "SimulationTimeCondition":
+            after: Made = {"time": {"after": max(0.0, self.report.number(kind, "value"))}}
+            return {"not": after} if kind.get("rule", "").startswith("less") else after
+        if kind.tag == "StoryboardElementStateCondition":
+            return self.state(kind)
+        if kind.tag == "TrafficSignalCondition":
+            return self._signal(kind)
+        if kind.tag in ("ParameterCondition", "VariableCondition"):
+            self.report.mark(kind, "approximated", "held against the declared value, once")
+            return ALWAYS if self._holds(kind) else NEVER
+        raise RefusedError(kind, f"odscen has no {kind.tag}")
+
+    def _signal(self, kind: _Element) -> Made:
+        name, state = self.report.word(kind, "name"), kind.get("state", "").lower()
+        found = self.movement(name)
+        if found is None:
+            raise RefusedError(kind, f"signal {name!r} is over no movement of a light of the map")
+        if state not in ("red", "yellow", "green"):
+            raise RefusedError(kind, f"the state {state!r} of a signal")
+        light, movement = found
+        return {"signal": {"light": light, "movement": movement, "shows": state}}
+
+    def _holds(self, kind: _Element) -> bool:
+        name = kind.get("parameterRef") or kind.get("variableRef") or ""
+        have, want, rule = (
+            self.values.get(name.lstrip("$")),
+            kind.get("value", ""),
+            kind.get("rule"),
+        )
+        if have is None:
+            raise RefusedError(kind, f"{name!r} is not declared")
+        try:
+            one, other = float(have), float(want)
+        except ValueError:
+            return (have == want) == (rule != "notEqualTo")
+        return {
+            "greaterThan": one > other,
+            "greaterOrEqual": one >= other,
+            "lessThan": one < other,
+            "lessOrEqual": one <= other,
+            "notEqualTo": one != other,
+        }.get(str(rule), one == other)
+
+    def _by_entity(self, element: _Element) -> Made:
+        who = self.report.child(element, "TriggeringEntities")
+        body = self.report.child(element, "EntityCondition")
+        if who is None or body is None:
+            raise RefusedError(element, "a condition without entities")
+        names = [self.actor(one) for one in self.report.children(who, "EntityRef")]
+        kind = self.report.only(body)
+        read = _KINDS.get(str(kind.tag))
+        if read is None or not names:
+            raise RefusedError(kind, f"odscen has no {kind.tag}")
+        rule = who.get("triggeringEntitiesRule", "any")
+        return joined("any" if rule == "any" else "all", [read(self, kind, one) for one in names])
+
+    def actor(self, element: _Element) -> str:
+        """Id of the actor that an element refers to.
+
+        Raises
+        ------
+        RefusedError
+            If it is not among the actors.
+        """
+        name = self.report.word(element, "entityRef")
+        if name not in self.entities:
+            raise RefusedError(element, f"entity {name!r} is not among the actors")
+        return self.entities[name].id
+
+    def bounded(self, kind: _Element, name: str, part: Made) -> Made:
+        """Hold a value against the bound of an element."""
+        value, rule = self.report.number(kind, "value"), kind.get("rule", "")
+        if rule.startswith("less"):
+            return {name: {**part, "below": value}}
+        if rule.startswith("greater"):
+            return {name: {**part, "above": value}}
+        self.report.mark(kind, "approximated", f"equal is within {_CLOSE} of {value:g}")
+        near = [
+            {name: {**part, "above": value - _CLOSE}},
+            {name: {**part, "below": value + _CLOSE}},
+        ]
+        return {"not": {"all": near}} if rule == "notEqualTo" else {"all": near}
+
+    def place(self, kind: _Element) -> list[float] | str:
+        """X and y of the position in an element, metres; of a file of odscen's perhaps a node.
+
+        Raises
+        ------
+        RefusedError
+            If there is none.
+        """
+        position = self.report.child(kind, "Position")
+        if position is None:
+            raise RefusedError(kind, f"{kind.tag} without a position")
+        return self.point_or_node(position)
+
+    def point_or_node(self, position: _Element) -> list[float] | str:
+        """X and y of a position, metres; of a file of odscen's perhaps a node.
+
+        Raises
+        ------
+        RefusedError
+            If it cannot be found on the map.
+        """
+        point = self.positions.point(position)
+        node = self.positions.name_at(point) if self.own and _headed(position) else None
+        return node or [round(point.x, 4), round(point.y, 4)]
+
+
+def _headed(position: _Element) -> bool:
+    """Whether a position says a heading: points of odscen's have none, nodes have."""
+    return position.find("WorldPosition[@h]") is not None
+
+
+def joined(kind: str, parts: list[Made]) -> Made:
+    """Combine conditions; one alone stays as it is."""
+    rest = [one for one in parts if kind != "all" or one != ALWAYS]
+    if not rest:
+        return ALWAYS
+    return rest[0] if len(rest) == 1 else {kind: rest}
+
+
+def _speed(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "speed", {"of": of})
+
+
+def _acceleration(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "acceleration", {"of": of})
+
+
+def _relative_speed(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return read.bounded(kind, "relative_speed", {"of": of, "to": read.actor(kind)})
+
+
+def _travelled(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return {"travelled": {"of": of, "above": read.report.number(kind, "value")}}
+
+
+def _stopped(read: ConditionReader, kind: _Element, of: str) -> Made:
+    return {"stopped": {"of": of, "seconds": read.report.number(kind, "duration", 0.0)}}
+
+
+def _reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
+    within = min(max(read.report.number(kind, "tolerance"), 0.01), 1000.0)
+    return {"reaches": {"of": of, "place": read.place(kind), "within": within}}
+
+
+def _headway(read: ConditionReader, kind: _Element, of: str) -> Made:
+    if kind.get("freespace") == "false":
+        read.report.mark(kind, "approximated", "between bodies, not reference points")
+    return read.bounded(kind, "headway", {"of": of, "to": read.actor(kind)})
+
+
+def _ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
+    target = read.report.only(kind)
+    other = read.report.child(target, "EntityRef")
+    if other is None:
+        raise RefusedError(target, "time to collision with a place")
+    if kind.get("freespace") == "false":
+        read.report.mark(kind, "approximated", "between bodies, not reference points")
+    return read.bounded(kind, "ttc", {"of": of, "to": read.actor(other)})
+
+
+def _measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
+    along = _ALONG.get(kind.get("relativeDistanceType", usual), "straight")
+    if along == "longitudinal" and kind.get("coordinateSystem") in ("lane", "road"):
+        along = "lane"
+    free = kind.get("freespace") == "true"
+    if not free:
+        read.report.mark(kind, "approximated", "between centres, not reference points")
+    return {"along": along, "free": free}
+
+
+def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
+    part = {"of": of, "to": read.actor(kind), **_measure(read, kind, "longitudinal")}
+    return read.bounded(kind, "distance", part)
+
+
+def _distance(read: ConditionReader, kind: _Element, of: str) -> Made:
+    part = {"of": of, "place": read.place(kind), **_measure(read, kind, "euclidianDistance")}
+    if kind.get("alongRoute") == "true":
+        part["along"] = "lane"
+    return read.bounded(kind, "distance", part)
+
+
+def _touched(read: ConditionReader, kind: _Element, of: str) -> Made:
+    other = read.report.only(kind)
+    if other.tag == "EntityRef":
+        return {"touched": {"of": of, "to": read.actor(other)}}
+    read.report.mark(other, "approximated", "any road user that a rule names")
+    return {"touched": {"of": of}}
+
+
+def _off_road(read: ConditionReader, kind: _Element, of: str) -> Made:
+    delay = read.report.number(kind, "duration", 0.0)
+    return {"off_road": {"of": of}, **({"delay": delay} if delay > 0 else {})}
+
+
+def _road_end(read: ConditionReader, kind: _Element, of: str) -> Made:
+    """Near to where the lanes end that lead straight on from where the actor starts."""
+    positions, delay = read.positions, read.report.number(kind, "duration", 0.0)
+    entity = next(name for name, one in read.entities.items() if one.id == of)
+    if entity not in positions.starts:
+        raise RefusedError(kind, f"the end of the road of {entity!r}, which has no place")
+    start = positions.starts[entity]
+    node = positions.along(positions.node_near(start), _FAR)
+    lanes = positions.graph.lanes
+    words = f"within {_ROAD_END:g} m of the end of the lanes straight on from where it starts"
+    read.report.mark(kind, "approximated", f"{words}; SUMO takes it off the road there")
+    place = [round(float(lanes.x[node]), 4), round(float(lanes.y[node]), 4)]
+    made: Made = {"reaches": {"of": of, "place": place, "within": _ROAD_END}}
+    return made | ({"delay": delay} if delay > 0 else {})
+
+
+_KINDS: Final[Mapping[str, Callable[[ConditionReader, _Element, str], Made]]] = {
+    "SpeedCondition": _speed,
+    "AccelerationCondition": _acceleration,
+    "RelativeSpeedCondition": _relative_speed,
+    "TraveledDistanceCondition": _travelled,
+    "StandStillCondition": _stopped,
+    "ReachPositionCondition": _reaches,
+    "TimeHeadwayCondition": _headway,
+    "TimeToCollisionCondition": _ttc,
+    "RelativeDistanceCondition": _relative_distance,
+    "DistanceCondition": _distance,
+    "CollisionCondition": _touched,
+    "OffroadCondition": _off_road,
+    "EndOfRoadCondition": _road_end,
+}

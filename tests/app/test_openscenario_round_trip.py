@@ -1,0 +1,186 @@
+"""Exports read again: the same scenario, but for what the export lists; also files of others."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from lxml import etree
+
+from odscen.app.export import export
+from odscen.app.scenario_imports import import_scenario
+from odscen.app.scenarios import generate, read_scenario
+from odscen.app.template_scenarios import template_scenario
+from odscen.changes.acting_differences import acting_differences
+from odscen.interchange.openscenario.dialect import VERSIONS
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.sampling.generation_settings import GenerationSettings
+from tests.sumo.story_case import document, entry, node_at, workspace
+
+if TYPE_CHECKING:
+    from odscen.scenario.document.scenario_document import Scenario
+
+PLACES = {
+    "cut-in": "motorway_weave",
+    "lead-brakes": "motorway_weave",
+    "bus-leaves": "motorway_weave",
+    "hidden-child": "signal_crossing",
+    "mid-block": "signal_crossing",
+    "red-light": "signal_crossing",
+    "oncoming": "rural_hills",
+}
+SHARED = Path(__file__).parents[3] / "shared"
+
+
+def there_and_back(
+    scenario: Scenario, folder: Path, version: str
+) -> tuple[Scenario, dict[str, list[dict[str, str]]]]:
+    """Scenario that an export is read as, and what the export lists."""
+    files = export(workspace(), scenario, folder, to="openscenario", options={"version": version})
+    (file,) = (one for one in files if one.suffix == ".xosc")
+    (notes,) = (one for one in files if one.name.endswith(".export.json"))
+    return import_scenario(workspace(), file).scenario, json.loads(notes.read_text())
+
+
+def unlisted(before: Scenario, after: Scenario, notes: dict[str, Any]) -> list[str]:
+    """Differences whose place is in none of the lists of the export."""
+    listed = {row["place"] for rows in notes.values() for row in rows}
+    return [
+        one.words
+        for one in acting_differences(before, after)
+        if not any(_covers(place, _indexed(before, one.place)) for place in listed)
+    ]
+
+
+def _covers(listed: str, place: str) -> bool:
+    """Whether a listed place is the place, or that of what it is in; or a part of its condition."""
+    return (
+        place == listed
+        or place.startswith((f"{listed}.", f"{listed}["))
+        or (place.endswith(".when") and listed.startswith(place))
+    )
+
+
+def _indexed(scenario: Scenario, place: tuple[str, ...]) -> str:
+    """A place as exports write it: ``rules[1].then[0]``."""
+    if place[0] in ("rules", "actors"):
+        ids = [one.id for one in getattr(scenario, place[0])]
+        head = f"{place[0]}[{ids.index(place[1])}]"
+        rest = list(place[2:])
+        if rest[:1] == ["then"] and len(rest) > 1:
+            rest[:2] = [f"then[{rest[1]}]"]
+        return ".".join([head, *rest])
+    return ".".join(place)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("template", PLACES)
+def test_a_template_comes_back_but_for_what_the_export_lists(
+    template: str, version: str, tmp_path: Path
+) -> None:
+    entry(PLACES[template])
+    before = template_scenario(workspace(), template, PLACES[template])
+    after, notes = there_and_back(before, tmp_path, version)
+    assert unlisted(before, after, notes) == []
+    assert [one.id for one in after.actors] == [one.id for one in before.actors]
+    if version != "1.0":
+        assert [one.id for one in after.rules] == [one.id for one in before.rules]
+
+
+@pytest.mark.parametrize("template", ["cut-in", "bus-leaves"])
+def test_a_scene_that_openscenario_can_say_comes_back_whole(template: str, tmp_path: Path) -> None:
+    entry(PLACES[template])
+    before = template_scenario(workspace(), template, PLACES[template])
+    after, notes = there_and_back(before, tmp_path, "1.2")
+    assert notes == {"approximated": [], "left_out": []}
+    assert acting_differences(before, after) == ()
+
+
+def test_sampled_scenarios_come_back_but_for_what_the_export_lists(tmp_path: Path) -> None:
+    for name in ("town_5x5", "roundabout", "t_junction_signs"):
+        entry(name)
+    config = SamplingConfig(actors_max=20, ego=True, pedestrian_share=0.3)
+    settings = GenerationSettings(config=config, count=10)
+    for number, file in enumerate(generate(workspace(), settings=settings, out=tmp_path / "in")):
+        before = read_scenario(file)
+        after, notes = there_and_back(before, tmp_path / "out", VERSIONS[number % 4])
+        assert unlisted(before, after, notes) == []
+        assert len(after.actors) == len(before.actors) > 3
+        assert not after.rules
+        places = {one.place[0] for one in acting_differences(before, after)}
+        assert places <= {"seed", "roi", "environment"}
+
+
+def test_who_departs_later_and_what_begins_with_another_rule_come_back(tmp_path: Path) -> None:
+    goal = node_at("town_5x5", 390.0, 103.4)
+    actors = [
+        {"id": "ego", "category": "car", "spawn": node_at("town_5x5", 215.0, 103.4), "ego": True,
+         "goal": goal, "initial_speed": 8.0, "lateral_offset": 0.3, "style": "sporty"},
+        {"id": "bus", "category": "bus", "spawn": node_at("town_5x5", 300.0, 103.4),
+         "goal": goal, "depart": 4.0, "via": [node_at("town_5x5", 330.0, 103.4)]},
+    ]  # fmt: skip
+    begun = {"rule": {"id": "slow", "has": "started"}}
+    near = {"reaches": {"of": "ego", "place": node_at("town_5x5", 250.0, 103.4), "within": 3.0}}
+    rules = [
+        {"id": "slow", "actor": "ego", "when": {"time": {"after": 2.0}, "delay": 1.0},
+         "then": [{"speed": {"to": 4.0, "rate": 2.0}}, {"release": {}}], "times": 2},
+        {"id": "both", "actor": "ego", "when": {"all": [begun, near]}, "then": [{"go": {}}]},
+        {"id": "any", "actor": "bus", "when": {"any": [begun, {"not": {
+            "speed": {"of": "ego", "above": 5.0}}}]}, "then": [{"go": {}}]},
+    ]  # fmt: skip
+    before = document("town_5x5", actors, rules, flows=[])
+    for version in ("1.1", "1.3"):
+        after, notes = there_and_back(before, tmp_path / version, version)
+        assert unlisted(before, after, notes) == []
+        assert [rule.id for rule in after.rules] == ["slow", "both", "any"]
+        assert after.actors == before.actors
+
+
+def test_what_is_changed_in_the_file_holds_and_not_the_property(tmp_path: Path) -> None:
+    entry("motorway_weave")
+    before = template_scenario(workspace(), "cut-in", "motorway_weave")
+    export(workspace(), before, tmp_path, to="openscenario", options={"version": "1.2"})
+    (file,) = tmp_path.glob("*.xosc")
+    tree = etree.parse(file)
+    ego = tree.find('.//Private[@entityRef="ego"]')
+    assert ego is not None
+    place, speed = ego.find(".//WorldPosition"), ego.find(".//AbsoluteTargetSpeed")
+    assert place is not None
+    assert speed is not None
+    place.set("x", f"{float(place.get('x', '')) + 10.0}")
+    speed.set("value", "12.5")
+    tree.write(file)
+    after = import_scenario(workspace(), file).scenario
+    changed = {one.place: one.after for one in acting_differences(before, after)}
+    assert changed.keys() == {("actors", "ego", "spawn"), ("actors", "ego", "initial_speed")}
+    assert changed["actors", "ego", "initial_speed"] == "12.5"
+
+
+def wholly_taken() -> list[Path]:
+    files = sorted((SHARED / "osc").rglob("*.xosc")) if (SHARED / "osc").is_dir() else []
+    return [one for one in files if "atalog" not in str(one)]
+
+
+@pytest.mark.slow
+def test_files_of_others_that_were_wholly_taken_say_the_same_when_they_are_written_again(
+    tmp_path: Path,
+) -> None:
+    files = wholly_taken()
+    if not files:
+        pytest.skip("../shared/osc is not here: the collections of files to import")
+    tried = 0
+    for file in files[::5]:
+        try:
+            read = import_scenario(workspace(), file, maps=SHARED / "maps" / "carla-2020")
+        except Exception:
+            continue
+        if read.lists["refused"] or any(one.severity == "error" for one in read.problems):
+            continue
+        after, notes = there_and_back(read.scenario, tmp_path / file.stem, "1.2")
+        assert unlisted(read.scenario, after, notes) == [], file.name
+        shutil.rmtree(tmp_path / file.stem)
+        tried += 1
+    assert tried > 5

@@ -1,0 +1,361 @@
+"""Exports of runs for learners, read by plain readers; ``make test-interchange`` has others."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from lxml import etree
+
+from odscen.app.export import EXPORTERS, export, export_run
+from odscen.app.runs import run_many
+from odscen.base.errors import InputError
+from odscen.interchange.exporter import WhatHappened
+from odscen.interchange.recordings.tfrecord import read_tfrecord
+from odscen.interchange.recordings.track_grid import ExportWindow, instants, tracks_of
+from odscen.learning.hetero_data import read_arrays
+from odscen.sumo.folder.finished_run import Run
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.workspace.store import Workspace
+
+FORMATS = ("pyg", "scenarionet", "waymo", "commonroad")
+SECONDS = 9.6
+DOCUMENT = Path(__file__).parents[2] / "docs" / "learning-formats.md"
+States = dict[tuple[str, int], tuple[float, float, float]]
+
+
+@pytest.fixture(scope="module")
+def run(workspace: Workspace, sampled: Path) -> Run:
+    settings = RunSettings(until=SECONDS, step_length=0.1)
+    return run_many(workspace, [sampled], settings=settings, reports=False)[0]
+
+
+@pytest.fixture(scope="module")
+def recorded(run: Run) -> States:
+    """Pose of each road user at each tenth of a second."""
+    table = run.trajectories()
+    return {
+        (str(name), round(time * 10)): (x, y, hdg)
+        for name, time, x, y, hdg in table.select("id", "time", "x", "y", "hdg").iter_rows()
+    }
+
+
+@pytest.fixture(scope="module")
+def exports(workspace: Workspace, run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("exports")
+    for name in FORMATS:
+        export_run(workspace, run.folder, out / name, to=name)
+    return out
+
+
+def _file(exports: Path, pattern: str) -> Path:
+    (file,) = exports.glob(pattern)
+    return file
+
+
+def _same(found: States, recorded: States, *, within: float) -> None:
+    assert found.keys() == recorded.keys()
+    one, other = (
+        np.array([states[key] for key in sorted(recorded)]) for states in (found, recorded)
+    )
+    assert np.hypot(*(one - other)[:, :2].T).max() <= within
+    assert np.abs(np.angle(np.exp(1j * (one - other)[:, 2]))).max() <= 1e-5
+
+
+# ---------------------------------------------------------------------------- PyTorch Geometric
+def test_the_arrays_have_every_recorded_state(exports: Path, recorded: States) -> None:
+    arrays = read_arrays(_file(exports, "pyg/*.npz"))
+    steps = np.round(arrays["time"] * 10).astype(int)
+    found = {
+        (str(name), int(step)): tuple(arrays["agent_state"][row, k, [0, 1, 3]])
+        for row, name in enumerate(arrays["agent_id"])
+        for k, step in enumerate(steps)
+        if arrays["agent_valid"][row, k]
+    }
+    _same(found, recorded, within=1e-9)
+    assert json.loads(str(arrays["about"]))["interpolated"] is False
+
+
+def test_the_arrays_are_those_of_the_document(exports: Path) -> None:
+    arrays = read_arrays(_file(exports, "pyg/*.npz"))
+    rows = re.findall(r"^\| `(\w+)` \| `([^`]+)` \| (\w+) \|", DOCUMENT.read_text(), re.MULTILINE)
+    named = {name: (shape, kind) for name, shape, kind in rows}
+    assert named.keys() == arrays.keys()
+    kinds = {"U": "text", "b": "bool", "f": "float64"}
+    for name, (shape, kind) in named.items():
+        dtype = arrays[name].dtype
+        assert kind == kinds.get(dtype.kind, str(dtype)), name
+        axes = [one for one in shape.strip("()").split(",") if one.strip()]
+        assert arrays[name].ndim == len(axes), name
+
+
+def test_edges_of_the_arrays_name_rows_that_are_there(exports: Path) -> None:
+    arrays = read_arrays(_file(exports, "pyg/*.npz"))
+    lanes = len(arrays["lane_key"])
+    assert arrays["node_edge"].max() < len(arrays["node"])
+    assert arrays["lane_edge"].max() < lanes
+    assert arrays["node_lane"].max() == lanes - 1
+    assert 0 <= arrays["light_lane"].min() <= arrays["light_lane"].max() < lanes
+    for name in ("lane", "line", "road_edge", "crosswalk"):
+        start = arrays[f"{name}_point_start"]
+        assert start[-1] == len(arrays[f"{name}_point"])
+        assert (np.diff(start) >= 2).all()
+
+
+def test_a_lane_begins_where_the_one_before_it_ends(exports: Path) -> None:
+    arrays = read_arrays(_file(exports, "pyg/*.npz"))
+    start, points = arrays["lane_point_start"], arrays["lane_point"]
+    before, after = arrays["lane_edge"]
+    gaps = points[start[before + 1] - 1] - points[start[after]]
+    for part in (slice(0, 3), slice(3, 6), slice(6, 9)):  # centre, left and right border
+        assert np.linalg.norm(gaps[:, part], axis=1).max() < 0.02
+    # The left border is on the left of the driving direction.
+    ahead = points[start[:-1] + 1, :2] - points[start[:-1], :2]
+    left = points[start[:-1], 3:5] - points[start[:-1], :2]
+    assert (ahead[:, 0] * left[:, 1] - ahead[:, 1] * left[:, 0] > 0).all()
+
+
+def test_some_lights_show_green_and_never_all(exports: Path) -> None:
+    arrays = read_arrays(_file(exports, "pyg/*.npz"))
+    color = arrays["light_color"]
+    assert color.shape == (12, len(arrays["time"]))
+    assert set(np.unique(color)) <= {1, 2, 3}
+    # Of four legs with three movements each, two opposite ones have green at a time.
+    assert ((color == 3).sum(axis=0) <= 6).all()
+    assert (color == 3).any(axis=1).sum() >= 6
+
+
+# ---------------------------------------------------------------------------- ScenarioNet
+def test_the_scenario_description_has_every_recorded_state(exports: Path, recorded: States) -> None:
+    scenario = pickle.loads(_file(exports, "scenarionet/sd_*.pkl").read_bytes())
+    assert {
+        "id",
+        "version",
+        "length",
+        "tracks",
+        "dynamic_map_states",
+        "map_features",
+        "metadata",
+    } == set(scenario)
+    found = {
+        (name, step): (*track["state"]["position"][step, :2], track["state"]["heading"][step])
+        for name, track in scenario["tracks"].items()
+        for step in np.flatnonzero(track["state"]["valid"]).tolist()
+    }
+    _same(found, recorded, within=1e-9)
+    for name, track in scenario["tracks"].items():
+        assert track["metadata"]["object_id"] == name
+        away = ~track["state"]["valid"]
+        for values in track["state"].values():
+            assert len(values) == scenario["length"]
+            assert not values[away].any()
+            assert values.flags.writeable
+    assert len(scenario["dynamic_map_states"]) == 12
+    assert scenario["dynamic_map_states"].keys() <= scenario["map_features"].keys()
+
+
+def test_the_pickle_names_nothing_but_arrays_and_plain_values(exports: Path) -> None:
+    import pickletools
+
+    data = _file(exports, "scenarionet/sd_*.pkl").read_bytes()
+    strings: list[str] = []
+    called = set()
+    for opcode, argument, _ in pickletools.genops(data):
+        if isinstance(argument, str):
+            strings.append(argument)
+        if opcode.name == "STACK_GLOBAL":
+            called.add(tuple(strings[-2:]))
+    assert called == {("numpy", "ndarray"), ("builtins", "bytearray")}
+
+
+# ---------------------------------------------------------------------------- Waymo
+def _fields(data: bytes) -> Iterator[tuple[int, Any]]:
+    """Fields of a message: numbers as integers, or the bytes they take."""
+    at = 0
+
+    def number() -> int:
+        nonlocal at
+        value = shift = 0
+        while True:
+            value |= (data[at] & 127) << shift
+            at, shift = at + 1, shift + 7
+            if data[at - 1] < 128:
+                return value
+
+    while at < len(data):
+        tag = number()
+        if tag & 7 == 0:
+            yield tag >> 3, number()
+            continue
+        size = {1: 8, 5: 4}.get(tag & 7) or (number() if tag & 7 == 2 else 0)
+        yield tag >> 3, data[at : at + size]
+        at += size
+
+
+def _all(data: bytes, field: int) -> list[Any]:
+    return [value for number, value in _fields(data) if number == field]
+
+
+def test_the_tfrecord_has_every_recorded_state_in_scenarios_of_91_instants(
+    exports: Path, recorded: States
+) -> None:
+    notes = json.loads(_file(exports, "waymo/*.json").read_text())
+    names = {number: name for name, number in notes["ids"].items()}
+    records = list(read_tfrecord(_file(exports, "waymo/*.tfrecord").read_bytes()))
+    # 9.6 s are 9.1 s, and 9.1 s that end with the run.
+    assert [one["begin"] for one in notes["scenarios"]] == [
+        0.0,
+        pytest.approx(SECONDS - 9.0, abs=0.11),
+    ]
+    found: States = {}
+    for record, about in zip(records, notes["scenarios"], strict=True):
+        assert len(_all(record, 1)) == len(_all(record, 7)) == 91
+        assert _all(record, 10) == [10]
+        tracks = _all(record, 2)
+        assert len(tracks) == about["tracks"]
+        for track in tracks:
+            states = _all(track, 3)
+            assert len(states) == 91
+            for step, state in enumerate(states):
+                values = dict(_fields(state))
+                if values[11]:
+                    place = np.frombuffer(values[2] + values[3], dtype="<f8")
+                    hdg = float(np.frombuffer(values[8], dtype="<f4")[0])
+                    key = names[_all(track, 1)[0]], round(about["begin"] * 10) + step
+                    found[key] = (float(place[0]), float(place[1]), hdg)
+    _same(found, recorded, within=1e-9)
+    features = [{field for field, _ in _fields(one)} - {1} for one in _all(records[0], 8)]
+    assert features.count({3}) == notes["lanes"]
+    assert {field for one in features for field in one} == {3, 4, 5, 8}
+
+
+# ---------------------------------------------------------------------------- CommonRoad
+def test_the_commonroad_file_has_every_recorded_state(exports: Path, recorded: States) -> None:
+    document = etree.parse(_file(exports, "commonroad/*.xml"))
+    notes = json.loads(_file(exports, "commonroad/*.json").read_text())
+    found: States = {}
+    for one in notes["obstacles"]:
+        (obstacle,) = document.xpath(f"dynamicObstacle[@id='{one['id']}']")
+        states = obstacle.xpath("initialState | trajectory/state")
+        rows = {
+            int(state.findtext("time/exact")): tuple(
+                float(state.findtext(path))
+                for path in ("position/point/x", "position/point/y", "orientation/exact")
+            )
+            for state in states
+        }
+        own = range(one["first_step"], one["last_step"] + 1)
+        assert rows.keys() == {0, *own}  # who comes later is beside the map at instant 0
+        found |= {(one["road_user"], step): rows[step] for step in own}
+    _same(found, recorded, within=1e-4)
+
+
+def test_lights_of_commonroad_show_each_instant_of_the_run(exports: Path) -> None:
+    document = etree.parse(_file(exports, "commonroad/*.xml"))
+    instants = len(read_arrays(_file(exports, "pyg/*.npz"))["time"])
+    lights = document.findall("trafficLight")
+    assert len(lights) >= 4
+    for light in lights:
+        durations = [int(one.text) for one in light.iterfind("cycle/cycleElement/duration")]
+        colors = [one.text for one in light.iterfind("cycle/cycleElement/color")]
+        assert sum(durations) == instants
+        assert all(one != other for one, other in pairwise(colors))
+
+
+# ---------------------------------------------------------------------------- all of them
+@pytest.mark.parametrize("to", FORMATS)
+def test_the_same_run_gives_the_same_bytes(
+    to: str, workspace: Workspace, run: Run, exports: Path, tmp_path: Path
+) -> None:
+    files = export_run(workspace, run.folder, tmp_path, to=to)
+    assert [one.read_bytes() for one in files] == [
+        (exports / to / one.name).read_bytes() for one in files
+    ]
+
+
+def test_a_part_of_a_run_has_its_instants_only(
+    workspace: Workspace, run: Run, tmp_path: Path
+) -> None:
+    window = {"begin": "2", "end": "4.05"}
+    (file,) = export_run(workspace, run.folder, tmp_path, to="pyg", options=window)
+    arrays = read_arrays(file)
+    assert arrays["time"].tolist() == [round(2 + 0.1 * k, 6) for k in range(21)]
+    assert arrays["agent_state"].shape[1] == arrays["light_color"].shape[1] == 21
+
+
+@pytest.mark.parametrize(
+    ("window", "words"),
+    [({"begin": "soon"}, "soon"), ({"end": "nan"}, "nan"), ({"begin": "900"}, "no instant")],
+)
+def test_a_window_that_cannot_be_is_refused(
+    window: dict[str, str], words: str, workspace: Workspace, run: Run, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=words):
+        export_run(workspace, run.folder, tmp_path, to="waymo", options=window)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_a_scenario_that_has_not_run_is_refused(
+    to: str, workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match="folder"):
+        export(workspace, sampled, tmp_path, to=to)
+    assert EXPORTERS[to].files is None
+
+
+# ---------------------------------------------------------------------------- the clock
+def _thinned(run: Run, every: int) -> WhatHappened:
+    from odscen.app.export import _happened
+
+    happened = _happened(run.folder)
+    ticks = (pl.col("time") * 10).round().cast(pl.Int64)
+    rows = happened.rows.filter(ticks % every == 0)
+    return replace(happened, rows=rows, step=every / 10)
+
+
+def test_half_a_second_between_records_is_bridged_and_said(
+    workspace: Workspace, run: Run, sampled: Path
+) -> None:
+    from odscen.app.export import _source
+    from odscen.app.scenarios import read_scenario
+
+    source = _source(workspace, read_scenario(sampled), "run", {})
+    fine, coarse = _thinned(run, 1), _thinned(run, 5)
+    times = instants(coarse, ExportWindow())
+    exact, bridged = (tracks_of(source, one, times) for one in (fine, coarse))
+    assert bridged.ids == exact.ids
+    both = exact.valid & bridged.valid
+    assert both.sum() > 0.9 * exact.valid.sum()
+    off = np.hypot(exact.x - bridged.x, exact.y - bridged.y)[both]
+    # Turns and braking; beyond that lie lane changes, which SUMO makes in one step of the run.
+    assert np.quantile(off, 0.99) < 0.35
+    assert 0.5 < off.max() < 3.5
+    assert off.mean() < 0.06
+
+
+def test_a_gap_in_what_was_recorded_is_not_bridged(
+    workspace: Workspace, run: Run, sampled: Path
+) -> None:
+    from odscen.app.export import _source
+    from odscen.app.scenarios import read_scenario
+
+    source = _source(workspace, read_scenario(sampled), "run", {})
+    happened = _thinned(run, 5)
+    name = happened.rows["id"][0]
+    gone = (pl.col("id") == name) & pl.col("time").is_between(1.9, 3.1)
+    happened = replace(happened, rows=happened.rows.filter(~gone))
+    times = instants(happened, ExportWindow())
+    tracks = tracks_of(source, happened, times)
+    valid = tracks.valid[tracks.ids.index(name)]
+    there = {round(time, 1) for time in times[valid].tolist()}
+    assert {1.5, 3.5} <= there
+    assert not there & {1.6, 2.0, 2.5, 3.0, 3.4}
