@@ -1,0 +1,253 @@
+"""Generators of traffic from outside: by name, from an installed package, or another program.
+
+An installed package offers one in its ``pyproject.toml``::
+
+    [project.entry-points."odscen.generators"]
+    mine = "my_package.traffic:MyGenerator"
+"""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from odscen.base.errors import InputError, OdscenError
+from odscen.learning.fill import Fill, FillRequest, fill_from_arrays, fill_from_bytes, request_bytes
+from odscen.learning.fill_check import CheckedFill, checked_fill
+from odscen.scenario.document.named_random import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import numpy as np
+
+    from odscen.base.categories import Body, Category
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.learning.fill import Generator
+    from odscen.learning.traffic_snapshots import LightView
+    from odscen.scenario.document.scenario_document import Actor
+    from odscen.scenario.placing.region import Region
+    from odscen.scenario.sampling.sampler import Crew
+
+GROUP = "odscen.generators"
+"""Of entry points."""
+REFERENCE = "reference"
+"""Name of the generator that ships with odscen."""
+TIME_LIMIT = 600.0
+"""Seconds that another program may take for one fill."""
+_LAST_LINES = 5
+MOST_BYTES = 1_000_000_000
+"""Of the file that another program writes."""
+
+
+class GeneratorDoor(NamedTuple):
+    """Where traffic comes from: a class or an entry point by name, or the line of a command."""
+
+    name: str | None = None
+    command: str | None = None
+    time_limit: float = TIME_LIMIT
+
+
+def open_generator(door: GeneratorDoor) -> Generator:
+    """Find a generator; it is made once and asked for each scenario.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be imported or made.
+    """
+    if door.command is not None and door.name is not None:
+        msg = "a generator is given by its name or as a command, not both"
+        raise InputError(msg)
+    if door.command is not None:
+        return _Command(_words(door.command), door.time_limit)
+    found = _found(door.name or "")
+    try:
+        made = found() if isinstance(found, type) else found
+    except Exception as error:  # whatever code from outside may raise
+        msg = f"it cannot be made: {error!r}"
+        raise InputError(msg, element=door.name) from error
+    if not callable(getattr(made, "fill", None)):
+        msg = "it has no method `fill(graph, request, rng)`"
+        raise InputError(msg, element=door.name)
+    return _Guarded(made, door.name or "")
+
+
+class Placer:
+    """Places actors by a generator, scenario after scenario.
+
+    Attributes
+    ----------
+    checked
+        What came of the last fill.
+    """
+
+    def __init__(self, generator: Generator) -> None:
+        self._generator = generator
+        self.checked: CheckedFill | None = None
+
+    def for_scenario(
+        self, bodies: Mapping[Category, Body], seed: int, *, lights: LightView | None = None
+    ) -> Callable[[Region, Crew], tuple[Actor, ...]]:
+        """Make the function that asks for a fill of a region, and makes actors of what is good.
+
+        It raises :class:`InputError` if nothing of a fill is.
+
+        Parameters
+        ----------
+        lights
+            What the lights of the map show at the beginning, if it has any.
+        """
+
+        def place(region: Region, crew: Crew) -> tuple[Actor, ...]:
+            request = FillRequest(
+                graph=region.graph,
+                roads=region.lanes,
+                walks=region.walks,
+                allowed={**crew.road_places.allowed, **crew.walk_places.allowed},
+                bodies=bodies,
+                vehicles=crew.vehicles,
+                walkers=crew.walkers,
+                seed=seed,
+                given_lights=lights,
+            )
+            given = self._generator.fill(region.graph, request, stream(seed, "generator"))
+            fill = given if isinstance(given, Fill) else fill_from_arrays(given)
+            self.checked = checked_fill(fill, request, region)
+            if self.checked.given and not self.checked.actors:
+                why = self.checked.remarks[0].why
+                msg = f"none of its {self.checked.given} road users can be placed; the first: {why}"
+                raise InputError(msg, element="generator")
+            return self.checked.actors
+
+        return place
+
+
+@dataclass(frozen=True)
+class _Guarded:
+    """Code from outside whose errors end in a message that names it."""
+
+    generator: Generator
+    name: str
+
+    def fill(self, graph: MapGraph, request: FillRequest, rng: np.random.Generator) -> Fill:
+        try:
+            given = self.generator.fill(graph, request, rng)
+            arrays = (
+                {one: getattr(given, one) for one in Fill.__slots__}
+                if isinstance(given, Fill)
+                else dict(given)
+            )
+        except OdscenError:
+            raise
+        except Exception as error:
+            msg = f"it failed: {error!r}"
+            raise InputError(msg, element=self.name) from error
+        try:
+            return fill_from_arrays(arrays)
+        except InputError as error:
+            error.file = f"fill of {self.name}"
+            raise
+
+
+@dataclass(frozen=True)
+class _Command:
+    """Another program, in any language: reads one .npz file and writes another."""
+
+    words: tuple[str, ...]
+    time_limit: float
+
+    def fill(self, graph: MapGraph, request: FillRequest, rng: np.random.Generator) -> Fill:
+        del graph, rng  # the request has both: the map, and the seed
+        with tempfile.TemporaryDirectory(prefix="odscen-fill-") as folder:
+            given, made = Path(folder) / "request", Path(folder) / "fill"
+            given.with_suffix(".npz").write_bytes(request_bytes(request))
+            self._run([word.format_map(_names(given, made)) for word in self.words])
+            out = made.with_suffix(".npz")
+            if not out.is_file():
+                msg = "it has ended, but written no file where {out}.npz says"
+                raise InputError(msg, element=self.words[0])
+            if out.stat().st_size > MOST_BYTES:
+                msg = f"its file has {out.stat().st_size:,} bytes; {MOST_BYTES:,} are the most"
+                raise InputError(msg, element=self.words[0])
+            return fill_from_bytes(out.read_bytes(), file=f"fill of {self.words[0]}")
+
+    def _run(self, words: list[str]) -> None:
+        try:
+            done = subprocess.run(
+                words,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=self.time_limit,
+                check=False,
+            )
+        except FileNotFoundError as error:
+            msg = "there is no such program"
+            raise InputError(msg, element=words[0]) from error
+        except OSError as error:
+            msg = f"it cannot be started: {error.strerror}"
+            raise InputError(msg, element=words[0]) from error
+        except subprocess.TimeoutExpired as error:
+            msg = f"it took more than {self.time_limit:g} s"
+            raise InputError(msg, element=words[0]) from error
+        if done.returncode:
+            lines = done.stderr.decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
+            said = f": {' / '.join(lines)}" if lines else ""
+            msg = f"it ended with exit code {done.returncode}{said}"
+            raise InputError(msg, element=words[0])
+
+
+def _names(given: Path, made: Path) -> dict[str, str]:
+    return {"in": str(given), "out": str(made)}
+
+
+def _words(command: str) -> tuple[str, ...]:
+    try:
+        words = tuple(shlex.split(command))
+        filled = "".join(words).format_map({"in": "\0", "out": "\1"})
+    except (ValueError, KeyError, IndexError, AttributeError) as error:
+        msg = f"{command!r} is no command with {{in}} and {{out}}: {error}"
+        raise InputError(msg, element="generator") from error
+    for name, mark in (("{in}", "\0"), ("{out}", "\1")):
+        if mark not in filled:
+            msg = f"{command!r} does not say where {name} goes"
+            raise InputError(msg, element="generator")
+    return words
+
+
+def _found(name: str) -> Any:
+    if name == REFERENCE:
+        from odscen.learning.reference.reference_generator import ReferenceGenerator
+
+        return ReferenceGenerator
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        points = [*entry_points(group=GROUP, name=name)]
+        if not points:
+            known = sorted(one.name for one in entry_points(group=GROUP))
+            offered = (
+                f"installed packages offer {', '.join(known)}"
+                if known
+                else "no installed package offers one"
+            )
+            msg = (
+                f"there is no generator {name!r}; {REFERENCE!r} ships with odscen, {offered}, and "
+                "package.module:Class is one"
+            )
+            raise InputError(msg, element="generator")
+        try:
+            return points[0].load()
+        except Exception as error:  # whatever an import may raise
+            msg = f"it cannot be imported from {points[0].value}: {error!r}"
+            raise InputError(msg, element=name) from error
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # whatever an import may raise
+        msg = f"it cannot be imported: {error!r}"
+        raise InputError(msg, element=name) from error

@@ -1,0 +1,99 @@
+"""Scenes that are evaluated: of snapshots, of fills, of scenarios whoever has made them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from odscen.app.learned.learned_maps import examples_of
+from odscen.base.categories import Category
+from odscen.base.errors import InputError
+from odscen.learning.fill import Fill
+from odscen.learning.reference.model_training import placed
+from odscen.learning.traffic_metrics import TrafficScene
+from odscen.scenario.document.scenario_document import MapReference, Scenario, Simulation
+from odscen.scenario.placing.random_places import place_at_random
+from odscen.scenario.placing.region import place_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.app.learned.learned_maps import WholeMap
+    from odscen.learning.fill import FillRequest
+    from odscen.learning.traffic_snapshots import LightView, Shard
+    from odscen.scenario.document.scenario_document import Actor
+    from odscen.workspace.store import Workspace
+
+
+def scenes_of(workspace: Workspace, shards: Sequence[Shard]) -> list[TrafficScene]:
+    """Vehicles of snapshots that a generator might have placed; empty snapshots are left out."""
+    found = []
+    for shard in shards:
+        for example in examples_of(workspace, [shard]):
+            good, one = placed(example), example.snapshot
+            if good.any():
+                found.append(
+                    TrafficScene(
+                        one.node[good],
+                        one.category[good],
+                        one.speed[good],
+                        one.lights,
+                        str(shard.about.get("seed")),
+                    )
+                )
+    if not found:
+        msg = f"the snapshots of {shards[0].map_name} have no vehicles to compare with"
+        raise InputError(msg)
+    return found
+
+
+def placed_at_random(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
+    """Place vehicles as sampling does: anywhere, from rest."""
+    spots = place_at_random(on.places, request.vehicles, rng)
+    node = np.array([one.node for one in spots], dtype=np.int64)
+    return Fill(node, np.array([str(one.category) for one in spots], dtype=np.str_))
+
+
+def scene_of_actors(
+    on: WholeMap, actors: Sequence[Actor], lights: LightView, *, name: str
+) -> TrafficScene:
+    """Vehicles that depart at the beginning; those without an initial speed are stopped."""
+    names = [*Category]
+    places = [place_of(on.region.graph, one.spawn) for one in actors]
+    kept = [
+        (place.node, names.index(one.category), one.initial_speed or 0.0)
+        for place, one in zip(places, actors, strict=True)
+        if place is not None and not place.walk and one.depart == 0.0
+    ]
+    node, category, speed = zip(*kept, strict=True) if kept else ((), (), ())
+    return TrafficScene(
+        np.array(node, dtype=np.int64), np.array(category, dtype=np.int64),
+        np.array(speed, dtype=np.float64), lights, name,
+    )  # fmt: skip
+
+
+def scene_of_scenario(
+    on: WholeMap, scenario: Scenario, lights: LightView
+) -> tuple[TrafficScene, float]:
+    """Vehicles of a scenario on allowed nodes, and the share of those that are on no such node."""
+    scene = scene_of_actors(on, scenario.actors, lights, name=scenario.name)
+    good = on.learned.allowed[scene.category, scene.node]
+    vehicles = sum(one.category is not Category.PEDESTRIAN for one in scenario.actors)
+    kept = TrafficScene(
+        scene.node[good], scene.category[good], scene.speed[good], lights, scene.name
+    )
+    return kept, 1.0 - int(good.sum()) / vehicles if vehicles else 0.0
+
+
+def scenario_of(on: WholeMap, actors: Sequence[Actor], number: int) -> Scenario:
+    """Scenario of a fill of a whole map."""
+    graph = on.region.graph
+    return Scenario(
+        name=f"{graph.map_name}-{number:04d}",
+        map=MapReference(name=graph.map_name, sha256=graph.map_sha256, spacing=graph.lanes.spacing),
+        seed=number,
+        roi=on.region.segments,
+        actors=tuple(actors),
+        simulation=Simulation(duration=60.0, step_length=0.5),
+    )

@@ -1,0 +1,345 @@
+"""How good generated traffic is, map by map, beside baselines and SUMO's own."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from odscen.app.learned.evaluated_scenes import (
+    placed_at_random,
+    scenario_of,
+    scene_of_actors,
+    scene_of_scenario,
+    scenes_of,
+)
+from odscen.app.learned.first_seconds import HARD, first_seconds
+from odscen.app.learned.learned_maps import examples_of, whole_map
+from odscen.app.scenarios import read_scenario, scenario_files
+from odscen.base.errors import InputError
+from odscen.learning.binned_baseline import binned_statistics, place_binned
+from odscen.learning.fill import VEHICLES, Fill
+from odscen.learning.fill_check import checked_fill
+from odscen.learning.reference.reference_generator import ReferenceGenerator, names_of
+from odscen.learning.traffic_metrics import (
+    MEASURES,
+    TrafficScene,
+    interval,
+    novelty,
+    scene_features,
+    together,
+)
+from odscen.learning.traffic_snapshots import no_lights
+from odscen.scenario.document.named_random import stream
+from odscen.sumo.realize.signals_ahead import lights_at_start
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from odscen.app.learned.learned_maps import WholeMap
+    from odscen.base.arrays import FloatArray
+    from odscen.learning.fill import FillRequest
+    from odscen.learning.reference.traffic_model import TrafficModel
+    from odscen.learning.traffic_metrics import VehicleRows
+    from odscen.learning.traffic_snapshots import LightView, Shard
+    from odscen.scenario.document.scenario_document import Actor, Scenario
+    from odscen.workspace.store import Workspace
+
+FLOOR, REFERENCE, BINNED, RANDOM = "SUMO", "reference", "binned statistics", "random fill"
+NEAR = 1
+"""Nodes: a vehicle nearer to one of a known snapshot is no new one."""
+SCENES = 12
+"""Fills of each map that are compared, at most."""
+DRAWS = 20
+RUN = 2
+"""Fills of each map that are run for two seconds."""
+
+
+class MeasuredValue(NamedTuple):
+    """A value with its 90 % bootstrap interval over snapshots."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficQuality:
+    """How one source of traffic does on one map.
+
+    Attributes
+    ----------
+    map_name
+        The map.
+    source
+        Where the traffic comes from.
+    scenes, vehicles
+        How many scenes, and vehicles in the mean.
+    values
+        By name: ``frechet``, ``mmd``, ``jsd_gap``, ``jsd_speed``, ``jsd_junction``,
+        ``jsd_heading``, ``stopped`` (share), ``novelty``, ``off_road``, and where traffic was run
+        ``hard_braking``, ``collided`` and ``inserted`` (shares).
+    """
+
+    map_name: str
+    source: str
+    scenes: int
+    vehicles: float
+    values: dict[str, MeasuredValue]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As values that JSON can hold."""
+        values = {name: one._asdict() for name, one in self.values.items()}
+        return {**asdict(self), "values": values}
+
+
+def evaluate_model(
+    workspace: Workspace,
+    shards: Sequence[Shard],
+    others: Sequence[Shard],
+    *,
+    model: TrafficModel | None = None,
+    seed: int = 0,
+    run: bool = True,
+    most: int = SCENES,
+    draws: int = DRAWS,
+    told: Callable[[str], None] | None = None,
+) -> list[TrafficQuality]:
+    """Evaluate a model and the baselines on the maps of shards.
+
+    For each snapshot traffic is asked for with its number of vehicles and its lights, and checked
+    as every fill is. SUMO's own row compares its runs of odd numbers with those of even ones.
+
+    Parameters
+    ----------
+    shards
+        What is compared with.
+    others
+        What binned statistics are made of; the towns of ``shards`` are left out.
+    model
+        The model that ships if not given.
+    run
+        Whether fills are run for two seconds.
+    most
+        Fills of each map; they are like snapshots at even steps of the data.
+    draws
+        Of the bootstrap for the intervals.
+    """
+    towns = {one.town for one in shards}
+    known = [one for one in others if one.town not in towns]
+    statistics = binned_statistics(examples_of(workspace, known)) if known else None
+    generator = ReferenceGenerator(model)
+
+    def by_reference(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
+        return generator.fill(on.region.graph, request, rng)
+
+    def by_bins(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
+        assert statistics is not None
+        lengths = np.array([request.bodies[one].length for one in VEHICLES])
+        site, allowed = on.learned.site, on.learned.allowed
+        found = place_binned(
+            statistics, site, request.lights, allowed,
+            wanted=request.vehicles, lengths=lengths, rng=rng,
+        )  # fmt: skip
+        return Fill(found.node, names_of(found.category), initial_speed=found.speed)
+
+    sources = {REFERENCE: by_reference, BINNED: by_bins, RANDOM: placed_at_random}
+    if statistics is None:
+        del sources[BINNED]
+    found = []
+    for name in sorted({one.map_name for one in shards}):
+        mine = [one for one in shards if one.map_name == name]
+        on = whole_map(workspace.map_for(name, mine[0].map_sha256))
+        compared = _ComparedMap(on, scenes_of(workspace, mine), workspace, draws)
+        found.append(compared.floor(mine))
+        for source, place in sources.items():
+            if told is not None:
+                told(f"{name}: {source}")
+            made = compared.filled(place, seed, most)
+            found.append(compared.quality(source, made, run=run))
+    return found
+
+
+def evaluate_scenarios(
+    workspace: Workspace, folder: Path, shards: Sequence[Shard], *, run: bool = True
+) -> list[TrafficQuality]:
+    """Compare scenarios, whoever has made them, with snapshots of SUMO on the same maps.
+
+    Vehicles that depart at the beginning count; those without an initial speed are stopped.
+
+    Raises
+    ------
+    InputError
+        If there are no scenarios, or no snapshots of the map of one.
+    """
+    scenarios = [read_scenario(file) for file in scenario_files([folder])]
+    found = []
+    for name in sorted({one.map.name for one in scenarios}):
+        mine = [one for one in shards if one.map_name == name]
+        if not mine:
+            known = ", ".join(sorted({one.map_name for one in shards}))
+            msg = f"there are no snapshots of map {name!r} to compare with; there are of {known}"
+            raise InputError(msg, file=str(folder), element="data")
+        on = whole_map(workspace.map_for(name, mine[0].map_sha256))
+        compared = _ComparedMap(on, scenes_of(workspace, mine), workspace)
+        own = [one for one in scenarios if one.map.name == name]
+        lights = lights_at_start(on.loaded.sumo)
+        scenes, off = zip(*(scene_of_scenario(on, one, lights) for one in own), strict=True)
+        made = _MadeTraffic(list(scenes), float(np.mean(off)), own)
+        found += [compared.floor(mine), compared.quality(folder.name, made, run=run)]
+    return found
+
+
+class _MadeTraffic(NamedTuple):
+    """Scenes of one source, the share of vehicles that were off the road, and scenarios to run."""
+
+    scenes: list[TrafficScene]
+    off_road: float
+    scenarios: list[Scenario]
+
+
+class _ComparedMap:
+    """The reference of one map, and what is compared with it."""
+
+    def __init__(
+        self,
+        on: WholeMap,
+        scenes: list[TrafficScene],
+        workspace: Workspace,
+        draws: int = DRAWS,
+    ) -> None:
+        self._draws = draws
+        self._on, self._scenes, self._workspace = on, scenes, workspace
+        self._rows = self._seen(scenes)
+
+    def floor(self, shards: Sequence[Shard]) -> TrafficQuality:
+        """SUMO's own traffic: runs of even numbers compared with those of odd ones."""
+        runs = list(dict.fromkeys(one.name for one in self._scenes))
+        even = [place for place, one in enumerate(self._scenes) if runs.index(one.name) % 2]
+        odd = [place for place in range(len(self._scenes)) if place not in even]
+        values: dict[str, MeasuredValue] = {}
+        if even:
+            scenes = [self._scenes[place] for place in even]
+            rows = [self._rows[place] for place in even]
+            reference = [self._rows[place] for place in odd]
+            known = [self._scenes[place] for place in odd]
+            values = _values(scenes, rows, reference, self._draws)
+            values["novelty"] = _alone(novelty(scenes, known, near=NEAR))
+        stopped = MEASURES["stopped"]
+        values["stopped"] = _with_interval(
+            self._scenes,
+            lambda some: stopped(self._rows[0], self._pick(self._rows, some)),
+            self._draws,
+        )
+        braking = [one.braking for shard in shards for one in shard.snapshots]
+        values["hard_braking"] = _braking(braking)
+        return self._quality(FLOOR, self._scenes, values)
+
+    def filled(
+        self,
+        place: Callable[[WholeMap, FillRequest, np.random.Generator], Fill],
+        seed: int,
+        most: int,
+    ) -> _MadeTraffic:
+        """Ask for traffic like that of each scene, and for some with the lights of a beginning."""
+        on, scenes, off = self._on, [], []
+        step = -(-len(self._scenes) // max(most, 1))
+        for number, scene in enumerate(self._scenes[::step]):
+            actors, dropped = self._asked(place, len(scene.node), scene.lights, seed, number)
+            scenes.append(scene_of_actors(on, actors, scene.lights, name=scene.name))
+            off.append(dropped)
+        lights = lights_at_start(on.loaded.sumo)
+        largest = sorted(range(len(self._scenes)), key=lambda k: -len(self._scenes[k].node))
+        scenarios = []
+        for number in largest[:: max(len(largest) // RUN, 1)][:RUN]:
+            wanted = len(self._scenes[number].node)
+            actors, _ = self._asked(place, wanted, lights, seed, len(scenes) + number)
+            scenarios.append(scenario_of(on, actors, number))
+        return _MadeTraffic(scenes, float(np.mean(off)), scenarios)
+
+    def quality(self, source: str, made: _MadeTraffic, *, run: bool) -> TrafficQuality:
+        """Compare scenes, and run what is to be run."""
+        values = _values(made.scenes, self._seen(made.scenes), self._rows, self._draws)
+        values["novelty"] = _alone(novelty(made.scenes, self._scenes, near=NEAR))
+        values["off_road"] = _alone(made.off_road)
+        runnable = [one for one in made.scenarios if one.actors]
+        if run and runnable:
+            outcomes = first_seconds(self._workspace, runnable)
+            values["hard_braking"] = _braking([one.braking for one in outcomes])
+            values["collided"] = _alone(float(np.mean([one.collided for one in outcomes])))
+            values["inserted"] = _alone(float(np.mean([one.inserted for one in outcomes])))
+        return self._quality(source, made.scenes, values)
+
+    def _asked(
+        self,
+        place: Callable[[WholeMap, FillRequest, np.random.Generator], Fill],
+        wanted: int,
+        lights: LightView,
+        seed: int,
+        number: int,
+    ) -> tuple[tuple[Actor, ...], float]:
+        """Actors of one fill, and the share of it that the check has dropped."""
+        request = self._on.request(wanted, lights, seed=seed)
+        rng = stream(seed, "evaluation", str(number))
+        checked = checked_fill(place(self._on, request, rng), request, self._on.region)
+        dropped = 1.0 - len(checked.actors) / checked.given if checked.given else 0.0
+        return checked.actors, dropped
+
+    def _seen(self, scenes: Sequence[TrafficScene]) -> list[VehicleRows]:
+        lanes, site = self._on.region.graph.lanes, self._on.learned.site
+        return [scene_features(lanes, site, one) for one in scenes]
+
+    def _pick(self, rows: Sequence[VehicleRows], some: Sequence[int]) -> VehicleRows:
+        return together([rows[place] for place in some])
+
+    def _quality(
+        self, source: str, scenes: Sequence[TrafficScene], values: dict[str, MeasuredValue]
+    ) -> TrafficQuality:
+        mean = float(np.mean([len(one.node) for one in scenes])) if scenes else 0.0
+        name = self._on.region.graph.map_name
+        return TrafficQuality(name, source, len(scenes), mean, values)
+
+
+def _values(
+    scenes: Sequence[TrafficScene],
+    rows: Sequence[VehicleRows],
+    reference: Sequence[VehicleRows],
+    draws: int,
+) -> dict[str, MeasuredValue]:
+    against = together(reference)
+    if sum(len(one.speed) for one in rows) < 2:
+        return {}
+    return {
+        name: _with_interval(
+            scenes,
+            lambda some, m=measure: m(against, together([rows[k] for k in some])),  # type: ignore[misc]
+            draws,
+        )
+        for name, measure in MEASURES.items()
+    }
+
+
+def _with_interval(
+    scenes: Sequence[TrafficScene], measure: Callable[[Sequence[int]], float], draws: int = DRAWS
+) -> MeasuredValue:
+    return MeasuredValue(measure(range(len(scenes))), *interval(scenes, measure, draws=draws))
+
+
+def _alone(value: float) -> MeasuredValue:
+    """A value without an interval."""
+    return MeasuredValue(value, float("nan"), float("nan"))
+
+
+def _braking(groups: Sequence[FloatArray]) -> MeasuredValue:
+    """Share of vehicles that brake hard, of groups that are drawn together for the interval."""
+    hard = [one[~np.isnan(one)] > HARD for one in groups]
+    nobody = np.empty(0, dtype=np.int64)
+    scenes = [TrafficScene(nobody, nobody, np.empty(0), no_lights(0)) for _ in hard]
+
+    def share(some: Sequence[int]) -> float:
+        chosen = np.concatenate([hard[place] for place in some])
+        return float(chosen.mean()) if len(chosen) else float("nan")
+
+    return _with_interval(scenes, share)

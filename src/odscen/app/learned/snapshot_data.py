@@ -1,0 +1,368 @@
+"""Snapshots of SUMO's traffic as data to learn from: runs of background traffic on whole maps.
+
+Every run is a *shard*, one file whose name says map and seed. A shard that is there is not made
+again, so that the command resumes after an interruption.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from odscen.app.maps import load_map
+from odscen.app.runs import check_run, run_all
+from odscen.base.categories import Category
+from odscen.base.errors import InputError
+from odscen.base.text_files import write_file, write_text
+from odscen.base.version import __version__
+from odscen.learning.reference.gap_states import seen_ahead
+from odscen.learning.reference.road_strips import road_strips
+from odscen.learning.traffic_snapshots import (
+    STOPPED,
+    Shard,
+    Snapshot,
+    shard_bytes,
+    shard_from_bytes,
+)
+from odscen.scenario.document.named_random import stream
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.document.scenario_document import (
+    Background,
+    Demand,
+    MapReference,
+    Scenario,
+    Simulation,
+)
+from odscen.sumo.realize.recording import Recording
+from odscen.sumo.realize.run_settings import RunSettings
+from odscen.sumo.realize.signals_ahead import lights_at
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import polars as pl
+
+    from odscen.app.maps import LoadedMap
+    from odscen.lanegraph.graphs import MapGraph
+    from odscen.learning.traffic_snapshots import LightView
+    from odscen.sumo.folder.finished_run import Run
+    from odscen.sumo.realize.signals_ahead import LightLog
+    from odscen.workspace.store import Workspace
+
+SUFFIX = ".shard.npz"
+SKIPPED = ".skipped.json"
+OFF_NODE = 2.5
+"""Metres from the centre of a body to a node; vehicles farther from any are left out."""
+BRAKING_SECONDS = 2.0
+ATTEMPTS = 3
+"""Runs that are tried until one does not gridlock, each with half the traffic of the last."""
+_HEADING = 4.0
+"""Metres that a heading wrong by one radian counts as, in search of the nearest node."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataSettings:
+    """Which runs snapshots are taken from.
+
+    Attributes
+    ----------
+    runs
+        For each map.
+    seed
+        Of the first run.
+    density
+        Least and most vehicles per kilometre of lane; each run draws one between.
+    warm_up, duration
+        Snapshots are taken between these seconds of a run.
+    snapshots
+        Of each run.
+    stopped_most
+        Share of stopped vehicles in a snapshot above which its run counts as gridlocked.
+    """
+
+    runs: int = 6
+    seed: int = 1
+    density: tuple[float, float] = (3.0, 14.0)
+    warm_up: float = 120.0
+    duration: float = 300.0
+    snapshots: int = 4
+    stopped_most: float = 0.5
+
+    def __post_init__(self) -> None:
+        low, high = self.density
+        if not 0 < low <= high <= 200:
+            msg = f"densities lie between 0 and 200 vehicles per km, not {low:g} to {high:g}"
+            raise InputError(msg, element="density")
+        if self.runs < 1 or self.snapshots < 1:
+            msg = f"at least one run and one snapshot are needed, not {self.runs}"
+            raise InputError(msg, element="runs")
+        if self.duration < self.warm_up + BRAKING_SECONDS + 1.0:
+            msg = f"a run of {self.duration:g} s has no snapshot after {self.warm_up:g} s"
+            raise InputError(msg, element="duration")
+
+
+class MadeShard(NamedTuple):
+    """What became of one run: its file, the vehicles in it, and why it was left out, if it was."""
+
+    file: Path
+    vehicles: int
+    skipped: str | None
+
+
+def make_shards(
+    workspace: Workspace,
+    maps: Sequence[str],
+    out: Path,
+    *,
+    settings: DataSettings,
+    done: Callable[[MadeShard], None] | None = None,
+) -> list[MadeShard]:
+    """Run traffic on maps and write a shard of snapshots for each run.
+
+    Raises
+    ------
+    NotFoundError
+        If the workspace has no such map.
+    InputError
+        If there is no map at all.
+    """
+    names = list(maps) or [entry.name for entry in workspace.maps()]
+    if not names:
+        msg = f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
+        raise InputError(msg)
+    entries = [workspace.map(name) for name in names]
+    out.mkdir(parents=True, exist_ok=True)
+    made = []
+    for entry in entries:
+        for seed in range(settings.seed, settings.seed + settings.runs):
+            file = out / f"{entry.name}-{seed:04d}{SUFFIX}"
+            found = _there(file) or _made(workspace, entry.name, seed, file, settings)
+            made.append(found)
+            if done is not None:
+                done(found)
+    return made
+
+
+def read_shards(folder: Path) -> list[Shard]:
+    """Read all shards of a folder, in the order of their names.
+
+    Raises
+    ------
+    InputError
+        If there are none, or one cannot be read.
+    """
+    files = sorted(folder.glob(f"*{SUFFIX}"))
+    if not files:
+        msg = f"no *{SUFFIX} in this folder; make some with: odscen learn data"
+        raise InputError(msg, file=str(folder))
+    return [shard_from_bytes(file.read_bytes(), file=str(file)) for file in files]
+
+
+def town_of(map_name: str) -> str:
+    """Town that a map is a version of: its name without a year, and without ``carla``."""
+    return re.sub(r"(?i)[-_. ]?((19|20)\d\d|carla)[-_. ]?", "", map_name) or map_name
+
+
+def _there(file: Path) -> MadeShard | None:
+    """What an earlier call has made of a run."""
+    if file.is_file():
+        shard = shard_from_bytes(file.read_bytes(), file=str(file))
+        return MadeShard(file, sum(len(one.node) for one in shard.snapshots), None)
+    note = file.with_name(file.name.removesuffix(SUFFIX) + SKIPPED)
+    if note.is_file():
+        return MadeShard(file, 0, str(json.loads(note.read_text(encoding="utf-8"))["why"]))
+    return None
+
+
+def _made(
+    workspace: Workspace, name: str, seed: int, file: Path, settings: DataSettings
+) -> MadeShard:
+    density = float(stream(seed, "density", name).uniform(*settings.density))
+    for _ in range(ATTEMPTS):
+        found = _attempted(workspace, name, seed, density, file, settings)
+        if found.skipped is None:
+            break
+        density /= 2.0
+    if found.skipped is not None:
+        note = file.with_name(file.name.removesuffix(SUFFIX) + SKIPPED)
+        write_text(note, json.dumps({"why": found.skipped}) + "\n")
+    return found
+
+
+def _attempted(
+    workspace: Workspace,
+    name: str,
+    seed: int,
+    density: float,
+    file: Path,
+    settings: DataSettings,
+) -> MadeShard:
+    loaded = load_map(workspace.map(name))
+    scenario = traffic_scenario(loaded, seed=seed, density=density, duration=settings.duration)
+    with tempfile.TemporaryDirectory(prefix="odscen-learn-") as folder:
+        checked = check_run(
+            workspace,
+            scenario,
+            name=f"{name}-{seed:04d}",
+            out=Path(folder),
+            settings=RunSettings(recording=Recording(emissions=False)),
+        )
+        (run,) = run_all([checked], reports=False)
+        why, snapshots = _judged(run, loaded, settings, seed)
+    if why is not None:
+        return MadeShard(file, 0, why)
+    about: dict[str, Any] = {"seed": seed, "per_km": round(density, 3), "odscen": __version__}
+    graph = loaded.sumo.graph
+    shard = Shard(graph.map_name, graph.map_sha256, town_of(name), about, snapshots)
+    strips = road_strips(graph.lanes)
+    views = [seen_ahead(graph.lanes, strips, one) for one in snapshots]
+    data = shard_bytes(shard, queues=[one[0] for one in views], ahead=[one[1] for one in views])
+    write_file(file, data)
+    return MadeShard(file, sum(len(one.node) for one in snapshots), None)
+
+
+def traffic_scenario(loaded: LoadedMap, *, seed: int, density: float, duration: float) -> Scenario:
+    """Background traffic on a whole map, ``density`` vehicles per kilometre of lane."""
+    graph = loaded.sumo.graph
+    mix = SamplingConfig().vehicles
+    return Scenario(
+        name=f"{graph.map_name}-{seed:04d}",
+        map=MapReference(name=graph.map_name, sha256=graph.map_sha256, spacing=graph.lanes.spacing),
+        seed=seed,
+        roi=connected_segments(graph),
+        demand=Demand(background=(Background(id="traffic", per_km=round(density, 3), mix=mix),)),
+        simulation=Simulation(duration=duration, step_length=0.5),
+    )
+
+
+def connected_segments(graph: MapGraph) -> tuple[str, ...]:
+    """Segments of the largest part of a map that hangs together, by length of its roads."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    segments = graph.segments
+    one, other = segments.adjacency.reshape(-1, 2).T
+    count = len(segments.ids)
+    pairs = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    _, parts = connected_components(pairs, directed=False)
+    largest = int(np.argmax(np.bincount(parts, weights=segments.lengths)))
+    return tuple(
+        str(name) for name, part in zip(segments.ids, parts, strict=True) if part == largest
+    )
+
+
+def _judged(
+    run: Run, loaded: LoadedMap, settings: DataSettings, seed: int
+) -> tuple[str | None, tuple[Snapshot, ...]]:
+    """Why a run is left out, or its snapshots."""
+    if run.exit_code == 3:
+        return f"the run has failed: {run.summary.get('error')}", ()
+    bad = [one["words"] for one in run.usability.get("reasons", ()) if one["kind"] == "gridlock"]
+    if bad:
+        return f"gridlocked: {bad[0]}", ()
+    if run.counts["teleported"] > 0.02 * max(run.counts["inserted"], 1):
+        return f"{run.counts['teleported']} vehicles were teleported", ()
+    rng = stream(seed, "snapshot times")
+    span = settings.duration - settings.warm_up - BRAKING_SECONDS - 0.5
+    each = span / settings.snapshots
+    times = settings.warm_up + each * (np.arange(settings.snapshots) + rng.random())
+    snapshots = snapshots_of(run, loaded, [round(float(2 * one)) / 2 for one in times])
+    speeds = np.concatenate([one.speed for one in snapshots])
+    stopped = float(np.mean(speeds < STOPPED)) if len(speeds) else 0.0
+    if stopped > settings.stopped_most:
+        return f"gridlocked: {stopped:.0%} of the vehicles are stopped", ()
+    return None, snapshots
+
+
+def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[Snapshot, ...]:
+    """Take snapshots of the vehicles of a run.
+
+    Parameters
+    ----------
+    times
+        Recorded seconds.
+
+    Raises
+    ------
+    InputError
+        If no trajectories were recorded.
+    """
+    import polars as pl
+
+    rows = run.trajectories().filter(pl.col("category") != str(Category.PEDESTRIAN))
+    logs = _light_logs(run)
+    tree = _tree(loaded)
+    return tuple(_snapshot(rows, one, tree, lights_at(loaded.sumo, logs, one)) for one in times)
+
+
+def _tree(loaded: LoadedMap) -> Any:
+    from scipy.spatial import cKDTree
+
+    return cKDTree(_points(loaded.sumo.graph.lanes))
+
+
+def _points(of: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Places in which headings count as metres, ``(N, 4)``."""
+    x, y, hdg = (np.asarray(one, dtype=np.float64) for one in (of.x, of.y, of.hdg))
+    return np.column_stack([x, y, _HEADING * np.cos(hdg), _HEADING * np.sin(hdg)])
+
+
+class _PlacedBodies(NamedTuple):
+    x: Any
+    y: Any
+    hdg: Any
+
+
+def _snapshot(rows: pl.DataFrame, time: float, tree: Any, lights: LightView) -> Snapshot:
+    import polars as pl
+
+    near = rows.filter((pl.col("time") > time - 0.01) & (pl.col("time") < time + 0.01))
+    points = _points(_PlacedBodies(near["x"], near["y"], near["hdg"]))
+    far, node = tree.query(points) if len(points) else (np.empty(0), np.empty(0, dtype=np.int64))
+    good = far < OFF_NODE
+    names = [str(one) for one in Category]
+    category = np.array([names.index(one) for one in near["category"]], dtype=np.int64)
+    braking = braking_of(rows, time, near["id"].to_list())
+    speed = near["speed"].to_numpy().astype(np.float64)
+    return Snapshot(node[good].astype(np.int64), category[good], speed[good], braking[good], lights)
+
+
+def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
+    """Strongest deceleration of each vehicle within two seconds, m/s²; NaN where it has left."""
+    import polars as pl
+
+    soon = rows.filter(
+        (pl.col("time") > time - 0.01) & (pl.col("time") < time + BRAKING_SECONDS + 0.01)
+    )
+    strongest = (
+        soon.sort("id", "time")
+        .with_columns(
+            ((pl.col("speed").diff() / pl.col("time").diff()).over("id") * -1.0).alias("braking")
+        )
+        .group_by("id")
+        .agg(pl.col("braking").max())
+    )
+    found = dict(zip(strongest["id"].to_list(), strongest["braking"].to_list(), strict=True))
+    values = [found.get(one) for one in ids]
+    return np.array([np.nan if one is None else max(one, 0.0) for one in values], dtype=np.float64)
+
+
+def _light_logs(run: Run) -> dict[str, LightLog]:
+    import polars as pl
+
+    from odscen.sumo.folder.layout import LIGHT_STATES_FILE
+
+    file = run.folder / LIGHT_STATES_FILE
+    logs: dict[str, LightLog] = {}
+    if file.is_file():
+        for light, time, state in (
+            pl.read_parquet(file).sort("time").select("light", "time", "state").iter_rows()
+        ):
+            logs.setdefault(light, []).append((time, state))
+    return logs

@@ -1,0 +1,162 @@
+"""``odscen learn``: traffic to learn from, the reference generator, and how good traffic is."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from odscen.app.learned.evaluation import TrafficQuality
+    from odscen.app.learned.snapshot_data import MadeShard
+
+DataOption = Annotated[
+    Path, typer.Option("--data", help="Folder of: odscen learn data.", metavar="DIR")
+]
+_COLUMNS = (
+    "frechet", "mmd", "jsd_gap", "jsd_speed", "jsd_junction", "jsd_heading", "stopped",
+    "hard_braking", "collided", "off_road", "novelty",
+)  # fmt: skip
+
+app = typer.Typer(
+    help="Learn traffic from SUMO: snapshots, training, and metrics of generated traffic.",
+    no_args_is_help=True,
+)
+
+
+@app.command()
+def data(
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write to.", metavar="DIR")],
+    maps: Annotated[
+        list[str] | None, typer.Option("--map", help="Only this map; may be given again.")
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Of each map.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first run.")] = 1,
+    until: Annotated[float, typer.Option(help="Seconds of each run.")] = 300.0,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run traffic on maps and store snapshots of it, a file for each run.
+
+    Runs that gridlock are made again with half the traffic, and in the end left out. Called again,
+    it resumes after an interruption.
+    """
+    from odscen.app.learned.snapshot_data import DataSettings, make_shards
+    from odscen.workspace.store import Workspace
+
+    settings = DataSettings(runs=runs, seed=seed, duration=until, warm_up=0.4 * until)
+
+    def done(made: MadeShard) -> None:
+        log(f"{made.file.name}: {made.skipped or f'{made.vehicles} vehicles'}")
+
+    made = make_shards(Workspace.open(workspace), maps or [], out, settings=settings, done=done)
+    kept = [one for one in made if one.skipped is None]
+    log(f"{len(kept)} of {len(made)} runs kept, {sum(one.vehicles for one in kept)} vehicles")
+    if as_json:
+        rows = [one._asdict() | {"file": str(one.file)} for one in made]
+        print_json({"runs": rows})
+
+
+@app.command()
+def train(
+    data: DataOption,
+    out: Annotated[Path, typer.Option("-o", "--out", help="File to write.", metavar="FILE")],
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(help="Town to leave out, as in Town04; may be given again.", metavar="TOWN"),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Train a model of traffic on snapshots; one thread, without a graphics card."""
+    from odscen.app.learned.model_files import train as trained
+    from odscen.learning.reference.model_training import TrainingSettings
+    from odscen.workspace.store import Workspace
+
+    model = trained(
+        Workspace.open(workspace),
+        data,
+        out,
+        hold_out=hold_out or (),
+        settings=TrainingSettings(seed=seed),
+        told=log,
+    )
+    log(f"wrote {out}: {out.stat().st_size:,} bytes")
+    if as_json:
+        print_json({"file": str(out), "about": model.about})
+
+
+@app.command()
+def evaluate(
+    data: DataOption,
+    folder: Annotated[
+        Path | None,
+        typer.Argument(help="Scenarios to measure. (default: a model)", metavar="[FOLDER]"),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model of: odscen learn train. (default: the one that ships)"),
+    ] = None,
+    towns: Annotated[
+        list[str] | None, typer.Option("--town", help="Only this town; may be given again.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    run: Annotated[
+        bool, typer.Option("--run/--no-run", help="Run two seconds, to see who brakes hard.")
+    ] = True,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare generated traffic with SUMO's: a model beside baselines, or a folder of scenarios.
+
+    The docs page "Learned traffic" explains the columns; values in brackets are 90 % intervals.
+    """
+    from odscen.app.learned import evaluation, model_files, snapshot_data
+    from odscen.workspace.store import Workspace
+
+    store, shards = Workspace.open(workspace), snapshot_data.read_shards(data)
+    chosen = shards
+    if towns:
+        others = model_files.kept(shards, towns)
+        chosen = [one for one in shards if one not in others]
+    if folder is not None:
+        found = evaluation.evaluate_scenarios(store, folder, chosen, run=run)
+    else:
+        with progress("evaluating") as step:
+            found = evaluation.evaluate_model(
+                store,
+                chosen,
+                shards,
+                model=None if model is None else model_files.read_model(model),
+                seed=seed,
+                run=run,
+                told=lambda what: step(what, 0.0),
+            )
+    if as_json:
+        print_json({"maps": [one.to_dict() for one in found]})
+        return
+    for name in dict.fromkeys(one.map_name for one in found):
+        own = [one for one in found if one.map_name == name]
+        title = f"{name}: {own[0].vehicles:.0f} vehicles in {own[0].scenes} snapshots"
+        print_table(title, ["", *(one.source for one in own)], _rows(own))
+
+
+def _rows(found: list[TrafficQuality]) -> list[list[str]]:
+    return [
+        [column.replace("_", " "), *(_cell(one, column) for one in found)]
+        for column in _COLUMNS
+        if any(column in one.values for one in found)
+    ]
+
+
+def _cell(quality: TrafficQuality, column: str) -> str:
+    measured = quality.values.get(column)
+    if measured is None or math.isnan(measured.value):
+        return ""
+    text = f"{measured.value:.3f}"
+    return text if math.isnan(measured.low) else f"{text} [{measured.low:.3f}, {measured.high:.3f}]"

@@ -1,0 +1,1 @@
+"""What learns from maps and runs: generators that place traffic."""

@@ -1,0 +1,144 @@
+"""Arrays of a run as a ``HeteroData`` of PyTorch Geometric.
+
+``pip install 'odscen[torch]'`` has PyTorch and PyTorch Geometric; ``pip install torch --index-url
+https://download.pytorch.org/whl/cpu`` before it takes the build without CUDA, a tenth of the size.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.base.errors import InputError
+from odscen.lanegraph.graphs import Relation, WalkKind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from odscen.base.arrays import FloatArray
+
+    Array = np.ndarray[Any, np.dtype[Any]]
+
+FORMAT = "odscen-arrays"
+VERSION = 1
+
+
+def read_arrays(file: Path) -> dict[str, Array]:
+    """Arrays of an .npz file that ``odscen export --to pyg`` wrote.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, or one of another version.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        about = json.loads(str(arrays["about"]))
+        known = (about["format"], about["version"]) == (FORMAT, VERSION)
+    except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
+        msg = "it is no file of arrays of a run"
+        raise InputError(msg, file=str(file)) from error
+    if not known:
+        msg = f"it is {about['format']} {about['version']}, not {FORMAT} {VERSION}"
+        raise InputError(msg, file=str(file))
+    return arrays
+
+
+def hetero_data(arrays: Mapping[str, Array]) -> Any:
+    """Make a ``torch_geometric.data.HeteroData``.
+
+    Parameters
+    ----------
+    arrays
+        Of a run, see ``docs/learning-formats.md``.
+
+    Returns
+    -------
+    HeteroData
+        Node types ``node`` and ``walk`` (the graphs of the map), ``lane``, ``agent``, ``light``;
+        edge types ``(node, successor | left | right, node)``, ``(walk, sidewalk | roadside |
+        crosswalk | joint, walk)`` both ways, ``(node, on, lane)``, ``(lane, successor, lane)``,
+        ``(light, controls, lane)``, ``(agent, starts_at, node)``. Reals are float32 and positions
+        relative to ``data.origin`` (x and y, float64), for single precision is half a metre at
+        projected coordinates.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        If torch or torch_geometric is not installed.
+    """
+    import torch
+    from torch_geometric.data import HeteroData
+
+    def real(values: Array) -> Any:
+        return torch.from_numpy(np.ascontiguousarray(values, dtype=np.float32))
+
+    data = HeteroData()
+    origin = arrays["node"][:, :2].mean(axis=0) if len(arrays["node"]) else np.zeros(2)
+    data.origin = torch.from_numpy(origin)
+    data.time = torch.from_numpy(arrays["time"])
+    for kind, pos, features in _nodes(arrays, origin):
+        data[kind].pos = real(pos)
+        data[kind].x = real(features)
+    data["agent"].state = real(_moved(arrays["agent_state"], origin))
+    data["agent"].valid = torch.from_numpy(arrays["agent_valid"])
+    data["light"].color = torch.from_numpy(arrays["light_color"].astype(np.int64))
+    for ends, index, lengths in _edges(arrays):
+        data[ends].edge_index = torch.from_numpy(np.ascontiguousarray(index, dtype=np.int64))
+        if lengths is not None:
+            data[ends].edge_attr = real(lengths)
+    return data
+
+
+def _moved(points: FloatArray, origin: FloatArray) -> FloatArray:
+    moved = points.copy()
+    moved[..., :2] -= origin
+    return moved
+
+
+def _nodes(
+    arrays: Mapping[str, Array], origin: FloatArray
+) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+    """Kind, positions (x, y, z) and features of nodes."""
+    node, walk = arrays["node"], arrays["walk"]
+    limit = np.nan_to_num(arrays["node_speed_limit"], nan=-1.0, posinf=-1.0)
+    turned = np.column_stack([np.cos(node[:, 3]), np.sin(node[:, 3]), node[:, 4:], limit])
+    yield "node", _moved(node[:, :3], origin), turned
+    beside = np.column_stack([np.cos(walk[:, 3]), np.sin(walk[:, 3]), walk[:, 4]])
+    yield "walk", _moved(walk[:, :3], origin), beside
+    start = arrays["lane_point_start"]
+    middle = arrays["lane_point"][(start[:-1] + start[1:]) // 2, :3]
+    lane_limit = np.nan_to_num(arrays["lane_speed_limit"], nan=-1.0, posinf=-1.0)
+    yield "lane", _moved(middle, origin), np.column_stack([lane_limit, arrays["lane_in_junction"]])
+    first = np.argmax(arrays["agent_valid"], axis=1)
+    state = arrays["agent_state"][np.arange(len(first)), first]
+    ego = arrays["agent_is_ego"][:, None]
+    yield "agent", _moved(state[:, :3], origin), np.hstack([arrays["agent_size"], ego])
+    yield "light", _moved(arrays["light_stop"], origin), arrays["light_color"][:, :1]
+
+
+def _edges(
+    arrays: Mapping[str, Array],
+) -> Iterator[tuple[tuple[str, str, str], Array, Array | None]]:
+    """Kind, ends and lengths of edges."""
+    for relation in Relation:
+        own = arrays["node_edge_relation"] == relation
+        kind = ("node", relation.name.lower(), "node")
+        yield kind, arrays["node_edge"][:, own], arrays["node_edge_length"][own, None]
+    for walk_kind in WalkKind:
+        own = arrays["walk_edge_kind"] == walk_kind
+        pairs, length = arrays["walk_edge"][:, own], arrays["walk_edge_length"][own, None]
+        both = np.concatenate([pairs, pairs[::-1]], axis=1)
+        yield ("walk", walk_kind.name.lower(), "walk"), both, np.concatenate([length, length])
+    lane = arrays["node_lane"]
+    yield ("node", "on", "lane"), np.stack([np.arange(len(lane)), lane]), None
+    yield ("lane", "successor", "lane"), arrays["lane_edge"], None
+    agent = np.flatnonzero(arrays["agent_node"] >= 0)
+    yield ("agent", "starts_at", "node"), np.stack([agent, arrays["agent_node"][agent]]), None
+    light = arrays["light_lane"]
+    yield ("light", "controls", "lane"), np.stack([np.arange(len(light)), light]), None

@@ -1,0 +1,243 @@
+"""The generator that ships with odscen: ``--generator reference``."""
+
+from __future__ import annotations
+
+from functools import cache, lru_cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from odscen.base.categories import Category
+from odscen.learning.fill import VEHICLES, Fill
+from odscen.learning.reference.gap_states import GapStates
+from odscen.learning.reference.site_features import light_columns, site_of, traffic_columns
+from odscen.learning.reference.small_network import logistic, softmax
+from odscen.learning.reference.traffic_model import (
+    context,
+    density_column,
+    model_from_bytes,
+    speed_within,
+    with_category,
+)
+from odscen.learning.safe_speeds import STANDING_GAP, safe_speed
+from odscen.learning.traffic_snapshots import SignalAhead
+from odscen.scenario.checks.actor_checks import SPEED_MAX
+
+if TYPE_CHECKING:
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
+    from odscen.lanegraph.graphs import LaneGraph, MapGraph
+    from odscen.learning.fill import Array, FillRequest
+    from odscen.learning.reference.site_features import Site
+    from odscen.learning.reference.traffic_model import TrafficModel
+    from odscen.learning.traffic_snapshots import LightView
+
+WEIGHTS = "reference_model.npz"
+PASSES = 6
+CLOSE_ENOUGH = 0.03
+"""Share of the vehicles wanted by which a pass may miss their number."""
+DECELERATION = 3.0
+"""m/s², at which a vehicle can stop at a red light."""
+GAP = 0.7
+"""Metres between bodies, at least."""
+_FACTOR = (1.0, 0.1, 0.75, 1.2)
+"""Desired speed over the limit: mean, deviation, least and most, as sampling draws it."""
+_CYCLING = (5.0, 1.0, 2.5, 9.0)
+
+
+class PlacedTraffic(NamedTuple):
+    """Vehicles on nodes; speeds in m/s."""
+
+    node: IntArray
+    category: IntArray
+    speed: FloatArray
+
+
+NOBODY = PlacedTraffic(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
+
+
+class ReferenceGenerator:
+    """Places vehicles as they are in SUMO's traffic, queues before red lights included.
+
+    Parameters
+    ----------
+    model
+        What was learned; the model that ships if not given.
+    """
+
+    def __init__(self, model: TrafficModel | None = None) -> None:
+        self._model = model or shipped_model()
+
+    def fill(self, graph: MapGraph, request: FillRequest, rng: np.random.Generator) -> Fill:
+        """Place vehicles and pedestrians; see :class:`~odscen.learning.fill.Generator`."""
+        none = np.zeros(len(graph.lanes.x), dtype=np.bool_)
+        allowed = np.stack([request.allowed.get(one, none) for one in VEHICLES])
+        lengths = np.array([request.bodies[one].length for one in VEHICLES])
+        site = _site(graph.lanes)
+        traffic = place_traffic(
+            self._model, site, request.lights, allowed,
+            spacing=graph.lanes.spacing, wanted=request.vehicles, lengths=lengths, rng=rng,
+        )  # fmt: skip
+        desired = _desired(traffic, site.limit[traffic.node], rng)
+        walkers = _walkers(request, rng)
+        rest = np.full(len(walkers), np.nan)
+        return Fill(
+            node=np.concatenate([traffic.node, walkers]),
+            category=np.concatenate(
+                [names_of(traffic.category), np.full(len(walkers), str(Category.PEDESTRIAN))]
+            ),
+            initial_speed=np.concatenate([traffic.speed, rest]),
+            desired_speed=np.concatenate([desired, rest]),
+        )
+
+
+def names_of(category: IntArray) -> Array:
+    """Names of categories by their places."""
+    return np.array([str(one) for one in Category])[category]
+
+
+@cache
+def shipped_model() -> TrafficModel:
+    """Read the model that ships with odscen."""
+    data = files("odscen.learning.reference").joinpath(WEIGHTS).read_bytes()
+    return model_from_bytes(data, file=WEIGHTS)
+
+
+def place_traffic(
+    model: TrafficModel,
+    site: Site,
+    lights: LightView,
+    allowed: BoolArray,
+    *,
+    spacing: float,
+    wanted: int,
+    lengths: FloatArray,
+    rng: np.random.Generator,
+) -> PlacedTraffic:
+    """Place about as many vehicles as are wanted, never more.
+
+    The whole map is placed several times, with another bias, until the number is close.
+
+    Parameters
+    ----------
+    allowed
+        Shape ``(6, N)``: nodes on which each category may be.
+    spacing
+        Metres between nodes.
+    lengths
+        Shape ``(6,)``: of the bodies, metres.
+    """
+    metres = float(allowed.any(axis=0).sum()) * spacing
+    density = np.full(len(site.limit), density_column(wanted, metres))
+    fixed = np.column_stack([site.columns, light_columns(site, lights), density])
+    draw = _Draw(model, site, lights, allowed, lengths, fixed)
+    bias, best = 0.0, NOBODY
+    for _ in range(PASSES if wanted else 0):
+        found = draw.traffic(bias, rng)
+        if abs(len(found.node) - wanted) < abs(len(best.node) - wanted):
+            best = found
+        if abs(len(found.node) - wanted) <= CLOSE_ENOUGH * wanted:
+            break
+        bias += float(np.clip(1.2 * np.log((wanted + 0.5) / (len(found.node) + 0.5)), -2.0, 2.0))
+    keep = np.sort(rng.permutation(len(best.node))[:wanted])
+    return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
+
+
+class _Draw(NamedTuple):
+    """All that one pass over the strips needs."""
+
+    model: TrafficModel
+    site: Site
+    lights: LightView
+    allowed: BoolArray
+    lengths: FloatArray
+    fixed: FloatArray
+
+    def traffic(self, bias: float, rng: np.random.Generator) -> PlacedTraffic:
+        """Place vehicles row after row, from the stop lines backwards."""
+        site, states = self.site, GapStates.empty(len(self.site.limit))
+        anywhere = np.asarray(self.allowed.any(axis=0))
+        found: list[PlacedTraffic] = []
+        for row in site.strips.rows:
+            states.advance(site.strips, row)
+            free = row[anywhere[row] & (states.gap[row] > self.lengths.min() / 2.0 + GAP)]
+            if not len(free):
+                continue
+            x = np.column_stack([self.fixed[free], traffic_columns(site, states, free)])
+            chance = logistic(self.model.occupied(x)[:, 0] + bias)
+            hit = np.flatnonzero(rng.random(len(free)) < chance)
+            if len(hit):
+                placed = self._vehicles(free[hit], x[hit], states, rng)
+                states.put(placed.node, placed.category, placed.speed)
+                found.append(placed)
+        if not found:
+            return NOBODY
+        return PlacedTraffic(
+            np.concatenate([one.node for one in found]),
+            np.concatenate([one.category for one in found]),
+            np.concatenate([one.speed for one in found]),
+        )
+
+    def _vehicles(
+        self, nodes: IntArray, x: FloatArray, states: GapStates, rng: np.random.Generator
+    ) -> PlacedTraffic:
+        """Category and speed of vehicles on nodes; without one that fits there is none."""
+        limit = self.site.limit[nodes]
+        shares = self.model.categories[context(self.site.outer[nodes], limit)]
+        fits = self.lengths[None, :] / 2.0 + GAP <= states.gap[nodes][:, None]
+        shares = shares * (self.allowed[:, nodes].T & fits)
+        some = shares.sum(axis=1) > 0
+        nodes, x, limit, shares = nodes[some], x[some], limit[some], shares[some]
+        category = _drawn(shares, rng)
+        odds = softmax(self.model.speed(with_category(x, category)))
+        speed = speed_within(_drawn(odds, rng), limit, rng.random(len(nodes)))
+        most = np.minimum(self._stoppable(nodes, category), self._safe(nodes, category, states))
+        return PlacedTraffic(nodes, category, np.minimum(speed, most))
+
+    def _safe(self, nodes: IntArray, category: IntArray, states: GapStates) -> FloatArray:
+        """Krauss's safe speed behind the leader on the strip, m/s."""
+        gap = states.gap[nodes] - self.lengths[category] / 2.0
+        leader = states.leader[nodes]
+        safe = safe_speed(gap - STANDING_GAP, np.maximum(leader, 0.0))
+        return np.where(leader >= 0.0, safe, np.inf)
+
+    def _stoppable(self, nodes: IntArray, category: IntArray) -> FloatArray:
+        """Highest speed from which one can stop at a red light, m/s."""
+        root = self.site.strips.root[nodes]
+        red = self.lights.state[self.site.lane[root]] == SignalAhead.RED
+        metres = np.maximum(self.site.strips.to_end[nodes] - self.lengths[category] / 2.0, 0.0)
+        return np.where(red, np.sqrt(2.0 * DECELERATION * metres), np.inf)
+
+
+def _drawn(shares: FloatArray, rng: np.random.Generator) -> IntArray:
+    """Draw a column for each row, by the shares in it."""
+    ends = np.cumsum(shares, axis=1)
+    at = rng.random(len(shares)) * ends[:, -1]
+    found: IntArray = np.minimum((ends <= at[:, None]).sum(axis=1), shares.shape[1] - 1)
+    return found
+
+
+def _desired(traffic: PlacedTraffic, limit: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Desired speeds, m/s: about the limit, never below the speed at departure."""
+    count = len(traffic.node)
+    mean, spread, low, high = _FACTOR
+    motor = np.clip(rng.normal(mean, spread, count), low, high) * limit
+    mean, spread, low, high = _CYCLING
+    cycling = np.clip(rng.normal(mean, spread, count), low, high)
+    bicycle = traffic.category == [*Category].index(Category.BICYCLE)
+    wanted = np.maximum(np.where(bicycle, cycling, motor), traffic.speed)
+    most = np.array([SPEED_MAX[one] for one in VEHICLES])[traffic.category]
+    return np.clip(wanted, 1.0, most)
+
+
+def _walkers(request: FillRequest, rng: np.random.Generator) -> IntArray:
+    """Nodes of pedestrians: at random, as they are no part of what was learned."""
+    allowed = request.allowed.get(Category.PEDESTRIAN)
+    if allowed is None:
+        return np.empty(0, dtype=np.int64)
+    return rng.permutation(np.flatnonzero(allowed))[: request.walkers]
+
+
+@lru_cache(maxsize=4)
+def _site(lanes: LaneGraph) -> Site:
+    return site_of(lanes)

@@ -1,0 +1,87 @@
+"""The generator that ships: as many vehicles as wanted, apart, and queued at red lights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from odscen.base.categories import DEFAULT_BODY
+from odscen.base.errors import InputError
+from odscen.learning.fill import VEHICLES, FillRequest
+from odscen.learning.fill_check import checked_fill
+from odscen.learning.reference.reference_generator import (
+    WEIGHTS,
+    ReferenceGenerator,
+    shipped_model,
+)
+from odscen.learning.reference.traffic_model import model_bytes, model_from_bytes, speed_class
+from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.placing.region import Region
+from odscen.scenario.placing.usable_nodes import Usable
+from odscen.scenario.sampling.sampler import wanted_crew
+from tests.graphs import two_lane_road
+
+GRAPH = two_lane_road(1000.0)
+REGION = Region.of(GRAPH, GRAPH.segments.ids)
+CREW = wanted_crew(REGION, SamplingConfig(), Usable(), fill=0.2)
+
+
+def request(vehicles: int, lights: LightView | None = None) -> FillRequest:
+    allowed = {**CREW.road_places.allowed, **CREW.walk_places.allowed}
+    return FillRequest(
+        GRAPH, REGION.lanes, REGION.walks, allowed, DEFAULT_BODY, vehicles, 0, 1, lights
+    )
+
+
+def test_the_weights_are_small_and_say_what_they_were_trained_on() -> None:
+    data = model_bytes(shipped_model())
+    assert len(data) < 1_000_000
+    assert shipped_model().about["vehicles"] > 10_000
+    assert model_bytes(model_from_bytes(data, file=WEIGHTS)) == data
+    with pytest.raises(InputError, match="no model"):
+        model_from_bytes(data[:2000], file="cut.npz")
+
+
+def test_it_places_about_as_many_as_are_wanted_and_nearly_all_pass_the_check() -> None:
+    given = request(24)
+    fill = ReferenceGenerator().fill(GRAPH, given, np.random.default_rng(1))
+    checked = checked_fill(fill, given, REGION)
+    assert 8 <= checked.given <= 24
+    assert len(checked.actors) >= 0.95 * checked.given
+    assert fill.initial_speed is not None
+    assert (fill.initial_speed >= 0).all()
+
+
+def test_the_same_random_numbers_give_the_same_fill() -> None:
+    one, two = (
+        ReferenceGenerator().fill(GRAPH, request(20), np.random.default_rng(7)) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one.node, two.node)
+    np.testing.assert_array_equal(one.initial_speed, two.initial_speed)
+
+
+def test_more_are_stopped_before_a_red_light_than_before_a_green_one() -> None:
+    def stopped(state: SignalAhead) -> float:
+        lights = no_lights(len(GRAPH.lanes.lanes.keys))
+        lights.state[:], lights.since[:] = state, 15.0
+        fills = [
+            ReferenceGenerator().fill(GRAPH, request(40, lights), np.random.default_rng(seed))
+            for seed in range(4)
+        ]
+        return float(np.mean(np.concatenate([one.initial_speed for one in fills]) < 0.1))
+
+    red, green = stopped(SignalAhead.RED), stopped(SignalAhead.GREEN)
+    assert red > 0.02
+    assert red > 2.0 * green
+
+
+def test_nobody_is_placed_where_nobody_is_wanted() -> None:
+    fill = ReferenceGenerator().fill(GRAPH, request(0), np.random.default_rng(1))
+    assert len(fill.node) == 0
+
+
+def test_speeds_have_classes_of_a_twentieth_of_the_limit() -> None:
+    speeds = np.array([0.0, 0.05, 0.2, 0.5, 10.0, 30.0])
+    assert speed_class(speeds, np.full(6, 10.0)).tolist() == [0, 0, 1, 2, 21, 28]
+    assert len(VEHICLES) == 6

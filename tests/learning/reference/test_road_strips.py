@@ -1,0 +1,78 @@
+"""Strips of road: who is ahead of whom, and how far it is to the stop line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from odscen.learning.reference.expected_flow import expected_flow
+from odscen.learning.reference.gap_states import FREE, gap_states
+from odscen.learning.reference.road_strips import road_strips
+from odscen.learning.reference.site_features import site_of
+from tests.graphs import fork, ring, two_lane_road
+
+CAR, STANDING = 0, 0.0
+
+
+def test_the_nodes_of_a_lane_follow_each_other_to_its_end() -> None:
+    lanes = two_lane_road(100.0).lanes
+    strips = road_strips(lanes)
+    first = np.flatnonzero(lanes.lane == 0)
+    assert strips.ahead[first].tolist() == [*first[1:].tolist(), -1]
+    assert strips.to_end[first[0]] == pytest.approx(98.0)
+    assert strips.from_start[first[-1]] == pytest.approx(98.0)
+    assert set(strips.root[first].tolist()) == {int(first[-1])}
+    assert len(strips.rows) == len(first)
+    assert sorted(np.concatenate(strips.rows).tolist()) == list(range(len(lanes.x)))
+
+
+def test_junctions_are_in_no_strip() -> None:
+    lanes = fork().lanes
+    strips = road_strips(lanes)
+    inside = np.array([name is not None for name in lanes.lanes.junctions])[lanes.lane]
+    assert inside.any()
+    assert not strips.on_road[inside].any()
+    assert not inside[np.concatenate(strips.rows)].any()
+
+
+def test_a_ring_is_cut_once() -> None:
+    lanes = ring().lanes
+    strips = road_strips(lanes)
+    assert int((strips.ahead < 0).sum()) == 1
+    assert len(np.concatenate(strips.rows)) == len(lanes.x)
+
+
+def test_gap_leader_and_queue_are_those_of_the_vehicles_ahead() -> None:
+    lanes = two_lane_road(100.0).lanes
+    strips = road_strips(lanes)
+    own = np.flatnonzero(lanes.lane == 0)
+    states = gap_states(
+        strips,
+        node=own[[49, 45, 30]],  # 0, 8 and 38 m before the end
+        category=np.array([CAR, CAR, CAR]),
+        speed=np.array([STANDING, STANDING, 7.0]),
+    )
+    assert states.gap[own[45]] == pytest.approx(8.0 - 2.5)
+    assert states.queue[own[45]] == 1
+    assert states.gap[own[40]] == pytest.approx(10.0 - 2.5)
+    assert states.queue[own[40]] == 2
+    assert states.leader[own[10]] == 7.0
+    assert states.queue[own[10]] == 0
+    other = np.flatnonzero(lanes.lane == 1)
+    assert states.gap[other].tolist() == [FREE] * len(other)
+    assert states.leader[other].tolist() == [-1.0] * len(other)
+
+
+@pytest.mark.parametrize("graph", [fork(), ring(), two_lane_road(60.0)])
+def test_features_are_finite_and_about_one(graph) -> None:  # type: ignore[no-untyped-def]
+    columns = site_of(graph.lanes).columns
+    assert np.isfinite(columns).all()
+    assert np.abs(columns).max() <= 3.0
+
+
+def test_traffic_is_expected_where_trips_come_together() -> None:
+    lanes = fork().lanes
+    flow = expected_flow(lanes)
+    roads = [row for row, name in enumerate(lanes.lanes.junctions) if name is None]
+    assert np.mean(flow[roads]) == pytest.approx(1.0)
+    assert (flow >= 0).all()
