@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.results.by_place.analysis_times import AnalysisTimes
+from odscen.results.by_place.analysis_times import AnalysisTimes, begins_at
 from odscen.results.by_place.traffic import over_run, traffic_figures
 from tests.results.made_traffic import PLACES, lane_rows
 
@@ -63,3 +63,11 @@ def test_a_summary_says_what_was_analysed_only_if_it_is_not_all() -> None:
     assert AnalysisTimes().to_dict() == {}
     times = AnalysisTimes(warm_up=300.0, interval=900.0)
     assert AnalysisTimes.of_summary(times.to_dict()) == times
+
+
+def test_a_time_belongs_to_the_interval_that_it_begins_or_lies_in():
+    clock = pl.DataFrame({"begin": [0.0, 300.0], "end": [300.0, 600.0]})
+    times = pl.Series("time", [-1.0, 0.0, 299.9, 300.0, 900.0])
+    assert begins_at(times, clock).to_list() == [None, 0.0, 0.0, 300.0, 300.0]
+    assert begins_at(times.clear(), clock).to_list() == []
+    assert begins_at(times, clock.clear()).to_list() == [None] * 5

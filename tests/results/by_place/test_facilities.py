@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import polars as pl
 import pytest
 
@@ -185,3 +187,19 @@ def test_hcms_service_flow_rates_at_their_speeds_are_the_bounds_of_our_levels() 
     for (flow, speed), level, following in zip(rates, "ABCDE", "BCDEF", strict=True):
         assert _level(0.99 * flow / speed) == level
         assert _level(1.01 * flow / speed) == following
+
+
+def test_what_follows_from_the_map_is_made_once_for_all_runs_on_it() -> None:
+    made: list[str] = []
+
+    def make() -> str:
+        made.append("made")
+        return "what follows"
+
+    of_run = facts(("M", False, False, False), ("s", True, False, False))
+    of_another = replace(of_run, drivers=of_run.drivers.head(1))
+    assert of_run.once("it", PLACES, make) == of_another.once("it", PLACES, make)
+    assert made == ["made"]
+    of_run.once("it", LanePlaces.from_json(PLACES.to_json()), make)
+    assert made == ["made"] * 2
+    assert movement_facilities(PLACES, of_run) is movement_facilities(PLACES, of_another)

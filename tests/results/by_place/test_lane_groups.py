@@ -36,12 +36,18 @@ X = {"road": (0.0, 100.0), "l": (100.0, 140.0), "t": (100.0, 140.0), ":l": (140.
      ":t": (140.0, 150.0)}  # fmt: skip
 FACTS = NetFacts(
     limits=pl.DataFrame(
-        [(lane, b - a, 15.0) for lane, (a, b) in X.items()],
-        schema=("lane", "length", "limit"),
+        [(lane, lane, b - a, 15.0) for lane, (a, b) in X.items()],
+        schema=("lane", "edge", "length", "limit"),
         orient="row",
     ),
-    links=pl.DataFrame({"via": [":l", ":t"], "yields_to": [[":o"], []]}),
-    drivers=pl.DataFrame({"id": [f"v{k}" for k in range(40)], "length": [5.0] * 40}),
+    links=pl.DataFrame(
+        {"via": [":l", ":t"], "yields_to": [[":o"], []], "turn": ["l", "s"], "state": ["o", "O"]}
+    ).with_columns(
+        pl.lit(value=False).alias(name) for name in ("gives_way", "onto_ring", "from_ring")
+    ),
+    drivers=pl.DataFrame(
+        {"id": [f"v{k}" for k in range(40)], "length": [5.0] * 40, "heavy": [False] * 40}
+    ),
     follows=pl.DataFrame(
         [("road", "l"), ("road", "t"), ("l", ":l"), ("t", ":t")],
         schema=("lane", "following"),

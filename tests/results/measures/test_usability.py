@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from odscen.results.measures.expectations import evaluate, parse_expectation
+from odscen.results.judging.expectations import evaluate, parse_expectation
 from odscen.results.measures.figure import RunData
 from odscen.results.measures.gridlock import Incident, find_incidents
 from odscen.results.measures.registry import figure_values

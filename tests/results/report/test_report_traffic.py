@@ -134,7 +134,7 @@ def test_who_stands_is_drawn_level_and_red_and_who_drives_is_not():
     standing, moving = paths_of(section, "standing"), paths_of(section, "moving")
     assert standing.count("M") == 1
     assert moving.count("M") == 2
-    assert "From r1 to r2, 100 m through 1 junction, 0:00 to 0:01 h: 1 vehicle." in words(section)
+    assert "From r1 to r2, 100 m through 1 junction, 0:00 to 1:00 min: 1 vehicle." in words(section)
     # The last step of standing leads to where the vehicle is on the move again.
     steps = re.findall(r"-?\d+", standing.split("l")[1])
     assert int(steps[1]) == 0
@@ -190,7 +190,11 @@ def test_the_whole_report_holds_every_section_and_is_well_formed():
 
 @pytest.mark.parametrize(
     ("begin", "end", "text"),
-    [(63000.0, 63900.0, "17:30 to 17:45 h"), (250.0, 260.0, "4:10 to 4:20 min")],
+    [
+        (63000.0, 63900.0, "17:30 to 17:45 h"),
+        (250.0, 260.0, "4:10 to 4:20 min"),
+        (0.0, 60.0, "0:00 to 1:00 min"),
+    ],
 )
 def test_stretches_of_time_are_written_for_people(begin, end, text):
     assert stretch(begin, end) == text

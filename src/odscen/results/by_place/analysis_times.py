@@ -110,6 +110,17 @@ WHOLE_RUN = AnalysisTimes()
 """All of a run, over the intervals that lanes were measured over."""
 
 
+def begins_at(times: pl.Series, clock: pl.DataFrame) -> pl.Series:
+    """``begin`` of the interval of each time, null before the first; ``clock`` is in order."""
+    import numpy as np
+    import polars as pl
+
+    begins = clock["begin"].to_numpy()
+    at = np.searchsorted(begins, times.to_numpy(), side="right") - 1
+    found = np.concatenate([[np.nan], begins])[at + 1]
+    return pl.Series("begin", found, nan_to_null=True)
+
+
 def on_clock(lanes: pl.DataFrame, clock: pl.DataFrame) -> pl.DataFrame:
     """Lane data summed up over the intervals of ``clock``, of which each holds whole rows."""
     import polars as pl

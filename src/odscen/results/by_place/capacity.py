@@ -19,18 +19,20 @@ what their gaps let through: of a gap of ``h`` seconds ``floor((h - t_c) / t_f) 
 ``h >= t_c``, with HCM's critical gap and follow-up time of permitted left turns, and
 :data:`SNEAKERS` more at the end of each green. Where :data:`FEWEST_GREENS` greens or more of this
 run did not clear the queue, all of it is taken times what they let through in proportion.
-Pedestrians to whom turns give way are not considered otherwise. Capacity of unsignalised movements
-is not computed.
+Pedestrians to whom turns give way are not considered otherwise. Movements without lights are in
+:mod:`odscen.results.by_place.unsignalised`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.results.by_place.analysis_times import begins_at
 from odscen.scenario.signals.webster import CRITICAL_GAP, FOLLOW_UP, SATURATION_FLOW
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     import polars as pl
 
@@ -47,11 +49,20 @@ FEWEST_GREENS = 5
 """Greens that did not clear the queue from which permitted turns are taken as the run has them."""
 _FREE = 4
 """Vehicles of a queue whose headways are longer because they start up."""
-_HELD = 4.0
+HELD = 4.0
 """Seconds lost before the line from which a vehicle was in the queue."""
 _BREAK = 6.0
 """Seconds between two vehicles that end a discharging queue."""
 _LEAST = 1e-9
+_LINK = ("via", "source", "lane_group")
+
+
+class _Green(NamedTuple):
+    """Seconds in which a connection has green, and whether it gives way meanwhile."""
+
+    time: float
+    until: float
+    permitted: bool
 
 
 def shown_greens(
@@ -77,18 +88,16 @@ def shown_greens(
     import polars as pl
 
     col = pl.col
-    first, last = clock.select(a=col("begin").min(), b=col("end").max()).row(0)
-    edges = clock.select(time="begin").join(states.select("light").unique(), how="cross")
+    first, last = clock["begin"][0], clock["end"][-1]
+    edges = clock.select(time="begin").join(states.select(col("light").unique()), how="cross")
     spans = (
         pl.concat([states.select("light", "time", "state"), edges], how="diagonal")
         .sort("light", "time", maintain_order=True)
         .with_columns(state=col("state").forward_fill().over("light"))
         .with_columns(until=col("time").shift(-1).over("light").fill_null(last).clip(None, last))
         .filter(col("state").is_not_null() & (col("until") > col("time")) & (col("time") >= first))
-        .sort("time")
-        .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)
-        .drop("end")
     )
+    spans = spans.with_columns(begins_at(spans["time"], clock))
     shown = _links_shown(programs, spans.select("light", "state").unique(), facts)
     return spans.join(shown, on=("light", "state")).sort("via", "time").drop("light", "state")
 
@@ -100,6 +109,9 @@ def _links_shown(
     import polars as pl
 
     before = dict(facts.links.select("via", "yields_to").rows())
+    of_light: dict[str, list[str]] = {}
+    for name, state in states.rows():
+        of_light.setdefault(name, []).append(state)
     rows = []
     for light in programs:
         at = {
@@ -108,7 +120,7 @@ def _links_shown(
             for link, lanes in zip(group.links, group.lanes, strict=False)
             if len(lanes) > 1
         }
-        for state in states.filter(pl.col("light") == light.id)["state"].sort():
+        for state in sorted(of_light.get(light.id, ())):
             green = {via for via, link in at.items() if state[link] in "Gg"}
             rows += [
                 (light.id, state, via, state[at[via]] == "g" and bool(green & {*before[via]}))
@@ -136,34 +148,38 @@ def saturation_flows(passed: pl.DataFrame, groups: LaneGroups) -> pl.DataFrame:
     -------
     ``lane_group``, ``headways`` that were measured, and ``saturation_flow``, veh/h and lane.
     """
+    import numpy as np
     import polars as pl
 
-    col = pl.col
-    headway = col("time").diff().over("source")
-    held = col("before") >= _HELD
-    breaks = (~held | (headway > _BREAK)).fill_null(value=True)
     queued = (
         passed.drop_nulls("movement")
         .join(groups.ways.select("via", "source", "lane_group"), left_on="lane", right_on="via")
         .sort("source", "time", "id")
-        .with_columns(headway=headway, queue=breaks.cum_sum().over("source"))
-        .with_columns(place=col("time").cum_count().over("source", "queue"))
-        .filter(held & (col("place") > _FREE))
     )
-    seconds, number = col("headway").sum(), pl.len()
-    whole = queued.select(seconds=seconds, number=number).row(0)
-    usual = 3600.0 * whole[1] / whole[0] if whole[1] >= FEWEST_HEADWAYS else SATURATION_FLOW
-    own = queued.group_by("lane_group").agg(headways=number, own=3600.0 * number / seconds)
-    known = col("headways") >= FEWEST_HEADWAYS
-    return (
-        groups.groups.select("lane_group")
-        .join(own, on="lane_group", how="left", maintain_order="left")
-        .select(
-            "lane_group",
-            col("headways").fill_null(0).cast(pl.Int64),
-            saturation_flow=pl.when(known).then("own").otherwise(usual),
-        )
-    )
+    time = queued["time"].to_numpy()
+    held = queued["before"].to_numpy() >= HELD
+    first = np.diff(queued["source"].rle_id().to_numpy().astype(np.int64), prepend=-1) > 0
+    headway = np.diff(time, prepend=np.nan)
+    breaks = first | ~held | (headway > _BREAK)
+    # Place in the queue, from 1 on.
+    place = np.arange(1, len(time) + 1)
+    begun = np.flatnonzero(breaks)
+    place -= begun[np.cumsum(breaks) - 1] if len(begun) else 0
+    known = held & (place > _FREE)
+    own: dict[str, list[float]] = {}
+    for group, seconds in zip(queued["lane_group"].filter(known), headway[known], strict=True):
+        own.setdefault(group, []).append(float(seconds))
+    number = int(known.sum())
+    enough = number >= FEWEST_HEADWAYS
+    usual = 3600.0 * number / float(headway[known].sum()) if enough else SATURATION_FLOW
+    rows = []
+    for group in groups.groups["lane_group"]:
+        seconds = own.get(group, [])
+        measured = len(seconds) >= FEWEST_HEADWAYS
+        flow = 3600.0 * len(seconds) / sum(seconds) if measured else usual
+        rows.append((group, len(seconds), flow))
+    schema = {"lane_group": pl.String, "headways": pl.Int64, "saturation_flow": pl.Float64}
+    return pl.DataFrame(rows, schema=schema, orient="row")
 
 
 def demand_sums(passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame) -> pl.DataFrame:
@@ -177,15 +193,10 @@ def demand_sums(passed: pl.DataFrame, groups: LaneGroups, clock: pl.DataFrame) -
     """
     import polars as pl
 
-    col = pl.col
-    inside = groups.ways.select("lane_group", lane="via")
-    on_the_way = groups.reach.sort("lane", "lane_group").unique("lane", keep="first")
-    led = pl.concat([inside, on_the_way.select("lane_group", "lane")]).unique("lane", keep="first")
+    due = passed["time"] - passed["before"]
     return (
-        passed.join(led, on="lane")
-        .with_columns(due=col("time") - col("before"))
-        .sort("due")
-        .join_asof(clock.sort("begin"), left_on="due", right_on="begin", coalesce=False)
+        passed.select("lane", begins_at(due, clock))
+        .join(groups.leads, on="lane")
         .drop_nulls("begin")
         .group_by("lane_group", "begin")
         .agg(demand=pl.len().cast(pl.Int64))
@@ -215,22 +226,42 @@ def capacity_sums(
     """
     import polars as pl
 
-    col = pl.col
-    number = passed.drop_nulls("movement").group_by(via="lane").agg(number=pl.len())
-    links = groups.ways.join(number, on="via", how="left").with_columns(
-        number=col("number").fill_null(0) + _LEAST
-    )
-    share = col("number") / col("number").sum().over("source", "begin")
     return (
-        _link_capacities(greens, flows, passed, groups, facts)
-        .join(links, on="via")
-        .with_columns(part=share / col("capacity").clip(_LEAST))
-        .group_by("lane_group", "source", "begin")
-        .agg(capacity=1.0 / col("part").sum())
+        shared_lanes(_link_capacities(greens, flows, passed, groups, facts), passed, groups)
         .group_by("lane_group", "begin")
-        .agg(col("capacity").sum())
+        .agg(pl.col("capacity").sum())
         .sort("lane_group", "begin")
     )
+
+
+def shared_lanes(
+    capacities: pl.DataFrame, passed: pl.DataFrame, groups: LaneGroups
+) -> pl.DataFrame:
+    """Capacity of lanes from those of their connections, in the shares that were driven.
+
+    Parameters
+    ----------
+    capacities
+        ``via``, ``begin``, ``capacity`` as if each connection had its lane for itself.
+
+    Returns
+    -------
+    ``lane_group``, ``source``, ``begin``, ``capacity``.
+    """
+    import polars as pl
+
+    entered = Counter(passed["lane"].filter(passed["movement"].is_not_null()))
+    of = {via: (group, lane) for via, lane, group in groups.ways.select(_LINK).rows()}
+    lanes: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
+    for via, begin, capacity in capacities.select("via", "begin", "capacity").rows():
+        if via in of:
+            lanes[*of[via], begin].append((entered[via] + _LEAST, max(capacity, _LEAST)))
+    rows = []
+    for key, links in sorted(lanes.items()):
+        total = sum(number for number, _ in links)
+        rows.append((*key, 1.0 / sum(number / total / capacity for number, capacity in links)))
+    names = {"lane_group": pl.String, "source": pl.String, "begin": pl.Float64}
+    return pl.DataFrame(rows, schema={**names, "capacity": pl.Float64}, orient="row")
 
 
 def _link_capacities(
@@ -247,33 +278,41 @@ def _link_capacities(
     col = pl.col
     flow_of = dict(groups.ways.join(flows, on="lane_group").select("via", "saturation_flow").rows())
     before = dict(facts.links.select("via", "yields_to").rows())
-    entered = passed.drop_nulls("movement").with_columns(due=col("time") - col("before"))
-    entries = {
-        str(via): rows.sort("time").select("due", "time").to_numpy()
-        for (via,), rows in entered.group_by("lane")
-    }
+    # Lists by connection, and no table for each: a table costs more than what is in it.
+    entered = (
+        passed.drop_nulls("movement")
+        .select("lane", "time", due=col("time") - col("before"))
+        .sort("time")
+        .group_by("lane")
+        .agg("due", "time")
+    )
+    entries = {via: np.array([due, time]).T for via, due, time in entered.rows()}
+    shown: dict[str, dict[float, list[_Green]]] = {}
+    for via, *green in greens.select("via", "begin", "time", "until", "permitted").rows():
+        if via in flow_of:
+            shown.setdefault(via, {}).setdefault(green[0], []).append(_Green(*green[1:]))
     nothing = np.zeros((0, 2))
     found = []
-    for (via,), rows in greens.filter(col("via").is_in(list(flow_of))).group_by("via"):
-        foes = [entries.get(one, nothing)[:, 1] for one in before[str(via)]]
+    for via, by_begin in shown.items():
+        foes = [entries.get(one, nothing)[:, 1] for one in before[via]]
         opposing = np.sort(np.concatenate(foes)) if foes else np.zeros(0)
         turns = [
             (begin, time, until, through_gaps(opposing, time, until, most=flow_of[via]))
-            for (begin,), own in rows.filter("permitted").group_by("begin")
-            for time, until in _merged(own)
+            for begin, own in by_begin.items()
+            for time, until in _merged([one for one in own if one.permitted])
         ]
-        share = _as_driven(entries.get(str(via), nothing), turns)
+        share = _as_driven(entries.get(via, nothing), turns)
         totals = {
-            begin: seconds * flow_of[via] / 3600.0
-            for begin, seconds in rows.group_by("begin")
-            .agg((col("until") - col("time")).filter(~col("permitted")).sum())
-            .rows()
+            begin: sum(one.until - one.time for one in own if not one.permitted)
+            * flow_of[via]
+            / 3600.0
+            for begin, own in by_begin.items()
         }
         for begin, _, _, number in turns:
             totals[begin] += share * number
         found += [(via, begin, total) for begin, total in sorted(totals.items())]
     schema = {"via": pl.String, "begin": pl.Float64, "capacity": pl.Float64}
-    return pl.DataFrame(found, schema=schema, orient="row").sort("via", "begin")
+    return pl.DataFrame(sorted(found), schema=schema, orient="row")
 
 
 def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, float]]) -> float:
@@ -299,10 +338,10 @@ def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, f
     return served / room if greens >= FEWEST_GREENS and room else 1.0
 
 
-def _merged(rows: pl.DataFrame) -> list[tuple[float, float]]:
+def _merged(greens: Iterable[_Green]) -> list[tuple[float, float]]:
     """Spans without a break between them as one."""
     found: list[tuple[float, float]] = []
-    for time, until in rows.select("time", "until").sort("time").rows():
+    for time, until, _ in sorted(greens):
         if found and time <= found[-1][1]:
             found[-1] = found[-1][0], until
         else:

@@ -71,13 +71,15 @@ def vehicle_passages(
         number, period = number * len(kept) // len(moments), period * round(1.0 / period)
     chosen = facts.drivers.filter(~pl.col("serves"))
     batches = -(-number // MOST_ROWS)
+    lanes = facts.once("known_lanes", places, lambda: _known_lanes(places, facts.limits))
     found = []
     for batch in range(batches):
-        drivers = chosen.filter(pl.Series(range(len(chosen))) % batches == batch)
-        lost = lost_time(trajectories, places, facts.limits, drivers, period=period)
+        own = pl.Series(range(len(chosen))) % batches == batch
+        drivers = chosen if batches == 1 else chosen.filter(own)
+        lost = _lost_on(trajectories, lanes, drivers, period=period)
         if lost is not None:
             found.append(passages(lost, end=end, period=period))
-    return pl.concat(found).sort("time", "id")
+    return found[0] if len(found) == 1 else pl.concat(found).sort("time", "id")
 
 
 def lost_time(
@@ -109,11 +111,17 @@ def lost_time(
     ``last`` (s), and seconds lost: ``behind``, ``on_the_way``, ``before``, and ``inside``.
     ``None`` if lane or speed were not recorded.
     """
+    return _lost_on(trajectories, _known_lanes(places, limits), drivers, period=period)
+
+
+def _lost_on(
+    trajectories: pl.LazyFrame, lanes: pl.DataFrame, drivers: pl.DataFrame, *, period: float
+) -> pl.DataFrame | None:
+    """The same, with lanes as :func:`_known_lanes` has them."""
     import polars as pl
 
     if not set(_NEEDED) <= set(trajectories.collect_schema()):
         return None
-    lanes = _known_lanes(places, limits)
     known = drivers.select("id", "factor", "max_speed").with_row_index("vehicle")
     # Numbers instead of names: there are very many rows.
     rows = (

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from odscen.results.by_place.analysis_times import begins_at
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import polars as pl
 
     from odscen.base.arrays import FloatArray
     from odscen.results.by_place.lane_places import LanePlaces
+
+_Made = TypeVar("_Made")
 
 STOP, ALL_WAY = "s", "w"
 """SUMO's states of connections at a stop sign, and where everybody has to stop."""
@@ -82,8 +86,8 @@ class NetFacts:
     links
         One row for each connection through a junction: ``via`` (its first lane inside), its
         ``state`` (SUMO's letter), whether it ``gives_way`` to other vehicles, whether it leads
-        ``onto_ring`` or comes ``from_ring``, a roundabout, and ``yields_to``: the ``via`` of those
-        that it gives way to.
+        ``onto_ring`` or comes ``from_ring``, a roundabout, ``yields_to``: the ``via`` of those that
+        it gives way to, and its ``turn``: SUMO's letter, mirrored where one drives on the left.
     drivers
         ``id``, ``factor`` on limits, ``max_speed`` (m/s), ``length`` (m), whether a vehicle is
         ``heavy``, and whether it ``serves`` stops.
@@ -91,6 +95,8 @@ class NetFacts:
         ``lane`` and ``following``: lanes, those in junctions included, by which one drives on.
     shapes
         Points of the centre line of each lane, ``(K, 2)``, metres, SUMO's frame.
+    made
+        What :meth:`once` has made; facts of other runs on the same map share it.
     """
 
     limits: pl.DataFrame
@@ -98,10 +104,33 @@ class NetFacts:
     drivers: pl.DataFrame
     follows: pl.DataFrame = field(default_factory=no_links)
     shapes: Mapping[str, FloatArray] = field(default_factory=dict)
+    made: dict[str, tuple[LanePlaces, Any]] = field(default_factory=dict, repr=False)
+
+    def once(self, name: str, places: LanePlaces, make: Callable[[], _Made]) -> _Made:
+        """What follows from the map alone: made by the first run on it, kept for the others.
+
+        Parameters
+        ----------
+        name
+            Of what is made.
+        places
+            Of the map; other places than those it was made with have it made anew.
+        make
+            Makes it, of nothing that a run has of its own.
+        """
+        kept = self.made.get(name)
+        if kept is None or kept[0] is not places:
+            kept = self.made[name] = places, make()
+        found: _Made = kept[1]
+        return found
 
 
 def movement_facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
     """``movement``, ``junction``, ``approach``, ``facility`` of each way through a junction."""
+    return facts.once("movement_facilities", places, lambda: _facilities(places, facts))
+
+
+def _facilities(places: LanePlaces, facts: NetFacts) -> pl.DataFrame:
     import polars as pl
 
     col = pl.col
@@ -146,11 +175,16 @@ def junction_facilities(movements: pl.DataFrame) -> pl.DataFrame:
     """``junction`` and ``facility``, from those of its movements."""
     import polars as pl
 
-    whole = pl.lit(Facility.UNCONTROLLED.value)
-    for of_movement, of_junction in _OF_JUNCTION:
-        there = (pl.col("facility") == of_movement.value).any()
-        whole = pl.when(there).then(pl.lit(of_junction.value)).otherwise(whole)
-    return movements.group_by("junction").agg(facility=whole).sort("junction")
+    kinds: dict[str, set[str]] = {}
+    for junction, kind in movements.select("junction", "facility").rows():
+        kinds.setdefault(junction, set()).add(kind)
+    rows = []
+    for junction, there in sorted(kinds.items()):
+        whole = Facility.UNCONTROLLED
+        for of_movement, of_junction in _OF_JUNCTION:
+            whole = of_junction if of_movement.value in there else whole
+        rows.append((junction, whole.value))
+    return pl.DataFrame(rows, schema={"junction": pl.String, "facility": pl.String}, orient="row")
 
 
 _SOME = (Facility.TWO_WAY_STOP.value, Facility.ROUNDABOUT.value, Facility.UNCONTROLLED.value)
@@ -183,11 +217,7 @@ def passage_sums(
     col = pl.col
     major = movements.filter(col("facility") == Facility.MAJOR.value)
     two_way = junction_facilities(movements).filter(col("facility").is_in(_SOME))
-    timed = (
-        passed.sort("time")
-        .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)
-        .drop_nulls("begin")
-    )
+    timed = passed.with_columns(begins_at(passed["time"], clock)).drop_nulls("begin")
     there = col("junction").is_in(two_way["junction"].implode())
     first = pl.when(col("movement").is_not_null()).then(
         col("movement").is_in(major["movement"].implode())
@@ -226,24 +256,10 @@ def highway_density(
     import polars as pl
 
     col = pl.col
-    motor = places.lanes.filter("motor").join(facts.limits, on="lane")
-    one_way = places.segments.rename({"length": "road"})
-    known = (
-        motor.with_columns(own=col("length") * col("share"))
-        .group_by("segment", "edge")
-        .agg(
-            col("own").first(),
-            metres=col("own").sum(),
-            wide=pl.len() >= 2,
-            fast=col("limit").min() >= HIGHWAY_SPEED,
-        )
-        .join(one_way, on="segment")
-        .with_columns(directions=(col("own").sum().over("segment") / col("road")).round())
-        # Edges one behind the other are one direction.
-        .with_columns(edge_of=pl.when(col("directions") > 1).then("edge").otherwise(pl.lit("")))
-        .filter((col("wide") & col("fast")).all().over("segment", "edge_of"))
-        .with_columns(metres=col("metres").sum().over("segment", "edge_of"))
-    )
+    motor, known = facts.once("highways", places, lambda: _highways(places, facts))
+    # A map without any has no row, and most maps are such.
+    if known.is_empty():
+        return _no_density()
     share = float(facts.drivers["heavy"].mean() or 0.0)  # type: ignore[arg-type]
     rows = lanes.select("lane", "begin", "seconds").join(
         motor.select("lane", "edge", "segment", part="share"), on="lane"
@@ -264,6 +280,48 @@ def highway_density(
         .agg(col("car_seconds").last(), lane_metres=col("metres").last())
         .sort("segment", "begin")
     )
+
+
+def _no_density() -> pl.DataFrame:
+    import polars as pl
+
+    number = pl.Float64
+    return pl.DataFrame(
+        schema={
+            "segment": pl.String, "begin": number, "car_seconds": number, "lane_metres": number,
+        }
+    )  # fmt: skip
+
+
+def _highways(places: LanePlaces, facts: NetFacts) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Lanes for motor vehicles, and the edges of freeways and multilane highways."""
+    import polars as pl
+
+    col = pl.col
+    motor = places.lanes.filter("motor").join(facts.limits, on="lane")
+    one_way = places.segments.rename({"length": "road"})
+    known = (
+        motor.with_columns(own=col("length") * col("share"))
+        .group_by("segment", "edge")
+        .agg(
+            col("own").first(),
+            metres=col("own").sum(),
+            wide=pl.len() >= 2,
+            fast=col("limit").min() >= HIGHWAY_SPEED,
+        )
+        .join(one_way, on="segment")
+        .with_columns(directions=(col("own").sum().over("segment") / col("road")).round())
+        # Edges one behind the other are one direction.
+        .with_columns(edge_of=pl.when(col("directions") > 1).then("edge").otherwise(pl.lit("")))
+        .filter((col("wide") & col("fast")).all().over("segment", "edge_of"))
+        .with_columns(metres=col("metres").sum().over("segment", "edge_of"))
+    )
+    return motor, known
+
+
+def has_highways(places: LanePlaces, facts: NetFacts) -> bool:
+    """Whether the map has freeways or multilane highways, of which density is a figure."""
+    return not facts.once("highways", places, lambda: _highways(places, facts))[1].is_empty()
 
 
 def heavy_share(

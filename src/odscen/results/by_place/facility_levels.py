@@ -119,7 +119,7 @@ def place_level(*, capacity: bool = False) -> pl.Expr:
     ungraded = col("facility").is_in(_UNGRADED).fill_null(value=False)
     enough = (number >= FEWEST) & ~ungraded
     level = pl.when(enough).then(junction_level(delay, col("control")))
-    failed = blocked | over_capacity() if capacity else blocked
+    failed = blocked | (over_capacity() & ~ungraded) if capacity else blocked
     return pl.when(failed).then(pl.lit("F")).otherwise(level)
 
 

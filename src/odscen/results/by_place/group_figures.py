@@ -13,6 +13,7 @@ from odscen.results.by_place.capacity import (
 from odscen.results.by_place.lane_groups import LaneGroups, lane_groups
 from odscen.results.by_place.level_of_service import FEWEST
 from odscen.results.by_place.queue_metres import SUMS, WORST, queue_backs, queue_sums, record_step
+from odscen.results.by_place.unsignalised import unsignalised_sums
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +69,7 @@ def group_sums(
     clock
         ``begin`` and ``end`` of each interval, s.
     programs, states
-        Of the traffic lights, and what they showed; without them there is no capacity.
+        Of the traffic lights, and what they showed; without them there is no capacity at lights.
 
     Returns
     -------
@@ -79,12 +80,18 @@ def group_sums(
 
     groups = lane_groups(places, facts)
     demand = demand_sums(passed, groups, clock)
-    backs = queue_backs(trajectories, groups, facts)
+    step = record_step(trajectories)
+    backs = queue_backs(trajectories, groups, facts, period=step)
     parts = [demand]
     if backs is not None:
-        parts.append(queue_sums(backs, groups, clock, step=record_step(trajectories)))
+        parts.append(queue_sums(backs, groups, clock, step=step))
+    capacity = unsignalised_sums(passed, groups, places, facts, clock)
     if states is not None:
-        parts.append(_capacity(passed, groups, facts, shown_greens(programs, states, clock, facts)))
+        greens = shown_greens(programs, states, clock, facts)
+        capacity = pl.concat(
+            [_capacity(passed, groups, facts, greens), capacity], how="diagonal_relaxed"
+        )
+    parts.append(capacity)
     seen = pl.concat([part.select("lane_group") for part in parts[:2]]).unique()
     table = groups.groups.join(seen, on="lane_group", how="semi").join(clock, how="cross")
     for part in parts:
@@ -95,7 +102,7 @@ def group_sums(
     table = table.with_columns(pl.col(zero).fill_null(0), flow)
     return (
         table.sort("lane_group", "begin").select(no_groups().columns),
-        groups.ways.select("movement", "lane_group").unique("movement", maintain_order=True),
+        groups.of,
     )
 
 
@@ -124,7 +131,10 @@ def group_rates() -> list[pl.Expr]:
 
 
 def over_capacity() -> pl.Expr:
-    """Whether demand exceeds capacity: level F, whatever the delay (HCM Exhibit 19-8)."""
+    """Whether demand exceeds capacity: level F, whatever the delay.
+
+    HCM Exhibits 19-8, 20-2, 21-8 and 22-8.
+    """
     import polars as pl
 
     return ((pl.col("vc") > 1.0) & (pl.col("demand") >= FEWEST)).fill_null(value=False)

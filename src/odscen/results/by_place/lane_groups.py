@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ JOINED = " + "
 """Between the movements in the name of a lane group."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LaneGroups:
     """Lane groups of a map; metres.
 
@@ -45,9 +46,42 @@ class LaneGroups:
     ways: pl.DataFrame
     reach: pl.DataFrame
 
+    @cached_property
+    def first(self) -> pl.DataFrame:
+        """The first group of each ``lane`` on the way.
+
+        ``lane``, ``junction``, ``other`` (its name) and ``ahead_of_other`` (metres).
+        """
+        return (
+            self.reach.sort("lane", "lane_group")
+            .unique("lane", keep="first")
+            .select("lane", "junction", other="lane_group", ahead_of_other="ahead")
+        )
+
+    @cached_property
+    def leads(self) -> pl.DataFrame:
+        """``lane`` and the one ``lane_group`` for which vehicles on it count.
+
+        First lanes inside, and lanes on the way.
+        """
+        import polars as pl
+
+        inside = self.ways.select("lane_group", lane="via")
+        both = [inside, self.first.select("lane", lane_group="other").select("lane_group", "lane")]
+        return pl.concat(both).unique("lane", keep="first")
+
+    @cached_property
+    def of(self) -> pl.DataFrame:
+        """``movement`` and its ``lane_group``."""
+        return self.ways.select("movement", "lane_group").unique("movement", maintain_order=True)
+
 
 def lane_groups(places: LanePlaces, facts: NetFacts) -> LaneGroups:
     """Lane groups of all junctions, from the lanes and connections of the network."""
+    return facts.once("lane_groups", places, lambda: _lane_groups(places, facts))
+
+
+def _lane_groups(places: LanePlaces, facts: NetFacts) -> LaneGroups:
     import polars as pl
 
     text = pl.String

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from odscen.base.stored_files import documents, read_document
+from odscen.base.stored_files import stored_document
 
 if TYPE_CHECKING:
     import polars as pl
@@ -52,9 +53,7 @@ class LanePlaces:
 
     def to_json(self) -> str:
         """One JSON document, columns as lists."""
-        tables = {f.name: getattr(self, f.name).to_dict(as_series=False) for f in fields(self)}
-        data = {"format": _FORMAT, "version": _VERSION, **tables}
-        return json.dumps(data, separators=(",", ":"), allow_nan=False)
+        return _to_json(self)
 
     @classmethod
     def from_json(cls, text: str) -> LanePlaces:
@@ -65,12 +64,7 @@ class LanePlaces:
         InputError
             If it is not such a document of this version.
         """
-        import polars as pl
-
-        what = "the places of lanes"
-        data = read_document(text, form=_FORMAT, version=_VERSION, what=what)
-        with documents(what, pl.exceptions.PolarsError):
-            return cls.of(**{field.name: data[field.name] for field in fields(cls)})
+        return _from_json(text)
 
     @classmethod
     def of(cls, **tables: object) -> LanePlaces:
@@ -84,6 +78,29 @@ class LanePlaces:
                 for name, data in tables.items()
             }
         )
+
+
+@lru_cache(maxsize=4)
+def _to_json(places: LanePlaces) -> str:
+    """One text for all runs on a map."""
+    tables = {f.name: getattr(places, f.name).to_dict(as_series=False) for f in fields(places)}
+    data = {"format": _FORMAT, "version": _VERSION, **tables}
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+
+
+@lru_cache(maxsize=4)
+def _from_json(text: str) -> LanePlaces:
+    """Runs on one map have the same text, and what follows from it is kept with the places."""
+    import polars as pl
+
+    with stored_document(
+        text,
+        pl.exceptions.PolarsError,
+        form=_FORMAT,
+        version=_VERSION,
+        what="the places of lanes",
+    ) as data:
+        return LanePlaces.of(**{field.name: data[field.name] for field in fields(LanePlaces)})
 
 
 def _schemas() -> dict[str, dict[str, type[pl.DataType]]]:

@@ -30,11 +30,11 @@ def positions(rows: pl.DataFrame, facts: NetFacts) -> pl.Series:
 
     lengths = dict(facts.limits.select("lane", "length").rows())
     found = np.zeros(rows.height)
-    numbered = rows.select("lane", "x", "y").with_row_index("row")
-    for (lane,), own in numbered.group_by("lane"):
-        shape = facts.shapes[str(lane)]
-        place = _along(shape, own.select("x", "y").to_numpy())
-        found[own["row"].to_numpy()] = place * lengths[lane]
+    points = np.column_stack([rows["x"].to_numpy(), rows["y"].to_numpy()])
+    by_lane = rows.select("lane").with_row_index("row").group_by("lane").agg("row")
+    for lane, numbers in zip(by_lane["lane"], by_lane["row"], strict=True):
+        own = numbers.to_numpy()
+        found[own] = _along(facts.shapes[lane], points[own]) * lengths[lane]
     return pl.Series("pos", found)
 
 

@@ -40,9 +40,18 @@ WORST = ("queue_metres_p95", "queue_metres_max")
 
 
 def queue_backs(
-    trajectories: pl.LazyFrame, groups: LaneGroups, facts: NetFacts
+    trajectories: pl.LazyFrame,
+    groups: LaneGroups,
+    facts: NetFacts,
+    *,
+    period: float | None = None,
 ) -> pl.DataFrame | None:
     """Distance from the stop line to the back of the queue, for each lane group and moment.
+
+    Parameters
+    ----------
+    period
+        From :func:`record_step`, which is asked if it is not given.
 
     Returns
     -------
@@ -68,18 +77,16 @@ def queue_backs(
         .collect(engine="streaming")
     )
     entered = _entries(trajectories, groups)
-    lengths = dict(facts.limits.select("lane", "length").rows())
+    lengths = facts.limits.select("lane", metres="length")
+    front = pl.col("ahead") + pl.col("metres") - pl.col("pos")
     rows = (
         _grouped(slow.with_columns(positions(slow, facts)), entered, groups)
         .join(facts.drivers.select("id", body="length"), on="id", how="left")
-        .with_columns(
-            front=pl.col("ahead")
-            + pl.col("lane").replace_strict(lengths, return_dtype=pl.Float64)
-            - pl.col("pos")
-        )
-        .with_columns(rear=pl.col("front") + pl.col("body").fill_null(5.0))
+        .join(lengths, on="lane", how="left", maintain_order="left")
+        .with_columns(front=front, rear=front + pl.col("body").fill_null(5.0))
     )
-    queued = _joined(rows, period=record_step(trajectories))
+    step = record_step(trajectories) if period is None else period
+    queued = _joined(rows, period=step)
     return (
         queued.group_by("lane_group", "time")
         .agg(metres=pl.col("rear").max())
@@ -118,27 +125,29 @@ def _grouped(slow: pl.DataFrame, entered: pl.DataFrame, groups: LaneGroups) -> p
     """The lane group of each slow vehicle, and ``ahead``: metres from its lane to the line."""
     import polars as pl
 
-    first = groups.reach.sort("lane", "lane_group").unique("lane", keep="first")
-    of_lane = dict(first.select("lane", "lane_group").rows())
-    at = dict(first.select("lane", "junction").rows())
-    rows = slow.with_columns(junction=pl.col("lane").replace_strict(at, return_dtype=pl.String))
-    found = rows.sort("time").join_asof(
-        entered.rename({"lane_group": "by"}),
-        left_on="time",
-        right_on="then",
-        by=("id", "junction"),
-        strategy="forward",
-        check_sortedness=False,
+    found = (
+        slow.join(groups.first, on="lane", how="left")
+        .sort("time")
+        .join_asof(
+            entered.rename({"lane_group": "by"}),
+            left_on="time",
+            right_on="then",
+            by=("id", "junction"),
+            strategy="forward",
+            check_sortedness=False,
+        )
     )
     reach = groups.reach.select("lane", "lane_group", "ahead")
-    own = found.with_columns(lane_group="by").join(reach, on=("lane", "lane_group"), how="left")
+    leads = pl.col("ahead").is_not_null()
     # On a lane that does not lead there, one has yet to change, and stands in the other's way.
-    other = found.with_columns(
-        lane_group=pl.col("lane").replace_strict(of_lane, return_dtype=pl.String)
-    ).join(reach, on=("lane", "lane_group"), how="left")
-    known = own.filter(pl.col("ahead").is_not_null())
-    rest = other.join(known.select("id", "time"), on=("id", "time"), how="anti")
-    return pl.concat([known, rest.select(known.columns)]).sort("id", "time")
+    return (
+        found.join(reach, left_on=("lane", "by"), right_on=("lane", "lane_group"), how="left")
+        .with_columns(
+            lane_group=pl.when(leads).then("by").otherwise("other"),
+            ahead=pl.coalesce("ahead", "ahead_of_other"),
+        )
+        .sort("id", "time")
+    )
 
 
 def _joined(rows: pl.DataFrame, *, period: float) -> pl.DataFrame:

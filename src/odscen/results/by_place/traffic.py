@@ -38,6 +38,7 @@ service in :mod:`odscen.results.by_place.level_of_service`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Literal, get_args
 
 from odscen.results.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
@@ -50,6 +51,7 @@ from odscen.results.by_place.facility_levels import (
 )
 from odscen.results.by_place.group_figures import (
     GROUP_FIXED,
+    GROUP_RATES,
     GROUP_SUMS,
     GROUP_WORST,
     group_rates,
@@ -79,7 +81,7 @@ _KEYS = ("segment", "movement", "lane_group", "junction", "control", "facility")
 _QUEUES = ("queue_max", "queue_p95")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TrafficFigures:
     """Five tables: one row for each place and interval of time, sorted by place and begin.
 
@@ -132,6 +134,11 @@ class TrafficFigures:
     movements: pl.DataFrame
     lane_groups: pl.DataFrame = field(default_factory=no_groups)
 
+    @cached_property
+    def whole(self) -> dict[TableName, pl.DataFrame]:
+        """Each table over all intervals, from :func:`over_run`."""
+        return {name: over_run(getattr(self, name)) for name in TABLES}
+
 
 def traffic_figures(
     lanes: pl.DataFrame,
@@ -141,6 +148,7 @@ def traffic_figures(
     queues: pl.DataFrame | None = None,
     facilities: FacilityData | None = None,
     times: AnalysisTimes = WHOLE_RUN,
+    clock: pl.DataFrame | None = None,
 ) -> TrafficFigures:
     """Figures of one run.
 
@@ -157,14 +165,18 @@ def traffic_figures(
         the delay of the lane data, and no road is a highway.
     times
         What is analysed; queues and facilities are of the same intervals.
+    clock
+        Intervals that ``lanes`` have been summed up over; made of ``times`` if not given.
 
     Raises
     ------
     InputError
         If an interval of the lane data lies in two of those.
     """
-    clock = times.clock(lanes, end=end)
-    lanes = summable(on_clock(lanes, clock))
+    if clock is None:
+        clock = times.clock(lanes, end=end)
+        lanes = on_clock(lanes, clock)
+    lanes = summable(lanes)
     segments = segment_sums(lanes, clock, places)
     junctions = _with_queues(junction_sums(lanes, clock, places), queues)
     movements = movement_sums(lanes, clock, places)
@@ -185,66 +197,90 @@ def traffic_figures(
 
 def over_run(table: pl.DataFrame) -> pl.DataFrame:
     """One of the tables with one row for each place, over all intervals."""
+    keys, whole = _over_run(tuple(table.columns))
+    if keys:
+        return _with_rates(table.group_by(keys, maintain_order=True).agg(whole))
+    return _with_rates(table.select(whole).with_columns(vehicles="departed"))
+
+
+@lru_cache(maxsize=32)
+def _over_run(columns: tuple[str, ...]) -> tuple[list[str], list[pl.Expr]]:
+    """Columns that name a place, and what the others come to over all intervals."""
     import polars as pl
 
-    keys = [key for key in _KEYS if key in table.columns]
+    keys = [key for key in _KEYS if key in columns]
     summed = (*SUMS, "departed", "arrived", *CONTROL, "car_seconds", *GROUP_SUMS)
-    sums = [name for name in summed if name in table.columns]
+    sums = [name for name in summed if name in columns]
     added = [
         pl.when(pl.col(name).count() > 0).then(pl.col(name).sum()).alias(name) for name in sums
     ]
-    whole = [pl.col("begin").min(), pl.col("end").max(), *added]
     greatest = ("length", *_QUEUES, *GROUP_WORST, *GROUP_FIXED, "lane_metres")
-    whole += [pl.col(name).max() for name in greatest if name in table.columns]
-    found = (
-        table.group_by(keys, maintain_order=True).agg(whole)
-        if keys
-        else table.select(whole).with_columns(vehicles="departed")
-    )
-    return _with_rates(found)
+    highest = [pl.col(name).max() for name in greatest if name in columns]
+    return keys, [pl.col("begin").min(), pl.col("end").max(), *added, *highest]
 
 
 def _with_rates(sums: pl.DataFrame) -> pl.DataFrame:
     """Everything that is a quotient of sums, and the columns in their order."""
     import polars as pl
 
+    rates, more, order = _rates(tuple(sums.columns))
+    found = sums.with_columns(rates)
+    found = found.with_columns(more) if more else found
+    return pl.DataFrame([found[name] for name in order])
+
+
+@lru_cache(maxsize=32)
+def _rates(columns: tuple[str, ...]) -> tuple[list[pl.Expr], list[pl.Expr], list[str]]:
+    """Quotients, what follows from them, and all columns in their order.
+
+    Making the expressions takes longer than computing them for the places of a small map.
+    """
+    import polars as pl
+
     col = pl.col
-    first = [*(key for key in _KEYS if key in sums.columns), *INTERVAL]
-    if "saturation_flow" in sums.columns:
-        return sums.with_columns(group_rates()).select(*first, pl.exclude(first))
-    seconds = col("end") - col("begin")
-    per_vehicle = pl.when(col("vehicles") > 0)
-    hours_km = seconds / 3600.0 * col("length")
-    driving = pl.when(col("distance") > 0)
-    rates = sums.with_columns(
-        flow=col("distance") / 1000.0 / hours_km,
-        density=col("seconds") / 3600.0 / hours_km,
-        speed=pl.when(col("seconds") > 0).then(col("distance") / col("seconds")),
-        delay=per_vehicle.then(col("time_loss") / col("vehicles")),
-        waiting=per_vehicle.then(col("standing_seconds") / col("vehicles")),
-        standing=col("standing_seconds") / seconds,
-    )
-    if "junction" in sums.columns:
-        rates = rates.with_columns(
-            control_delay=pl.when(col("passages") > 0).then(
-                col("control_seconds") / col("passages")
-            )
-        )
-        if "movement" in sums.columns:
-            rates = rates.with_columns(group_rates()).with_columns(level=place_level(capacity=True))
+    rates: dict[str, pl.Expr] = {}
+    more: dict[str, pl.Expr] = {}
+    of_groups = dict(zip(GROUP_RATES, group_rates(), strict=True))
+    if "saturation_flow" not in columns:
+        seconds = col("end") - col("begin")
+        per_vehicle = pl.when(col("vehicles") > 0)
+        hours_km = seconds / 3600.0 * col("length")
+        driving = pl.when(col("distance") > 0)
+        rates = {
+            "flow": col("distance") / 1000.0 / hours_km,
+            "density": col("seconds") / 3600.0 / hours_km,
+            "speed": pl.when(col("seconds") > 0).then(col("distance") / col("seconds")),
+            "delay": per_vehicle.then(col("time_loss") / col("vehicles")),
+            "waiting": per_vehicle.then(col("standing_seconds") / col("vehicles")),
+            "standing": col("standing_seconds") / seconds,
+        }
+    if "saturation_flow" in columns:
+        rates |= of_groups
+    elif "junction" in columns:
+        share = col("control_seconds") / col("passages")
+        rates["control_delay"] = pl.when(col("passages") > 0).then(share)
+        if "movement" in columns:
+            rates |= of_groups
+            more["level"] = place_level(capacity=True)
         else:
-            rates = rates.with_columns(level=place_level(), throughput="vehicles")
-    elif "segment" in sums.columns:
+            more = {"level": place_level(), "throughput": col("vehicles")}
+    elif "segment" in columns:
         metres = col("length") * 1000.0
         free_seconds = col("seconds") - col("time_loss")
-        rates = rates.with_columns(
-            travel_time=driving.then(metres * col("seconds") / col("distance")),
-            free_flow_time=driving.then(metres * free_seconds / col("distance")),
-            lane_density=col("car_seconds") / 3.6 / (seconds / 3600.0) / col("lane_metres"),
-        ).with_columns(level=segment_level(free_seconds))
+        rates["travel_time"] = driving.then(metres * col("seconds") / col("distance"))
+        rates["free_flow_time"] = driving.then(metres * free_seconds / col("distance"))
+        hours = seconds / 3600.0
+        rates["lane_density"] = col("car_seconds") / 3.6 / hours / col("lane_metres")
+        more["level"] = segment_level(free_seconds)
     else:
-        rates = rates.with_columns(running=col("seconds") / seconds)
-    return rates.select(*first, pl.exclude(first))
+        rates["running"] = col("seconds") / seconds
+    first = (*(key for key in _KEYS if key in columns), *INTERVAL)
+    order = dict.fromkeys((*first, *columns, *rates, *more))
+    return (
+        [value.alias(name) for name, value in rates.items()],
+        [value.alias(name) for name, value in more.items()],
+        list(order),
+    )
 
 
 def _with_queues(junctions: pl.DataFrame, queues: pl.DataFrame | None) -> pl.DataFrame:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -157,6 +158,7 @@ def _came_in() -> pl.Expr:
     return pl.when(first).then("entered").otherwise(0) + pl.col("departed")
 
 
+@lru_cache(maxsize=16)
 def _sum(*names: str) -> Sequence[pl.Expr]:
     import polars as pl
 

@@ -37,7 +37,9 @@ def _fuel_per_km(values: Mapping[str, Any]) -> str:
 
 def _co2_in_all(values: Mapping[str, Any]) -> str:
     total = values.get("co2_total")
-    return "" if total is None else f"{total:,.0f} kg in all"
+    if total is None:
+        return ""
+    return f"{total:,.0f} kg in all" if total >= 10.0 else f"{total * 1000.0:,.0f} g in all"
 
 
 FIGURES = (

@@ -7,7 +7,6 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.units import in_unit
 
 if TYPE_CHECKING:
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.results.by_place.parking_use import ParkingUse
     from odscen.results.by_place.traffic import TableName, TrafficFigures
     from odscen.results.measures.summary import ActorOutcome
 
@@ -42,6 +42,7 @@ class Basis(StrEnum):
     CONFLICTS = "conflicts"
     SIGNALS = "signals"
     STOPS = "stops"
+    PARKING = "parking"
 
 
 class SummaryPart(StrEnum):
@@ -60,6 +61,7 @@ class ReportSection(StrEnum):
     CONFLICTS = "conflicts"
     SIGNALS = "traffic lights"
     TRANSIT = "public transport"
+    PARKING = "parking"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +107,8 @@ class RunData:
     visits
         One row per visit of a stop, from :func:`odscen.sumo.folder.recorded.read_visits`; ``None``
         if the scenario has no lines of public transport.
+    parking
+        Use of parking areas; ``None`` if no trip parks.
     stations
         From :func:`odscen.results.by_place.station_figures.station_figures`; ``None`` if the study
         has none, or trajectories were not recorded.
@@ -118,6 +122,12 @@ class RunData:
     signals: pl.DataFrame | None = None
     visits: pl.DataFrame | None = None
     stations: pl.DataFrame | None = None
+    parking: ParkingUse | None = None
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What figures have been computed, and what several of them are made of, by name."""
+        return {}
 
     @cached_property
     def vehicles(self) -> Sequence[ActorOutcome]:
@@ -132,7 +142,7 @@ class RunData:
     @cached_property
     def network(self) -> Mapping[str, Any]:
         """The network's row over the whole run, see :class:`TrafficFigures`; empty without."""
-        return {} if self.traffic is None else over_run(self.traffic.network).row(0, named=True)
+        return {} if self.traffic is None else self.traffic.whole["network"].row(0, named=True)
 
     def has(self, basis: Basis) -> bool:
         """Whether the run has recorded it."""
@@ -143,6 +153,7 @@ class RunData:
             Basis.CONFLICTS: self.conflicts is not None,
             Basis.SIGNALS: self.signals is not None,
             Basis.STOPS: self.visits is not None,
+            Basis.PARKING: self.parking is not None,
         }[basis]
 
 

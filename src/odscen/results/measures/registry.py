@@ -57,7 +57,7 @@ COLUMN_UNITS = {column.name: column.unit for column in table_columns.COLUMNS}
 
 COUNTS = tuple(figure.name for figure in RUN_FIGURES if figure.count)
 
-_ON_DEMAND = (Basis.CONFLICTS, Basis.STOPS)
+_ON_DEMAND = (Basis.CONFLICTS, Basis.STOPS, Basis.PARKING)
 
 _BY_NAME: dict[tuple[FigureKind, str], Figure] = {
     (figure.kind, figure.name): figure for figure in ALL_FIGURES
@@ -106,7 +106,14 @@ def figure_values(
     measured on demand, and of public transport, which few scenarios have, are left out.
     """
     return {
-        figure.name: figure.compute(data) if data.has(figure.basis) else None
+        figure.name: _value(data, figure) if data.has(figure.basis) else None
         for figure in figures
         if figure.part is part and (figure.basis not in _ON_DEMAND or data.has(figure.basis))
     }
+
+
+def _value(data: RunData, figure: RunFigure) -> float | int | None:
+    if figure.name not in data.kept:
+        data.kept[figure.name] = figure.compute(data)
+    value: float | int | None = data.kept[figure.name]
+    return value

@@ -17,17 +17,25 @@ if TYPE_CHECKING:
     from odscen.results.measures.figure import RunData
 
 _FHWA = "FHWA-HOP-06-070"
+_RATIOS = "travel time over free-flow time"
 _RATIO = Display("", digits=2)
 
 
 def _ratios(run: RunData) -> pl.Series:
+    if _RATIOS not in run.kept:
+        run.kept[_RATIOS] = _of_trips(run.trips)
+    ratios: pl.Series = run.kept[_RATIOS]
+    return ratios
+
+
+def _of_trips(trips: pl.DataFrame | None) -> pl.Series:
     import polars as pl
 
-    if run.trips is None:
+    if trips is None:
         return pl.Series(dtype=pl.Float64)
-    free = pl.col("duration") - pl.col("time_loss")
-    driven = ~pl.col("person") & pl.col("arrival").is_not_null() & (free > 0)
-    return run.trips.filter(driven).select(x=pl.col("duration") / free)["x"]
+    free = trips["duration"] - trips["time_loss"]
+    driven = ~trips["person"] & trips["arrival"].is_not_null() & (free > 0)
+    return (trips["duration"] / free).filter(driven)
 
 
 def _mean_ratio(run: RunData) -> float | None:

@@ -183,19 +183,21 @@ def _approaches(programs: Sequence[LightProgram], ways: pl.DataFrame) -> pl.Data
     """Lanes on the way to each light."""
     import polars as pl
 
-    lights = pl.DataFrame(
-        [(lanes[0], light.id) for light, group in _groups(programs) for lanes in group.lanes],
-        schema={"source": pl.String, "light": pl.String},
-        orient="row",
-    ).unique()
-    last = (
-        ways.select("lane", "approach")
-        .join(lights, left_on="lane", right_on="source")
-        .select("approach", "light")
-        .unique()
-    )
-    before = ways.filter(pl.col("movement").is_null()).select("lane", "approach")
-    return before.join(last, on="approach").select("lane", "light").unique()
+    edges: dict[str, set[str]] = {}
+    lanes: dict[str, set[str]] = {}
+    for lane, edge, movement in ways.select("lane", "approach", "movement").rows():
+        edges.setdefault(lane, set()).add(edge)
+        if movement is None:
+            lanes.setdefault(edge, set()).add(lane)
+    found = {
+        (lane, light.id)
+        for light, group in _groups(programs)
+        for first in group.lanes
+        for edge in edges.get(first[0], ())
+        for lane in lanes.get(edge, ())
+    }
+    schema = {"lane": pl.String, "light": pl.String}
+    return pl.DataFrame(sorted(found), schema=schema, orient="row")
 
 
 def _used(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
@@ -203,35 +205,65 @@ def _used(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     keys = ["light", "group"]
-    late = (
-        passed.filter(pl.col("stopped").is_not_null() & (pl.col("stopped") < pl.col("passed")))
-        .join(greens, on=keys)
-        .filter((pl.col("stopped") < pl.col("begin")) & (pl.col("end") < pl.col("passed")))
-        .select(*keys, "number")
-        .unique()
+    shown = {
+        (light, group): (begins, ends)
+        for light, group, begins, ends in greens.sort("begin")
         .group_by(keys)
-        .agg(cycle_failures=pl.len())
-    )
-    vehicles = passed.group_by(keys).agg(vehicles=pl.len())
-    during = (
-        greens.join(passed.select(*keys, "passed"), on=keys)
-        .filter((pl.col("passed") >= pl.col("begin")) & (pl.col("passed") < pl.col("end")))
-        .select(*keys, "number", pl.col("passed").alias("at"))
-    )
-    marks = pl.concat(
-        [
-            greens.select(*keys, "number", at="begin"),
-            during,
-            greens.select(*keys, "number", at="end"),
-        ]
-    ).sort(*keys, "number", "at")
-    gaps = marks.with_columns(gap=pl.col("at").diff().over(*keys, "number"))
-    unused = gaps.group_by(keys).agg(
-        unused_green=(pl.col("gap") - PASSING).clip(0.0).fill_null(0.0).sum()
-    )
-    return vehicles.join(late, on=keys, how="full", coalesce=True).join(
-        unused, on=keys, how="full", coalesce=True
-    )
+        .agg("begin", "end")
+        .rows()
+    }
+    seen = {
+        (light, group): (times, stopped)
+        for light, group, times, stopped in passed.sort("passed")
+        .group_by(keys)
+        .agg("passed", "stopped")
+        .rows()
+    }
+    rows = []
+    for key in sorted({*shown, *seen}):
+        times, stopped = seen.get(key, ([], []))
+        rows.append((*key, len(times), *_of_greens(*shown.get(key, ([], [])), times, stopped)))
+    names = dict.fromkeys(keys, pl.String)
+    numbers = {"vehicles": pl.Int64, "cycle_failures": pl.Int64, "unused_green": pl.Float64}
+    return pl.DataFrame(rows, schema={**names, **numbers}, orient="row")
+
+
+def _of_greens(
+    begins: Sequence[float],
+    ends: Sequence[float],
+    times: Sequence[float],
+    stopped: Sequence[float | None],
+) -> tuple[int, float]:
+    """Greens that did not clear the queue, and seconds of green in which nobody passed.
+
+    Parameters
+    ----------
+    begins, ends
+        Of the greens of a group, ascending.
+    times, stopped
+        When each vehicle passed, ascending, and when it was stopped before.
+    """
+    import numpy as np
+
+    begin, end, at = (np.asarray(some, dtype=np.float64) for some in (begins, ends, times))
+    since = np.array([np.inf if one is None else one for one in stopped], dtype=np.float64)
+    # A vehicle waits through the greens that begin after its stop and end before it passes.
+    first = np.searchsorted(begin, since, side="right")
+    last = np.searchsorted(end, at, side="left")
+    some = last > first
+    change = np.zeros(len(begin) + 1, dtype=np.int64)
+    np.add.at(change, first[some], 1)
+    np.add.at(change, last[some], -1)
+    failed = int(np.sum(np.cumsum(change) > 0))
+    number = np.searchsorted(begin, at, side="right") - 1
+    inside = number >= 0
+    inside[inside] = at[inside] < end[number[inside]]
+    which = np.arange(len(begin))
+    marks = np.concatenate([begin, at[inside], end])
+    of = np.concatenate([which, number[inside], which])
+    order = np.lexsort((marks, of))
+    gaps = np.diff(marks[order])[np.diff(of[order]) == 0]
+    return failed, float(np.clip(gaps - PASSING, 0.0, None).sum())
 
 
 def write_signal_use(table: pl.DataFrame, folder: Path) -> None:
@@ -270,9 +302,9 @@ def read_signal_use_table(file: Path) -> pl.DataFrame:
 def _share(run: RunData, part: str, whole: str) -> float | None:
     if run.signals is None:
         return None
-    known = run.signals.filter(run.signals["vehicles"].is_not_null())
-    total = float(known[whole].sum())
-    return float(known[part].sum()) / total if total else None
+    known = run.signals["vehicles"].is_not_null()
+    total = float(run.signals[whole].filter(known).sum())
+    return float(run.signals[part].filter(known).sum()) / total if total else None
 
 
 FIGURES = (

@@ -7,12 +7,12 @@ seed.
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.base.json_text import indented
 from odscen.base.stored_files import typed_rows
 from odscen.results.records.outcomes import ActorStatus
 from odscen.results.records.run_records import (
@@ -197,6 +197,8 @@ def _outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOu
     departure, arrival = history.departure, history.arrival
     status = _status(history)
     inserted = departure.time if departure else None
+    # Who appears by a rule is due when it does, and not before.
+    depart = inserted if actor.appears and inserted is not None else actor.depart
     travel_time = arrival.travel_time if arrival else None
     mean_speed = None
     if travel_time and actor.route_length is not None:
@@ -210,9 +212,9 @@ def _outcome(actor: PlannedActor, history: _ActorHistory, trip: Trip) -> ActorOu
         spawn=actor.spawn,
         goal=actor.goal,
         status=status,
-        depart=actor.depart,
+        depart=depart,
         inserted=inserted,
-        depart_delay=None if inserted is None else inserted - actor.depart,
+        depart_delay=None if inserted is None else inserted - depart,
         insertion_error=departure.error if departure else None,
         arrived=arrival.time if arrival else None,
         travel_time=travel_time,
@@ -258,4 +260,4 @@ def actors_from_json(text: str) -> tuple[ActorOutcome, ...]:
 
 def summary_to_json(summary: Mapping[str, Any]) -> str:
     """``summary.json``; NaN and infinity are refused."""
-    return json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return indented(summary, indent=2, ensure_ascii=False) + "\n"

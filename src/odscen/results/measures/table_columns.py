@@ -77,7 +77,8 @@ COLUMNS = (
         "capacity",
         "veh",
         "at lights: what the greens shown let through, by the saturation flow of its lanes, "
-        "permitted turns by the gaps of those they give way to. Null without lights",
+        "permitted turns by the gaps of those they give way to; without: what those they give way "
+        "to leave, by HCM chapters 20 to 22. Null for those who give way to none",
     ),
     _column("vc", "", "demand / capacity; null in intervals below 300 s"),
     _column(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.results.by_place.traffic import over_run
 from odscen.results.measures.figure import CLOCK, Basis, Better, Display, ReportSection, RunFigure
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ def _worst_junction_delay(run: RunData) -> float | None:
 
     if run.traffic is None:
         return None
-    junctions = over_run(run.traffic.junctions)
+    junctions = run.traffic.whole["junctions"]
     entered = junctions.filter(junctions["vehicles"] >= LEAST_VEHICLES)
     control = pl.when(pl.col("passages") >= LEAST_VEHICLES).then("control_delay")
     shown = control if entered["passages"].count() else pl.col("delay")

@@ -1,4 +1,4 @@
-"""How well lines of public transport keep to their timetable."""
+"""How well lines keep to their timetable, and how full parking places are."""
 
 from __future__ import annotations
 
@@ -61,6 +61,18 @@ def _on_time(run: RunData) -> float | None:
     return _number((lateness(run.visits)["late"] <= LATE).mean())
 
 
+def _parked(run: RunData) -> float | None:
+    return None if run.parking is None else float(run.parking.use().ended)
+
+
+def _diverted(run: RunData) -> float | None:
+    return None if run.parking is None else float(run.parking.use().diverted)
+
+
+def _occupancy(run: RunData) -> float | None:
+    return None if run.parking is None else run.parking.use().occupancy
+
+
 def _number(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
@@ -102,5 +114,41 @@ FIGURES = (
         display=Display("%", 100.0, 1),
         section=ReportSection.TRANSIT,
         compute=_on_time,
+    ),
+    RunFigure(
+        name="parked_trips",
+        unit="",
+        label="trips ended in a parking place",
+        definition="Trips that ended by taking a parking place.",
+        source="SUMO stop output",
+        better=Better.HIGHER,
+        basis=Basis.PARKING,
+        display=Display("", digits=0),
+        section=ReportSection.PARKING,
+        compute=_parked,
+    ),
+    RunFigure(
+        name="parking_diverted",
+        unit="",
+        label="trips diverted to other parking",
+        definition="Trips that ended in another parking area than planned, as that was full.",
+        source="SUMO stop output, against the plan of the run",
+        better=Better.LOWER,
+        basis=Basis.PARKING,
+        display=Display("", digits=0),
+        section=ReportSection.PARKING,
+        compute=_diverted,
+    ),
+    RunFigure(
+        name="parking_occupancy",
+        unit="",
+        label="parking occupancy",
+        definition="Mean share of the parking places of the region that were taken.",
+        source="SUMO stop output",
+        better=Better.NEITHER,
+        basis=Basis.PARKING,
+        display=Display("%", 100.0, 1),
+        section=ReportSection.PARKING,
+        compute=_occupancy,
     ),
 )

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.base.stored_files import documents, read_document, tables
+from odscen.base.json_text import indented
+from odscen.base.stored_files import stored_document, tables
 from odscen.results.by_place.facility_levels import with_missing
-from odscen.results.by_place.traffic import TABLES, TrafficFigures, over_run
+from odscen.results.by_place.traffic import TABLES, TrafficFigures
 from odscen.results.measures.figure import Basis
 from odscen.results.measures.registry import COLUMN_UNITS, RUN_FIGURES, figure_values
 from odscen.results.measures.table_columns import COLUMNS
@@ -100,9 +100,13 @@ def places_from_json(text: str, table: TableName) -> pl.DataFrame:
     """
     import polars as pl
 
-    what = "figures of a run"
-    data = read_document(text, form=FIGURES_FORMAT, version=VERSION, what=what)
-    with documents(what, pl.exceptions.PolarsError):
+    with stored_document(
+        text,
+        pl.exceptions.PolarsError,
+        form=FIGURES_FORMAT,
+        version=VERSION,
+        what="figures of a run",
+    ) as data:
         rows = data.get(table, ()) if table == "lane_groups" else data[table]
         return pl.DataFrame(rows, schema=_schema(rows[0] if rows else ()))
 
@@ -125,15 +129,14 @@ def figures_json(data: RunData, figures: TrafficFigures) -> str:
     shown = [figure for figure in RUN_FIGURES if figure.basis is not Basis.ACTORS]
     of_run = figure_values(data, shown)
     units = {figure.name: figure.unit for figure in shown if figure.name in of_run}
-    tables = {name: over_run(getattr(figures, name)) for name in TABLES}
     content: dict[str, Any] = {
         "format": FIGURES_FORMAT,
         "version": VERSION,
         "units": {"run": units, "tables": COLUMN_UNITS},
         "run": rounded(of_run),
-        **{name: _short(table).to_dicts() for name, table in tables.items()},
+        **{name: _short(table).to_dicts() for name, table in figures.whole.items()},
     }
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+    return indented(content, indent=1) + "\n"
 
 
 def _short(table: pl.DataFrame) -> pl.DataFrame:

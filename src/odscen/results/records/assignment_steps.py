@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from odscen.base.stored_files import documents, read_document, typed_rows
+from odscen.base.stored_files import stored_document, typed_rows
 from odscen.results.records.run_records import json_with_rows
 
 ASSIGNMENT_FORMAT = "odscen-assignment"
@@ -77,9 +77,9 @@ class Assignment:
         InputError
             If it is not an assignment of this version.
         """
-        what = "an assignment of routes"
-        data = read_document(text, form=ASSIGNMENT_FORMAT, version=VERSION, what=what)
-        with documents(what):
+        with stored_document(
+            text, form=ASSIGNMENT_FORMAT, version=VERSION, what="an assignment of routes"
+        ) as data:
             steps = tuple(map(_STEP, data["steps"]))
             return cls(float(data["wanted"]), int(data["used"]), steps)
 

@@ -7,12 +7,13 @@ without asking SUMO.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
+from functools import lru_cache
 from itertools import pairwise
 from math import dist
 from typing import NamedTuple
 
-from odscen.base.stored_files import documents, read_document
+from odscen.base.stored_files import stored_document
 
 _FORMAT = "odscen-signals"
 _VERSION = 1
@@ -162,10 +163,16 @@ def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
 
 def programs_to_json(programs: tuple[LightProgram, ...]) -> str:
     """One JSON document."""
-    data = {"format": _FORMAT, "version": _VERSION, "lights": [asdict(one) for one in programs]}
-    return json.dumps(data, separators=(",", ":"), allow_nan=False)
+    data = {"format": _FORMAT, "version": _VERSION, "lights": programs}
+    return json.dumps(data, default=_fields, separators=(",", ":"), allow_nan=False)
 
 
+def _fields(one: LightProgram | ShownGroup | ShownPlan | ShownDetector) -> dict[str, object]:
+    """What ``asdict`` gives, one level; it would copy each text."""
+    return {field.name: getattr(one, field.name) for field in fields(one)}
+
+
+@lru_cache(maxsize=8)
 def programs_from_json(text: str) -> tuple[LightProgram, ...]:
     """Inverse of :func:`programs_to_json`.
 
@@ -174,9 +181,9 @@ def programs_from_json(text: str) -> tuple[LightProgram, ...]:
     InputError
         If it is not such a document of this version.
     """
-    what = "the programs of lights"
-    data = read_document(text, form=_FORMAT, version=_VERSION, what=what)
-    with documents(what):
+    with stored_document(
+        text, form=_FORMAT, version=_VERSION, what="the programs of lights"
+    ) as data:
         return tuple(_light(light) for light in data["lights"])
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import orjson
 
-from odscen.base.stored_files import documents, read_document, typed_rows
+from odscen.base.stored_files import stored_document, typed_rows
 from odscen.results.records.planned_stations import PlannedStation
 
 if TYPE_CHECKING:
@@ -54,6 +54,11 @@ class PlannedActor:
         Why it is not in the SUMO files, if it is not.
     informed
         Whether it looks for quicker routes on the way.
+    begins_in, ends_in
+        Parking areas of its trip: ``depart`` is when it is to leave its place, and it has arrived
+        when it takes one.
+    appears
+        Whether a rule lets it appear; until then it is not due, and ``depart`` is the run's end.
     """
 
     id: str
@@ -76,6 +81,9 @@ class PlannedActor:
     ego: bool = False
     problem: str | None = None
     informed: bool = False
+    begins_in: str | None = None
+    ends_in: str | None = None
+    appears: bool = False
 
     @property
     def person(self) -> bool:
@@ -96,6 +104,22 @@ class PlannedMeasure:
     begin: float
     end: float
     lines: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedParking:
+    """A parking area: its segment, how many places it has, and where its middle is, metres."""
+
+    id: str
+    segment: str
+    places: int
+    x: float
+    y: float
+
+
+def begin_area(area: str) -> str:
+    """Id by which SUMO knows the places of a parking area that trips begin in."""
+    return f"{area}.begin"
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +159,10 @@ class Plan:
         Time of day at its start, s after midnight; 0 if the scenario has none.
     stations
         Of its study.
+    parking
+        Areas, where trips park.
+    criteria
+        Of the scenario: what must come out for the run to pass.
     """
 
     scenario: str
@@ -152,6 +180,8 @@ class Plan:
     interval: float | None = None
     clock: float = 0.0
     stations: tuple[PlannedStation, ...] = ()
+    parking: tuple[PlannedParking, ...] = ()
+    criteria: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
@@ -176,6 +206,8 @@ class Plan:
             "clock": self.clock,
         }
         said["stations"] = [asdict(one) for one in self.stations]
+        said["parking"] = [asdict(one) for one in self.parking]
+        said["criteria"] = list(self.criteria)
         head |= {name: value for name, value in said.items() if value}
         return json_with_rows(head, "actors", [_without_defaults(actor) for actor in self.actors])
 
@@ -188,15 +220,17 @@ class Plan:
         InputError
             If it is not a plan of this version.
         """
-        what = "a plan of a run"
-        data = read_document(text, form=PLAN_FORMAT, version=VERSION, what=what)
-        with documents(what):
+        with stored_document(
+            text, form=PLAN_FORMAT, version=VERSION, what="a plan of a run"
+        ) as data:
             x, y = data["net_offset"]
             data["net_offset"] = (float(x), float(y))
             data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
             data["measures"] = _nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
             data["closed"] = _nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
             data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
+            data["parking"] = tuple(map(_PLANNED_PARKING, data.get("parking", ())))
+            data["criteria"] = tuple(data.get("criteria", ()))
             return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
 
 
@@ -209,6 +243,7 @@ def _nested(
 
 _PLANNED_ACTOR = typed_rows(PlannedActor)
 _PLANNED_MEASURE = typed_rows(PlannedMeasure)
+_PLANNED_PARKING = typed_rows(PlannedParking)
 _CLOSED_PERIOD = typed_rows(ClosedPeriod)
 _PLAN = typed_rows(Plan)
 
@@ -354,9 +389,7 @@ def rows_from_json(
     InputError
         If the text has another format or version, or rows that ``make`` cannot take.
     """
-    what = f"a list of {key}"
-    data = read_document(text, form=form, version=VERSION, what=what)
-    with documents(what):
+    with stored_document(text, form=form, version=VERSION, what=f"a list of {key}") as data:
         return tuple(map(make, data[key]))
 
 

@@ -108,11 +108,17 @@ def time_axis(end: float) -> Axis:
 
 
 def clock_axis(begin: float, end: float) -> Axis:
-    """Axis of a stretch of the run, labelled ``17:15``: of day, or since the start."""
+    """Axis of a stretch of the run, labelled ``17:15``: of day, or since the start.
+
+    Within the first hour without a clock the labels are minutes.
+    """
     steps = (1, 2, 5, 10, 15, 30, 60, 120, 180, 360)
     step = next((60.0 * one for one in steps if end - begin <= one * 540.0), 43_200.0)
     first = np.ceil(begin / step - 1e-9) * step
     values = np.arange(first, end + 1e-6, step).tolist()
+    if not has_clock() and end <= 3600.0:
+        minutes = [(value, f"{value / 60.0:.0f}") for value in values]
+        return Axis(begin, end, minutes, "time since the start, min")
     name = "time of day" if has_clock() else "time since the start, h:min"
     return Axis(begin, end, [(value, time_words(value)) for value in values], name)
 

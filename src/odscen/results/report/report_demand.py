@@ -102,8 +102,19 @@ MOST_ROWS = 200
 """Counts that are not met that the table names."""
 
 
-def counts_section(counts: Sequence[ShownCount], *, heading: str, rmse: float) -> Markup:
-    """Scatter plot of counts and traffic, and a row for each count that is not met."""
+def counts_section(
+    counts: Sequence[ShownCount], *, heading: str, rmse: float, hours: tuple[int, int] = (0, 0)
+) -> Markup:
+    """Scatter plot of counts and traffic, and a row for each count that is not met.
+
+    Parameters
+    ----------
+    rmse
+        Root of the mean squared difference, vehicles.
+    hours
+        How many whole hours of a place are within GEH 5, and how many there are, if slices of
+        counts make up hours.
+    """
     missed = [one for one in counts if one.geh > GOOD_GEH]
     met = len(counts) - len(missed)
     share = met / len(counts) if counts else 0.0
@@ -111,6 +122,9 @@ def counts_section(counts: Sequence[ShownCount], *, heading: str, rmse: float) -
         f"{met:,} of {len(counts):,} counts are within GEH 5 ({share:.1%}); the root of the mean "
         f"squared difference is {rmse:.1f} vehicles. On the line traffic is what was counted."
     )
+    good, there = hours
+    if there:
+        explained += f" Of the whole hours, {good:,} of {there:,} are ({good / there:.1%})."
     heads = ("Place", "From, s", "To, s", "Counted", "Traffic", "GEH", "Why not")
     worst = sorted(missed, key=lambda one: (-one.geh, one.place, one.begin))[:MOST_ROWS]
     table = html_table(heads, [_count_row(one) for one in worst], label="Counts not met")

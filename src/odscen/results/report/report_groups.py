@@ -45,9 +45,9 @@ def group_section(groups: pl.DataFrame) -> Markup | None:
     )
     explained = (
         "a lane group is what the Highway Capacity Manual analyses as one: the lanes of an "
-        "approach that share a movement. v/c is demand over capacity, at traffic lights; above 1 "
-        "the level of service is F. A queue reaches from the stop line to the rear of its last "
-        "vehicle. "
+        "approach that share a movement. v/c is demand over capacity, of those who give way or "
+        "have a light; above 1 the level of service is F. A queue reaches from the stop line to "
+        "the rear of its last vehicle. "
         "Over storage: the share of the time in which it is longer than the lanes of the group; "
         "spillback: in which it reaches the junction behind, or the edge of the map. The 95th "
         "percentile is that of the worst interval."

@@ -14,6 +14,7 @@ from odscen.results.records.run_records import EventKind
 from odscen.results.records.traces import speed_by_place, thinned_paths
 from odscen.results.report.report_incidents import incident_rings
 from odscen.results.report.report_measures import measure_layer
+from odscen.results.report.report_parking import parking_layer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -93,6 +94,7 @@ def run_map(
     layers.append(_speed_layer(speed_by_place(vehicles)))
     layers.append(_path_layer(paths, actors, dot))
     layers.append(_mark_layer(paths, spawns, events, dot))
+    layers += [areas] if (areas := parking_layer(plan.parking, extent / 400.0)) else []
     layers += [shown] if (shown := measure_layer(plan.measures, extent / 400.0)) else []
     layers += [rings] if (rings := incident_rings(incidents, extent / 400.0)) else []
     svg = element(

@@ -86,6 +86,30 @@ def expectation_table(expectations: Sequence[Mapping[str, Any]]) -> Markup | Non
     return report_section("Expectations", table, explained=explained, ident="expectations")
 
 
+def criteria_table(criteria: Sequence[Mapping[str, Any]]) -> Markup | None:
+    """Table of the scenario's criteria: met or not, the value, and the instant."""
+    if not criteria:
+        return None
+    rows = []
+    for row in criteria:
+        met = bool(row["passed"])
+        value = _value(row["value"], 3)
+        cells = (
+            element("td", row["words"]),
+            element("td", f"{value} {row['unit']}".strip() if value else "not measured"),
+            element("td", "" if row["time"] is None else f"{row['time']:.1f} s"),
+            element("td", "met" if met else "not met", class_="good" if met else "bad"),
+        )
+        rows.append(element("tr", *cells))
+    explained = (
+        "what the scenario asks of a run, what the run gave, and the second of the run in which it "
+        "came about. Where no conflict was recorded, TTC, PET and DRAC are at the limit of what is "
+        "recorded."
+    )
+    table = html_table(("Criterion", "Value", "At", "Verdict"), rows)
+    return report_section("Criteria", table, explained=explained, ident="criteria")
+
+
 def event_list(
     events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
 ) -> Markup:

@@ -52,8 +52,11 @@ def duration(seconds: float | None) -> str:
 
 
 def stretch(begin: float, end: float) -> str:
-    """``"17:15 to 17:30 h"``, of day if the run has a clock, or ``"4:10 to 4:20 min"``."""
-    if begin % 60.0 == end % 60.0 == 0.0:
+    """``"17:15 to 17:30 h"``, of day if the run has a clock, or ``"4:10 to 4:20 min"``.
+
+    Less than five minutes of a run without a clock are minutes and seconds, too.
+    """
+    if begin % 60.0 == end % 60.0 == 0.0 and (has_clock() or end - begin >= 300.0):
         return f"{time_words(begin)} to {time_words(end)} h"
     one, other = (f"{int(t // 60)}:{int(t % 60):02d}" for t in (begin, end))
     return f"{one} to {other} min"

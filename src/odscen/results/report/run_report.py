@@ -30,9 +30,11 @@ from odscen.results.report.report_groups import group_section, station_section
 from odscen.results.report.report_incidents import incident_section
 from odscen.results.report.report_map import CATEGORIES, run_map
 from odscen.results.report.report_measures import measure_section
+from odscen.results.report.report_parking import parking_section
 from odscen.results.report.report_service import service_section
 from odscen.results.report.report_tables import (
     actor_table,
+    criteria_table,
     event_list,
     expectation_table,
 )
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.drawing.map_drawing import MapDrawing
+    from odscen.results.by_place.parking_use import ParkingUse
     from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.measures.figure import Values
     from odscen.results.measures.gridlock import Incident
@@ -75,6 +78,7 @@ def render_report(
     lights: LightsOfRun | None = None,
     visits: pl.DataFrame | None = None,
     stations: pl.DataFrame | None = None,
+    parking: ParkingUse | None = None,
     assignment: Assignment | None = None,
 ) -> str:
     """Write the report of one run.
@@ -110,6 +114,8 @@ def render_report(
         Visits of stops, if the scenario has lines of public transport.
     stations
         What the stations of the study counted, if it has any.
+    parking
+        Use of parking areas, if trips park.
     assignment
         How routes by travel time were found, if the scenario wants such.
 
@@ -124,7 +130,7 @@ def render_report(
     incidents = find_incidents(plan, actors, events, end=end)
     title = plan.scenario or "Run"
     usability = run_usability(actors, incidents, end=end, until=_cut_short(summary, plan))
-    run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end)
+    run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end, parking=parking)
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
     with starting_at(plan.clock):
@@ -142,12 +148,14 @@ def render_report(
             corridor_section(corridor) if corridor is not None else None,
             signal_section(lights, given, drawing=drawing) if lights is not None else None,
             transit_section(visits, given) if visits is not None else None,
+            parking_section(parking, given) if parking is not None else None,
             assignment_section(assignment) if assignment is not None else None,
             _speed_section(traces, end),
             _progress_section(actors, end),
             conflict_section(conflicts) if conflicts is not None else None,
             walking_section(given, actors, traces, end=end),
             emission_section(figures) if figures else None,
+            criteria_table(summary.get("criteria") or ()),
             expectation_table(summary.get("expectations") or ()),
             event_list(
                 events, actors, problems=[str(text) for text in summary.get("problems") or ()]
@@ -179,14 +187,17 @@ def _verdict(summary: Mapping[str, Any], usability: Usability) -> tuple[str, str
     """Class and words."""
     if summary.get("status") == RunStatus.FAILED:
         return "bad", "The run failed"
-    expectations = summary.get("expectations") or ()
+    asked = {"criteria": summary.get("criteria"), "expectations": summary.get("expectations")}
+    expectations = [row for rows in asked.values() for row in rows or ()]
+    kind = " and ".join(name for name, rows in asked.items() if rows)
     missed = sum(not row.get("passed") for row in expectations)
     words = usability.level.capitalize()
     if missed:
-        return "bad", f"{words}, {missed} of {len(expectations)} expectations not met"
+        return "bad", f"{words}, {missed} of {len(expectations)} {kind} not met"
     style = _STYLES[usability.level]
     if expectations:
-        met = "expectation met" if len(expectations) == 1 else "all expectations met"
+        one = {"criteria": "criterion"}.get(kind, "expectation")
+        met = f"{one} met" if len(expectations) == 1 else f"all {kind} met"
         return style, f"{words}, {met}"
     return style, words
 

@@ -11,18 +11,23 @@ from odscen.base.markup import Markup, element, join, number
 from odscen.results.report.page_templates import html_page, html_table, page_head, report_section
 from odscen.results.report.plots import Axis, ChartFrame, chart, legend, nice_ticks, text_at
 from odscen.results.sweeps.safe_boundary import safe_boundary
+from odscen.results.sweeps.sweep_rows import UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
 
-SAFE, UNSAFE, OTHER = "c-safe", "c-unsafe", "c-other"
-_WORDS: Final = {SAFE: "safe", UNSAFE: "not safe", OTHER: "not run"}
+SAFE, CALM, UNSAFE, OTHER = "c-safe", "c-calm", "c-unsafe", "c-other"
+_WORDS: Final = {
+    SAFE: "safe",
+    CALM: "safe, no encounter",
+    UNSAFE: "not safe",
+    OTHER: "not run",
+}
 MOST_LINES: Final = 2_000
 """Cases that are drawn as lines; of more, evenly chosen ones."""
 _DEFAULT_MEASURE: Final = "min_ttc"
-_UNITS: Final = {"impact_speed": "m/s", "min_ttc": "s", "min_pet": "s", "max_drac": "m/s²"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +67,7 @@ class SweepShown:
     @property
     def styles(self) -> list[str]:
         """Class of each case."""
-        return [_style(row["safe"]) for row in self.rows]
+        return [_style(row) for row in self.rows]
 
 
 def sweep_page(sweep: SweepShown) -> str:
@@ -81,8 +86,12 @@ def sweep_page(sweep: SweepShown) -> str:
     return html_page(f"{sweep.title} - sweep", join([head, *(s for s in sections if s)]))
 
 
-def _style(safe: bool | None) -> str:
-    return OTHER if safe is None else SAFE if safe else UNSAFE
+def _style(row: Mapping[str, Any]) -> str:
+    if row["safe"] is None:
+        return OTHER
+    if not row["safe"]:
+        return UNSAFE
+    return CALM if row.get("min_ttc") is None and row.get("min_pet") is None else SAFE
 
 
 def _keys(styles: Sequence[str]) -> Markup:
@@ -104,7 +113,7 @@ def _plane(sweep: SweepShown) -> Markup | None:
         if np.isnan(sweep.column(_DEFAULT_MEASURE)).all():
             return None
         names.append(_DEFAULT_MEASURE)
-    units = {**_UNITS, **sweep.units}
+    units = {**UNITS, **sweep.units}
     x, y = (sweep.column(name) for name in names)
     across, up = (_axis(v, name, units[name]) for v, name in zip((x, y), names, strict=True))
     frame = ChartFrame(across, up, height=400.0)
@@ -126,7 +135,8 @@ def _plane(sweep: SweepShown) -> Markup | None:
         ]
         drawn.append(element("g", *dots, class_=f"dots {style}"))
     about = f"Cases by {names[0]} and {names[1]}, coloured by whether they are safe."
-    explained = "each dot is a case. "
+    explained = "each dot is a case"
+    explained += ", hollow where there was no encounter. " if CALM in styles else ". "
     if len(sweep.names) == 2:
         explained += (
             "The line is the boundary between safe and not, half-way between neighbouring cases."
@@ -187,26 +197,26 @@ def _lines(sweep: SweepShown) -> Markup:
         if np.isfinite(sweep.column(name)).any()
     ]  # fmt: skip
     names = [*sweep.names, *measures]
-    units = {**_UNITS, **sweep.units}
+    units = {**UNITS, **sweep.units}
     width, top, bottom = 760.0, 46.0, 330.0
     at = np.linspace(70.0, width - 70.0, len(names)) if len(names) > 1 else np.array([width / 2])
-    heights = []
+    heights, axes = [], []
     drawn = [element("title", "All cases: one line each, one axis for each parameter and measure.")]
     for place, name in zip(at.tolist(), names, strict=True):
         values = sweep.column(name)
         axis = _axis(values, name, units.get(name, ""))
         heights.append(bottom - (values - axis.low) / (axis.high - axis.low) * (bottom - top))
-        drawn.append(_upright(axis, place, top, bottom))
+        axes.append(_upright(axis, place, top, bottom))
     styles = sweep.styles
     chosen = np.unique(np.linspace(0, len(styles) - 1, min(len(styles), MOST_LINES)).astype(int))
-    for style in (OTHER, SAFE, UNSAFE):
+    for style in (OTHER, CALM, SAFE, UNSAFE):
         lines = [
             _line(at, [h[index] for h in heights], _said(sweep.rows[index], sweep))
             for index in chosen.tolist()
             if styles[index] == style
         ]
         drawn.append(element("g", *lines, class_=f"case-lines {style}"))
-    svg = element("svg", *drawn, viewBox="0 0 760 350", role="img", class_="chart")
+    svg = element("svg", *drawn, *axes, viewBox="0 0 760 350", role="img", class_="chart")
     explained = (
         "each line is a case; it meets each axis at its value. Where a case has no such measure, "
         "without an encounter or a collision, the line has a gap."
@@ -241,15 +251,15 @@ def _line(at: FloatArray, heights: Sequence[float], words: str) -> Markup:
 
 def _table(sweep: SweepShown) -> Markup:
     measures = [key for key in sweep.rows[0] if key not in {"case", "safe", "status", "detail"}]
-    names = [*sweep.names, *(key for key in measures if key not in sweep.units)]
-    units = {**_UNITS, **sweep.units}
-    heads = ["case", "safe", *(f"{n}, {units[n]}" if units.get(n) else n for n in names), ""]
+    names = [*sweep.names, *(key for key in measures if _measured(sweep, key))]
+    units = {**UNITS, **sweep.units}
+    heads = ["case", "", "safe", *(f"{n}, {units[n]}" if units.get(n) else n for n in names)]
     rows = []
     for row in sweep.rows:
-        cells = [element("td", row["case"]), element("td", _verdict(row))]
-        cells += [element("td", _written(row[name]), class_="n") for name in names]
         links = [element("a", words, href=path) for words, path in sweep.links[row["case"]]]
-        cells.append(element("td", *(part for link in links for part in (link, " "))))
+        files = element("td", *(part for link in links for part in (link, " ")))
+        cells = [element("td", row["case"]), files, element("td", _verdict(row))]
+        cells += [element("td", _written(row[name]), class_="n") for name in names]
         rows.append(element("tr", *cells))
     box = element("input", id="filter", type="search", placeholder="for example: not safe")
     field = element("label", "Filter ", box, class_="filter")
@@ -258,10 +268,15 @@ def _table(sweep: SweepShown) -> Markup:
     return report_section("Each case", field, table, explained=explained, ident="table")
 
 
+def _measured(sweep: SweepShown, measure: str) -> bool:
+    """Whether a column is a measure that some case has."""
+    return measure not in sweep.units and any(row[measure] is not None for row in sweep.rows)
+
+
 def _verdict(row: Mapping[str, Any]) -> str:
     if row["safe"] is None:
         return f"{row['status']}: {row['detail']}"
-    return "safe" if row["safe"] else "not safe"
+    return _WORDS[_style(row)]
 
 
 def _written(value: Any) -> str:

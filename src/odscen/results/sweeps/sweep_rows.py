@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 OUTCOME: Final = ("collision", "impact_speed", "min_ttc", "min_pet", "max_drac")
 """Columns of a row about how it went: whether, m/s, s, s, m/s^2; of those who are watched."""
+UNITS: Final = {"impact_speed": "m/s", "min_ttc": "s", "min_pet": "s", "max_drac": "m/s²"}
 _NEAR: Final = 1e-6
 _OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError
-from odscen.results.measures.expectations import NAMES, evaluate, parse_expectation
+from odscen.results.judging.expectations import NAMES, evaluate, parse_expectation
 from odscen.results.measures.figure import Figure
 from odscen.results.measures.registry import COUNTS
 

@@ -1,0 +1,1 @@
+"""What is asked of a run: expectations, criteria of its scenario, and the verdicts."""
