@@ -33,6 +33,7 @@ actors = st.builds(
     model=st.none() | labels,
     spawn=labels,
     goal=st.none() | labels,
+    via=st.lists(labels, max_size=3).map(tuple),
     speed=st.none() | st.floats(0, 100, exclude_min=True),
     lateral_offset=st.floats(-10, 10),
     depart=st.floats(0, 1e6),
@@ -54,6 +55,7 @@ flows = st.builds(
         st.sampled_from(Category), st.floats(0, 1e3, exclude_min=True), min_size=1, max_size=3
     ),
     speed=st.none() | st.floats(0, 100, exclude_min=True),
+    initial_speed=st.none() | st.floats(0, 100),
 )
 environments = st.builds(
     Environment,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from enum import Enum
+from functools import lru_cache
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
@@ -86,6 +87,19 @@ def documents(what: str, *more: type[Exception]) -> Iterator[None]:
 
 
 @contextmanager
+def stored_document(
+    text: str | bytes, *more: type[Exception], form: str, version: int, what: str
+) -> Iterator[dict[str, Any]]:
+    """Read a JSON document of ours and say what is wrong with it where it is used.
+
+    Parameters and errors of :func:`read_document` and :func:`documents`.
+    """
+    data = read_document(text, form=form, version=version, what=what)
+    with documents(what, *more):
+        yield data
+
+
+@contextmanager
 def tables(place: str) -> Iterator[None]:
     """Say where tables are that cannot be read or lack columns: in the folder of a run.
 
@@ -116,9 +130,7 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
 
     What it gives raises ``TypeError`` or ``ValueError`` that name the field.
     """
-    hints = {name: _types(hint) for name, hint in get_type_hints(kind).items()}
-    enums = {name: types[0] for name, types in hints.items() if issubclass(types[0], Enum)}
-    known = {name: _accepted(types) for name, types in hints.items()}
+    enums, known = _fields(kind)
 
     def make(row: Mapping[str, Any]) -> _Row:
         for name, value in row.items():
@@ -128,6 +140,14 @@ def typed_rows(kind: Callable[..., _Row]) -> Callable[[Mapping[str, Any]], _Row]
         return kind(**{**row, **{name: enum(row[name]) for name, enum in enums.items()}})
 
     return make
+
+
+@lru_cache(maxsize=64)
+def _fields(kind: Callable[..., Any]) -> tuple[dict[str, type], dict[str, frozenset[type]]]:
+    """Enumerations among the fields, and the types that the value of each may have."""
+    hints = {name: _types(hint) for name, hint in get_type_hints(kind).items()}
+    enums = {name: types[0] for name, types in hints.items() if issubclass(types[0], Enum)}
+    return enums, {name: _accepted(types) for name, types in hints.items()}
 
 
 def _types(hint: Any) -> tuple[type, ...]:

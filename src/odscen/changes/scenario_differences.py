@@ -82,7 +82,12 @@ def scenario_differences(before: Scenario, after: Scenario) -> tuple[ScenarioCha
     their content.
     """
     old, new = (one.model_dump(mode="json") for one in (before, after))
-    return tuple(_fields(old, new, ()))
+    return tuple(field_differences(old, new))
+
+
+def field_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[ScenarioChange]:
+    """Find the differences of two documents as plain data, in the order of their fields."""
+    yield from _fields(old, new, ())
 
 
 def _fields(

@@ -39,9 +39,9 @@ FORMAT = "odscen-map-graph"
 VERSION = 1
 
 
-def to_npz_bytes(graph: MapGraph) -> bytes:
-    """Write the graph as an .npz file; the same graph gives the same bytes."""
-    arrays: dict[str, Array] = {
+def graph_arrays(graph: MapGraph) -> dict[str, Array]:
+    """All of a map graph as named arrays, those of the file."""
+    return {
         "format": _strings([FORMAT]),
         "version": np.array([VERSION], dtype=np.int32),
         "map": _strings([graph.map_name, graph.map_sha256]),
@@ -49,8 +49,12 @@ def to_npz_bytes(graph: MapGraph) -> bytes:
         **_lane_arrays(graph.lanes),
         **_walk_arrays(graph.walks),
     }
+
+
+def to_npz_bytes(graph: MapGraph) -> bytes:
+    """Write the graph as an .npz file; the same graph gives the same bytes."""
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    np.savez(buffer, allow_pickle=False, **graph_arrays(graph))
     return buffer.getvalue()
 
 

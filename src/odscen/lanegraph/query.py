@@ -174,10 +174,17 @@ def is_connected(segments: Segments, ids: Iterable[str]) -> bool:
     NotFoundError
         If the map has no such segment.
     """
-    import networkx as nx
+    # Without networkx, which takes longer to import than a short run: every run asks this.
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
-    graph = _induced_adjacency(segments, ids)
-    return len(graph) > 0 and nx.is_connected(graph)
+    rows = segment_rows(segments, ids)
+    place = np.full(len(segments.ids), -1)
+    place[rows] = np.arange(len(rows))
+    pairs = place[segments.adjacency]
+    pairs = pairs[(pairs >= 0).all(axis=1)]
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(rows),) * 2)
+    return len(rows) > 0 and connected_components(graph, directed=False)[0] == 1
 
 
 def largest_part(segments: Segments) -> tuple[SegmentId, ...]:

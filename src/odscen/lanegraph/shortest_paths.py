@@ -6,7 +6,6 @@ functions below make one for a single query.
 
 from __future__ import annotations
 
-import graphlib
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -132,7 +131,7 @@ class _PathFinder:
         """For each part a bit for each of ``parts`` that it leads to; and which bit is whose."""
         columns = {part: k for k, part in enumerate(np.unique(parts).tolist())}
         reached: dict[int, int] = {}
-        for part in graphlib.TopologicalSorter(self._part_successors).static_order():
+        for part in self._part_order:
             bits = 1 << columns[part] if part in columns else 0
             for after in self._part_successors[part]:
                 bits |= reached[after]
@@ -191,6 +190,22 @@ class _PathFinder:
         return after
 
     @cached_property
+    def _part_order(self) -> tuple[int, ...]:
+        """Parts, each behind those that it leads to."""
+        after = self._part_successors
+        order: list[int] = []
+        done: set[int] = set()
+        todo = list(after)
+        while todo:  # parts make no circles
+            ahead = [one for one in after[todo[-1]] if one not in done]
+            if ahead:
+                todo += ahead
+            elif (part := todo.pop()) not in done:
+                done.add(part)
+                order.append(part)
+        return tuple(order)
+
+    @cached_property
     def _ends_ahead(self) -> Int32Array:
         """At least how many ends, itself included, can be reached from each node of the region."""
         ends = np.flatnonzero(self._is_end)
@@ -210,15 +225,16 @@ class _PathFinder:
         if not 0 <= source < len(self.mask) or not self.mask[source]:
             msg = f"{self._name(source)} is outside the region of interest"
             raise InputError(msg)
-        if self._tree is None or self._tree[0] != source:
+        tree = self._tree  # other threads may ask for theirs
+        if tree is None or tree[0] != source:
             distances, predecessors = csgraph.dijkstra(
                 self._matrix,
                 directed=self._directed,
                 indices=np.asarray(self._local[source]),
                 return_predecessors=True,
             )
-            self._tree = source, distances, predecessors
-        return self._tree[1], self._tree[2]
+            tree = self._tree = source, distances, predecessors
+        return tree[1], tree[2]
 
     def _name(self, node: int) -> str:
         return f"node {node}"

@@ -76,6 +76,19 @@ def test_a_good_scenario_has_no_problems() -> None:
         (actor(goal="1.0.-1.10"), "goal_unreachable", "actors[0].goal"),
         (actor(goal="ped.1.0.-2.9"), "goal_unreachable", "actors[0].goal"),
         (actor(goal="1.0.-1.30"), "goal_not_candidate", "actors[0].goal"),
+        (actor(via=["8.8.8.8"]), "unknown_via", "actors[0].via[0]"),
+        (actor(via=["1.0.1.49"]), "via_unreachable", "actors[0].via[0]"),
+        (actor(via=["1.0.-1.30", "1.0.-1.20"]), "via_unreachable", "actors[0].via[1]"),
+        (actor(via=["ped.1.0.-2.9"]), "via_unreachable", "actors[0].via[0]"),
+        (actor(via=["2.0.-1.3"], goal="3.0.-1.29"), "goal_unreachable", "actors[0].goal"),
+        (actor(via=["2.0.-1.29"]), "no_goal", "actors[0].spawn"),
+        (
+            actor(
+                "ped.1.0.-2.9", category="pedestrian", via=["ped.1.0.-2.20"], goal="ped.1.0.-2.0"
+            ),
+            "via_turns_round",
+            "actors[0].via",
+        ),
         (actor(lateral_offset=1.8), "off_lane", "actors[0].lateral_offset"),
         (actor(lateral_offset=-1.0), "body_over_border", "actors[0].lateral_offset"),
         (actor(speed=90), "speed_implausible", "actors[0].speed"),
@@ -96,6 +109,14 @@ def test_a_spawn_or_goal_outside_the_region_names_the_segment_to_add() -> None:
     far = problems(actor(goal="2.0.-1.29"), roi=("r1", "j9"))
     assert [(p.code, p.segments) for p in far] == [("goal_outside_roi", ("r2",))]
     assert "add the segment" in far[0].message
+    passed = problems(actor(via=["2.0.-1.3"]), roi=("r1", "j9"))
+    assert [(p.code, p.segments) for p in passed] == [("via_outside_roi", ("r2",))]
+
+
+def test_a_route_may_lead_through_places_in_their_order() -> None:
+    assert codes(actor(via=["1.0.-1.30", "90.0.-1.4", "2.0.-1.3"], goal="2.0.-1.29")) == []
+    walker = actor("ped.1.0.-2.0", category="pedestrian", via=["ped.1.0.-2.20", "ped.2.0.-2.3"])
+    assert codes(walker) == []
 
 
 def test_the_end_of_the_region_is_a_goal_inside_a_junction_too() -> None:
@@ -161,6 +182,12 @@ def test_flows_are_checked() -> None:
     assert codes(flows=(mixed,)) == ["wrong_graph"]
     late = Flow(id="f", spawn="1.0.-1.0", per_hour=9, begin=700)
     assert codes(flows=(late,)) == ["departs_too_late"]
+    fast = Flow(id="f", spawn="1.0.-1.0", per_hour=9, speed=8.0, initial_speed=9.0)
+    assert codes(flows=(fast,)) == ["initial_speed_too_high"]
+    on_foot = Flow(
+        id="f", spawn="ped.1.0.-2.0", per_hour=9, mix={Category.PEDESTRIAN: 1}, initial_speed=9.0
+    )
+    assert codes(flows=(on_foot,)) == []
 
 
 def test_weather_is_looked_up_in_the_catalogue() -> None:
@@ -198,13 +225,6 @@ def test_all_problems_come_at_once() -> None:
         "no_goal",
     ]
     assert [p.severity for p in found] == ["error", "error", "warning", "error", "error"]
-
-
-def test_a_setting_that_no_run_acts_on_is_a_warning() -> None:
-    found = problems(actor(crosses_anywhere=True, ignores_red=True))
-    assert [(p.severity, p.code, p.where) for p in found] == [
-        ("warning", "not_acted_on", "actors[0].crosses_anywhere")
-    ]
 
 
 LIGHTS = (Light(("5", "6"), (20.0, 20.0, 7.0)), Light(("X0",), (30.0, 7.0)))

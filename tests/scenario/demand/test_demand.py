@@ -214,6 +214,7 @@ def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, messag
         read(text)
 
 
+@pytest.mark.slow
 def test_a_table_has_as_many_lines_as_it_may_have_and_no_more() -> None:
     assert len(read_profile("share\n" + "1\n" * MOST_ROWS)) == MOST_ROWS
     with pytest.raises(InputError, match=r"^line 500002: there are more than 500000 lines"):

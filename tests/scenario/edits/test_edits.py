@@ -41,6 +41,18 @@ def test_a_region_grows_only_by_neighbours() -> None:
     assert edits.eligible_segments(two, GRAPH) == ("r2", "r3")
 
 
+def test_a_region_is_extended_by_many_segments_in_any_order_but_stays_in_one_piece() -> None:
+    one = scenario(roi=("r1",))
+    assert edits.extend_roi(one, GRAPH, ["r3", "r1", "j9"]).roi == ("r1", "r3", "j9")
+    assert edits.extend_roi(scenario(roi=()), GRAPH, ["r2", "j9"]).roi == ("r2", "j9")
+    with pytest.raises(ScenarioError, match="several pieces"):
+        edits.extend_roi(one, GRAPH, ["r3"])
+    with pytest.raises(ScenarioError, match="already"):
+        edits.extend_roi(one, GRAPH, ["r1"])
+    with pytest.raises(NotFoundError, match="no segment named 'r77'"):
+        edits.extend_roi(one, GRAPH, ["r77"])
+
+
 def test_removing_a_segment_that_splits_the_region_is_refused() -> None:
     with pytest.raises(ScenarioError, match="several pieces"):
         edits.shrink_roi(scenario(), GRAPH, "j9")
@@ -108,6 +120,28 @@ def test_moving_keeps_the_goal_only_where_it_can_be_reached() -> None:
     car = edits.set_goal(with_car(), GRAPH, "car-1", goal="2.0.-1.29")
     assert edits.move_actor(car, GRAPH, "car-1", spawn="1.0.-1.20").actors[0].goal == "2.0.-1.29"
     assert edits.move_actor(car, GRAPH, "car-1", spawn="3.0.-1.5").actors[0].goal is None
+
+
+def test_moving_keeps_the_places_on_the_way_only_where_they_can_be_reached() -> None:
+    car = edits.change_actor(with_car(), "car-1", via=("1.0.-1.15", "2.0.-1.3"))
+    before = edits.move_actor(car, GRAPH, "car-1", spawn="1.0.-1.5").actors[0]
+    assert before.via == ("1.0.-1.15", "2.0.-1.3")
+    assert edits.move_actor(car, GRAPH, "car-1", spawn="1.0.-1.20").actors[0].via == ()
+
+
+def test_a_goal_must_be_reachable_from_the_last_place_on_the_way() -> None:
+    car = edits.change_actor(with_car(), "car-1", via=("2.0.-1.3",))
+    assert edits.set_goal(car, GRAPH, "car-1", goal="2.0.-1.29").actors[0].goal == "2.0.-1.29"
+    with pytest.raises(ScenarioError, match=r"from '2.0.-1.3' to '3.0.-1.29'"):
+        edits.set_goal(car, GRAPH, "car-1", goal="3.0.-1.29")
+
+
+def test_removing_a_segment_removes_the_places_on_the_way_in_it() -> None:
+    car = edits.change_actor(with_car(), "car-1", via=("1.0.-1.15", "2.0.-1.3"))
+    with pytest.raises(ScenarioError, match="'car-1'"):
+        edits.shrink_roi(car, GRAPH, "r2")
+    new = edits.shrink_roi(car, GRAPH, "r2", with_actors=True)
+    assert new.actors[0].via == ("1.0.-1.15",)
 
 
 def test_fields_change_and_a_new_category_drops_the_model() -> None:

@@ -51,3 +51,10 @@ def test_an_outage_needs_a_light_and_an_id_is_used_once() -> None:
 def test_a_measure_that_is_not_there_cannot_be_removed() -> None:
     with pytest.raises(NotFoundError, match="no measure named 'shut'"):
         edits.remove_measure(scenario(), measure="shut")
+
+
+def test_a_renamed_measure_keeps_its_place() -> None:
+    two = edits.set_measure(scenario(), GRAPH, measure=closure("r2"))
+    two = edits.set_measure(two, GRAPH, measure=closure("r3", name="other"))
+    renamed = edits.set_measure(two, GRAPH, measure=closure("r2", name="works"), instead_of="shut")
+    assert [one.id for one in renamed.measures] == ["works", "other"]

@@ -56,3 +56,27 @@ def test_rules_about_a_removed_actor_are_mended_one_after_another() -> None:
 def test_a_rule_that_is_not_there_cannot_be_removed() -> None:
     with pytest.raises(NotFoundError, match="no rule named 'halt'"):
         edits.remove_rule(scenario(), rule="halt")
+
+
+def test_a_renamed_rule_keeps_its_place_and_those_that_wait_for_it_follow() -> None:
+    wait = {"not": {"any": [{"rule": {"id": "halt"}}, {"time": {"after": 9}}], "delay": 1}}
+    three = scenario()
+    for one in (rule(), rule("later", when=wait), rule("other")):
+        three = edits.set_rule(three, GRAPH, rule=one)
+    renamed = edits.set_rule(three, GRAPH, rule=rule("stop"), instead_of="halt")
+    assert [one.id for one in renamed.rules] == ["stop", "later", "other"]
+    inside = renamed.rules[1].when.not_
+    assert inside is not None
+    assert inside.any is not None
+    assert inside.any[0].rule is not None
+    assert (inside.any[0].rule.id, inside.delay) == ("stop", 1)
+    assert renamed.rules[2] == three.rules[2]
+
+
+def test_a_rule_is_not_renamed_to_a_name_that_is_taken_or_from_one_that_is_not_there() -> None:
+    two = edits.set_rule(scenario(), GRAPH, rule=rule())
+    two = edits.set_rule(two, GRAPH, rule=rule("other"))
+    with pytest.raises(ScenarioError, match="id 'other' is taken"):
+        edits.set_rule(two, GRAPH, rule=rule("other"), instead_of="halt")
+    with pytest.raises(NotFoundError, match="no rule named 'gone'"):
+        edits.set_rule(two, GRAPH, rule=rule("new"), instead_of="gone")

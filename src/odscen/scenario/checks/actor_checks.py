@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.scenario.document.problems import Problem, error, warning
-from odscen.scenario.placing.region import NodePlace, Region, on_foot
+from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot, turns_round
 from odscen.scenario.placing.spawn_room import SAGITTA
 
 if TYPE_CHECKING:
@@ -105,33 +105,33 @@ def actor_problems(
             f"{subject.name} departs at {actor.depart:g} s, but the run ends at "
             f"{scenario.simulation.duration:g} s; depart earlier or run longer",
         )
-    if actor.crosses_anywhere:  # R45; no run acts on it by itself
-        yield warning(
-            "not_acted_on",
-            f"{subject.where}.crosses_anywhere",
-            f"crosses_anywhere has no effect yet: {subject.name} keeps to crosswalks; a rule with "
-            "'walk' lets it cross where you like",
-        )
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:
-        yield from _initial_speed_problems(subject, actor, spawn)
-        yield from goal_problems(subject, spawn)
+        yield from _initial_speed_problems(subject, spawn)
+        last, problems = via_problems(subject, spawn)
+        yield from problems
+        if last is not None:
+            problems = tuple(goal_problems(subject, last))
+            yield from problems
+            if not any(problem.severity == "error" for problem in problems):
+                yield from _turning_problems(subject)
         yield from _body_problems(subject, actor, spawn, body_of(actor, assets))
 
 
-def _initial_speed_problems(subject: Subject, actor: Actor, spawn: NodePlace) -> Iterator[Problem]:
+def _initial_speed_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
     """Yield what is odd about the speed at departure, which SUMO bounds."""
-    if actor.initial_speed is None or spawn.walk:
+    one = subject.one
+    if one.initial_speed is None or spawn.walk:
         return
     limit = float(subject.region.graph.lanes.speed_limit[spawn.node])
     # Who wants to be faster than the limit may be.
-    allowed = actor.speed or (limit if math.isfinite(limit) else math.inf)
-    if actor.initial_speed > allowed + 1e-9:
+    allowed = one.speed or (limit if math.isfinite(limit) else math.inf)
+    if one.initial_speed > allowed + 1e-9:
         yield warning(
             "initial_speed_too_high",
             f"{subject.where}.initial_speed",
-            f"{subject.name} is to depart with {actor.initial_speed:g} m/s, but its lane and its "
+            f"{subject.name} is to depart with {one.initial_speed:g} m/s, but its lane and its "
             f"desired speed allow {allowed:g} m/s: it departs with that",
         )
 
@@ -158,6 +158,7 @@ def flow_problems(scenario: Scenario, region: Region, index: int) -> Iterator[Pr
     spawn, problems = spawn_problems(subject)
     yield from problems
     if spawn is not None:
+        yield from _initial_speed_problems(subject, spawn)
         yield from goal_problems(subject, spawn)
 
 
@@ -194,22 +195,93 @@ def spawn_problems(subject: Subject) -> tuple[NodePlace | None, tuple[Problem, .
     return (None if found else place), tuple(found)
 
 
+def vias(one: Actor | Flow) -> tuple[str, ...]:
+    """Nodes that a route leads through; those of flows lead through none."""
+    found: tuple[str, ...] = getattr(one, "via", ())
+    return found
+
+
+def legs(one: Actor | Flow) -> Iterator[tuple[str, str | None]]:
+    """Yield the pairs of nodes between which a route leads; an open goal is ``None``."""
+    return zip((one.spawn, *vias(one)), (*vias(one), one.goal), strict=True)
+
+
+def via_problems(
+    subject: Subject, spawn: NodePlace
+) -> tuple[NodePlace | None, tuple[Problem, ...]]:
+    """Check the places that a route leads through.
+
+    Returns
+    -------
+    The last of them, from which the route leads on to its goal (the spawn if there are none), or
+    ``None`` if one is wrong; and what is wrong with it.
+    """
+    region, here, name = subject.region, spawn, subject.one.spawn
+    for index, node in enumerate(vias(subject.one)):
+        where, nodes = f"{subject.where}.via[{index}]", [name, node]
+        place = region.place(node)
+        if place is None:
+            message = f"{subject.name} passes {node!r}, which the map does not have; pick a node"
+            return None, (error("unknown_via", where, message, nodes=nodes),)
+        if not region.holds(place):
+            segment = region.segment_of(place)
+            message = (
+                f"{subject.name} passes {node!r} in segment {segment!r}, outside the region of "
+                "interest; pick another node or add the segment"
+            )
+            return None, (
+                error("via_outside_roi", where, message, nodes=nodes, segments=[segment]),
+            )
+        if not region.leads(here, place):
+            message = (
+                f"{subject.name} is to pass {node!r}, but cannot get there from {name!r} inside "
+                "the region of interest; pick a node further on"
+            )
+            return None, (error("via_unreachable", where, message, nodes=nodes),)
+        here, name = place, node
+    return here, ()
+
+
+def _turning_problems(subject: Subject) -> Iterator[Problem]:
+    """Yield a place at which a walk would go back the way it came, as SUMO's walks cannot."""
+    region, names = subject.region, (subject.one.spawn, *vias(subject.one), subject.one.goal)
+    places = [place for name in names if name is not None and (place := region.place(name))]
+    if len(places) < 3 or not places[0].walk:
+        return
+    path = region.path_over([place.node for place in places], walk=True)
+    node = turns_round(path)
+    if node is not None:
+        name = name_of(region.graph, NodePlace(walk=True, node=node))
+        yield error(
+            "via_turns_round",
+            f"{subject.where}.via",
+            f"{subject.name} would turn round at {name!r} and lead back along itself, which no "
+            "walk can; pick a place that it passes, or use a rule with 'walk'",
+            nodes=[name],
+        )
+
+
 def goal_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
-    """Check the goal of an actor or flow whose spawn is right (R38)."""
+    """Check the goal of an actor or flow whose spawn is right (R38).
+
+    ``spawn`` is the last place that its route leads through, if it leads through any.
+    """
     one, region, where = subject.one, subject.region, f"{subject.where}.goal"
+    start = (one.spawn, *vias(one))[-1]
     if not region.router_of(spawn).has_goals(spawn.node):
+        starts = "starts on" if start == one.spawn else "passes"
         yield error(
             "no_goal",
             f"{subject.where}.spawn",
-            f"{subject.name} starts on {one.spawn!r}, from where no path leads on inside the "
+            f"{subject.name} {starts} {start!r}, from where no path leads on inside the "
             "region of interest; start further back or add the next segment",
-            nodes=[one.spawn],
+            nodes=[start],
         )
         return
     if one.goal is None:
         return
     goal = region.place(one.goal)
-    nodes = [one.spawn, one.goal]
+    nodes = [start, one.goal]
     if goal is None:
         message = f"{subject.name} goes to {one.goal!r}, which the map does not have; pick a goal"
         yield error("unknown_goal", where, message, nodes=nodes)
@@ -222,7 +294,7 @@ def goal_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
         yield error("goal_outside_roi", where, message, nodes=nodes, segments=[segment])
     elif not region.leads(spawn, goal):
         message = (
-            f"{subject.name} cannot get from {one.spawn!r} to {one.goal!r} inside the region of "
+            f"{subject.name} cannot get from {start!r} to {one.goal!r} inside the region of "
             f"interest; pick one of its {len(region.candidates(spawn))} goals"
         )
         yield error("goal_unreachable", where, message, nodes=nodes)

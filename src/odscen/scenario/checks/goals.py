@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.checks.actor_checks import (
+    Subject,
+    goal_problems,
+    legs,
+    spawn_problems,
+    via_problems,
+)
 from odscen.scenario.document.named_random import stream
 from odscen.scenario.document.problems import Problem, refuse_errors
 from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot
@@ -37,13 +43,16 @@ def resolve_goals(
         With every actor whose spawn or goal is not usable.
     """
     region = Region.of(graph, scenario.roi) if region is None else region
-    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
+    region.look_up(leg for actor in scenario.actors for leg in legs(actor))
     goals: dict[str, int] = {}
     problems: list[Problem] = []
     for index, actor in enumerate(scenario.actors):
         subject = Subject.actor(scenario, region, index)
         place, found = spawn_problems(subject)
         problems += found
+        if place is not None:
+            place, found = via_problems(subject, place)
+            problems += found
         if place is None:
             continue
         given = None if actor.goal is None else region.place(actor.goal)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -154,7 +155,8 @@ def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator
         own = region.graph.lanes.segment == region.graph.lanes.segment[spawn.node]
         mask = region.lanes & (~closed | (own & closed[spawn.node]))
         router = routers.setdefault(mask.tobytes(), Router(region.graph, mask))
-        if not mask[goal.node] or not router.reachable(spawn.node)[goal.node]:
+        nodes = [spawn.node, *(p.node for one in actor.via if (p := region.place(one))), goal.node]
+        if not all(mask[b] and router.reachable(a)[b] for a, b in pairwise(nodes)):
             names = ", ".join(repr(one.id) for one in closing)
             message = (
                 f"{actor.id!r} departs at {actor.depart:g} s, when {names} has closed every route "

@@ -7,11 +7,18 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
+from odscen.base.errors import OdscenError
 from odscen.scenario.document.problems import Problem, error, warning
 from odscen.scenario.document.rules_document import actors_of, places_of, rule_parts
 from odscen.scenario.signals.light import find_light
 from odscen.scenario.signals.movement_names import find_movements, known_names
 from odscen.scenario.story.action_kinds import ACTIONS
+from odscen.scenario.story.own_kinds import (
+    own_action,
+    own_actions,
+    own_condition,
+    own_conditions,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -62,6 +69,8 @@ def _part(
         if isinstance(place, str) and region.place(place) is None:
             message = f"the map has no node {place!r}; pick one"
             yield error("unknown_place", f"{where}.{name}", message, nodes=[place])
+    if kind == "own":
+        yield from _own(found)
     if kind == "rule" and (other := getattr(part, "id", None)) not in ids:
         message = f"there is no rule {other!r}; there are {_listed(ids)}"
         yield error("unknown_rule", f"{where}.id", message)
@@ -76,6 +85,24 @@ def _part(
     if kind == "appear" and ".then[" in where and rule.actor not in known:
         message = f"{rule.actor!r} is of a flow, which says when it departs; let an actor appear"
         yield error("action_not_possible", where, message)
+
+
+def _own(found: RulePart) -> Iterator[Problem]:
+    """Yield that no installed package gives a kind, or what it finds wrong with its values."""
+    name = str(getattr(found.part, "kind", ""))
+    acts = ".then[" in found.where
+    try:
+        kind = own_action(name) if acts else own_condition(name)
+        wrong = None if kind is None or kind.check is None else kind.check(found.part)
+    except OdscenError as failed:
+        yield error("own_kind", found.where, str(failed))
+        return
+    if kind is None:
+        names = own_actions() if acts else own_conditions()
+        message = f"no installed package gives {name!r}; there are {_listed(names)}"
+        yield error("own_kind", f"{found.where}.kind", message)
+    elif wrong is not None:
+        yield error("own_kind", found.where, f"{name!r}: {wrong}")
 
 
 def _goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -> Iterator[Problem]:

@@ -11,9 +11,11 @@ from odscen.scenario.checks.actor_checks import (
     AssetLookup,
     actor_problems,
     flow_problems,
+    legs,
 )
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.measure_checks import measure_problems
+from odscen.scenario.checks.parking_checks import parking_problems
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_timing import signal_problems
 from odscen.scenario.checks.start_overlaps import start_overlaps
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from odscen.lanegraph.graphs import MapGraph
+    from odscen.lanegraph.parking_areas import MapParking
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.light import Light
 
@@ -36,6 +39,7 @@ def check(
     assets: AssetLookup | None = None,
     lights: Sequence[Light] | None = None,
     *,
+    parking: MapParking | None = None,
     region: Region | None = None,
 ) -> tuple[Problem, ...]:
     """Find everything that is wrong with a scenario on its map.
@@ -49,6 +53,8 @@ def check(
         Catalogue for the rules on models and for their sizes; without one those are left out.
     lights
         Traffic lights of the map for the rules on their timing; without them those are left out.
+    parking
+        Where cars can park on the map; without it the rules on that are left out.
     region
         The scenario's region on ``graph``, if the caller has it: paths found once are remembered.
 
@@ -63,12 +69,13 @@ def check(
     found += roi_problems(scenario, graph)
     found += _document_problems(scenario)
     found += _environment_problems(scenario, assets)
-    region.look_up((actor.spawn, actor.goal) for actor in scenario.actors)
+    region.look_up(leg for actor in scenario.actors for leg in legs(actor))
     for index in range(len(scenario.actors)):
         found += actor_problems(scenario, region, index, assets)
     for index in range(len(scenario.flows)):
         found += flow_problems(scenario, region, index)
     found += demand_problems(scenario, region)
+    found += parking_problems(scenario, region, parking)
     found += transit_problems(scenario, region)
     if lights is not None:
         clock, until = scenario.demand.clock, scenario.simulation.duration

@@ -3,6 +3,10 @@
 Members of a matrix row, and of background traffic, are drawn from a stream of random numbers named
 by the scenario's seed and the row: adding rows, actors or flows changes nothing for the others, and
 more trips in a row leave its first ones as they were.
+
+When a trip begins is random; where it begins and ends in its zones is spread evenly
+(:class:`EvenShares`). A quarter of an hour has one or two trips of a row, and drawn each on its own
+they would lie on other roads with each seed, by more than the counts of these roads may be off.
 """
 
 from __future__ import annotations
@@ -40,6 +44,53 @@ SAMPLE = 400
 """Trips from which the usual length of one is estimated."""
 
 
+STARTS = (0.7548776662, 0.4142135624, 0.7320508076, 0.2360679775)
+"""Steps of the places where trips begin: from trip to trip of a row, from origin to origin, from
+destination to destination, from quarter to quarter of an hour. The first of it and of
+:data:`GOALS` are those of Roberts' R2 sequence, the others roots whose ratios are irrational."""
+GOALS = (0.5698402910, 0.6457513111, 0.3166247904, 0.6055512755)
+PARTS = (0.0, 0.1231056256, 0.3588989435, 0.7958315233)
+"""Steps of the number that decides whether a part of a trip is one."""
+QUARTER = 900.0
+
+
+@dataclass(frozen=True, slots=True)
+class EvenShares:
+    """Numbers from 0 to 1 that fill the interval evenly, over the trips of many rows.
+
+    Kronecker sequences: each trip, row and quarter of an hour is an irrational step further, modulo
+    1, from a number that the seed draws. So the trips that leave a zone in an hour lie evenly over
+    its places, however few each row has, and each row on its own has places that depend on no
+    other.
+
+    Attributes
+    ----------
+    first
+        Of the start, the goal and the part of a trip, before any step.
+    row
+        Steps between rows: of the origin, the destination and the quarter of an hour.
+    """
+
+    first: tuple[float, float, float]
+    row: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def places(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return numbers for the starts and the goals of the first trips, shapes ``(count,)``."""
+        trips = np.arange(count, dtype=np.float64)
+        return (
+            (self._at(0, STARTS) + trips * STARTS[0]) % 1.0,
+            (self._at(1, GOALS) + trips * GOALS[0]) % 1.0,
+        )
+
+    def whole(self, number: float) -> int:
+        """Trips of a row: whole, and on average over rows the number asked for."""
+        return int(number) + int(self._at(2, PARTS) % 1.0 < number % 1.0)
+
+    def _at(self, which: int, steps: Sequence[float]) -> float:
+        far = sum(step * times for step, times in zip(steps[1:], self.row, strict=True))
+        return self.first[which] + far
+
+
 @dataclass(frozen=True, slots=True)
 class Trips:
     """Trips of one row or part, in the order of their numbers, arrays of shape ``(n,)``.
@@ -75,13 +126,22 @@ class Trips:
 
 def matrix_trips(scenario: Scenario, ground: TripEnds, matrix: Matrix) -> Iterable[Trips]:
     """Yield the trips of each row of a matrix."""
+    zones = [zone.id for zone in scenario.demand.zones]
+    names = [*zones, *map(str, ground.region.graph.segments.ids)]
+    order = {name: row for row, name in reversed(tuple(enumerate(names)))}
+    mix = ",".join(sorted(matrix.mix))
+    (part,) = stream(scenario.seed, "parts", mix).random(1).tolist()
     for origin, destination, number in matrix.trips:
         rng = stream(scenario.seed, "trips", matrix.id, origin, destination)
+        start = stream(scenario.seed, "starts", mix, origin).random()
+        goal = stream(scenario.seed, "goals", mix, destination).random()
+        row = (order.get(origin, 0), order.get(destination, 0), matrix.begin / QUARTER)
         yield _drawn(
             scenario,
             ground,
             matrix,
             rng,
+            EvenShares((start, goal, part), row),
             name=f"{matrix.id}.{origin}-{destination}",
             number=number,
             between=(
@@ -106,7 +166,9 @@ def background_trips(
         day = curve(scenario.demand, background.profile)
         passed = day.amount(end) - day.amount(begin)
         number = standing * passed / usual_duration(ground, background.mix)
-    yield _drawn(scenario, ground, background, rng, name=background.id, number=number)
+    first = tuple(stream(scenario.seed, "places", background.id).random(3).tolist())
+    even = EvenShares(first)
+    yield _drawn(scenario, ground, background, rng, even, name=background.id, number=number)
 
 
 def window(scenario: Scenario, part: Window) -> tuple[float, float]:
@@ -147,13 +209,15 @@ def _drawn(
     ground: TripEnds,
     part: Window,
     rng: np.random.Generator,
+    even: EvenShares,
     *,
     name: str,
     number: float,
     between: tuple[tuple[str, ...], tuple[str, ...]] | tuple[()] = (),
 ) -> Trips:
-    count = int(number) + int(rng.random() < number % 1.0)
-    uniform = rng.random((count, 4))
+    count = even.whole(number)
+    uniform = rng.random((count, 2))
+    at_start, at_goal = even.places(count)
     begin, end = window(scenario, part)
     times = curve(scenario.demand, part.profile).draw(uniform[:, 0], begin=begin, end=end)
     departs = np.maximum(np.round(times, 2), FIRST)
@@ -164,8 +228,8 @@ def _drawn(
         mine = np.array([one is category for one in categories], dtype=np.bool_)
         reach = ground.reachable_ends(category, *between)
         if len(reach.starts):
-            picked = (uniform[mine, 2] * len(reach.starts)).astype(np.intp)
-            starts[mine], goals[mine] = reach.starts[picked], reach.goals(picked, uniform[mine, 3])
+            picked = (at_start[mine] * len(reach.starts)).astype(np.intp)
+            starts[mine], goals[mine] = reach.starts[picked], reach.goals(picked, at_goal[mine])
     met = goals >= 0
     return Trips(
         name=name,

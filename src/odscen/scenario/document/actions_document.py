@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from odscen.scenario.document.conditions_document import Coordinate, RulePlace, one_of
+from odscen.scenario.document.conditions_document import Coordinate, OwnKind, RulePlace, one_of
 from odscen.scenario.document.document_parts import Identifier, Label, Part
 
 Positive = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
@@ -103,11 +103,15 @@ class LateralMove(Part):
 
 
 class GapKeeping(Part):
-    """Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds."""
+    """Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
+
+    ``ahead``: drive in front of it at that gap, seconds at its speed.
+    """
 
     to: Identifier
     metres: Positive | None = None
     seconds: Positive | None = None
+    ahead: bool = False
     lasting: Positive | None = None
     rate: Rate = 3.0
 
@@ -255,6 +259,10 @@ class Releasing(Part):
     """SUMO drives as if there had been no rule."""
 
 
+class OwnAction(OwnKind):
+    """An action of an installed package."""
+
+
 class Action(Part):
     """One kind of action, or several that run together."""
 
@@ -278,6 +286,7 @@ class Action(Part):
     horn: Honking | None = None
     ignore: Ignoring | None = None
     release: Releasing | None = None
+    own: OwnAction | None = None
     together: Annotated[tuple[Action, ...], Field(min_length=2)] | None = None
 
     @model_validator(mode="after")

@@ -15,6 +15,7 @@ from odscen.scenario.document.document_parts import Identifier, Label, Part, Sec
 Coordinate = Annotated[float, Field(ge=-1e7, le=1e7, allow_inf_nan=False)]
 RulePlace = Label | tuple[Coordinate, Coordinate]
 """A node of the map, or x and y in the OpenDRIVE frame, metres."""
+OwnValue = Annotated[float, Field(allow_inf_nan=False)] | Label
 Metres = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 Signed = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
@@ -124,6 +125,29 @@ class Touching(Part):
     to: Identifier | None = None
 
 
+class OwnKind(Part):
+    """A kind that an installed package gives, with its name and its own ``values``.
+
+    ``to`` is another actor that it asks about, ``place`` a place.
+    """
+
+    kind: Identifier
+    to: Identifier | None = None
+    place: RulePlace | None = None
+    values: Annotated[dict[Identifier, OwnValue], Field(max_length=50)] = Field(
+        default_factory=dict
+    )
+
+
+class OwnCondition(OwnKind):
+    """A condition of an installed package; ``of`` is whose value it is, the rule's actor's if not.
+
+    See :mod:`odscen.scenario.story.own_kinds`.
+    """
+
+    of: Identifier | None = None
+
+
 class Condition(Part):
     """One kind of condition, or several that are combined; ``delay`` and ``edge`` fit all.
 
@@ -148,6 +172,7 @@ class Condition(Part):
     appeared: OneActor | None = None
     touched: Touching | None = None
     off_road: OneActor | None = None
+    own: OwnCondition | None = None
     all: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = None
     any: Annotated[tuple[Condition, ...], Field(min_length=1)] | None = None
     not_: Annotated[Condition | None, Field(alias="not")] = None

@@ -23,4 +23,5 @@ class Part(BaseModel):
         extra="forbid",
         allow_inf_nan=False,
         json_schema_serialization_defaults_required=True,
+        defer_build=True,  # the validator of the whole document has those of its parts in it
     )

@@ -1,7 +1,8 @@
 """Arithmetic with named values: ``$gap``, ``2 * $gap + 1``, ``round($speed / 3.6)``.
 
 The operators and functions are those of OpenSCENARIO 1.3 that give numbers: ``+ - * / %``,
-brackets, ``pow``, ``sqrt``, ``round``, ``floor``, ``ceil``, ``abs``, ``sign``, ``min`` and ``max``.
+brackets, ``pow``, ``sqrt``, ``round``, ``floor``, ``ceil``, ``abs``, ``sign``, ``min`` and ``max``,
+and ``pi``.
 Nothing else is ever called.
 """
 
@@ -99,6 +100,8 @@ def _value(node: ast.expr, values: Mapping[str, float]) -> float:
         raise SyntaxError(ast.unparse(node))
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
         return float(node.value)
+    if isinstance(node, ast.Name) and node.id == "pi":
+        return math.pi
     if isinstance(node, ast.Name) and node.id.startswith("_") and node.id[1:] in values:
         return float(values[node.id[1:]])
     if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:

@@ -7,10 +7,11 @@ in a JSON Pointer, except that parts with an id are named by it, ``rules/cut-in/
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError, ScenarioError
+from odscen.base.errors import InputError, NotFoundError, ScenarioError
 from odscen.scenario.document.expressions import evaluate, names_in
 
 if TYPE_CHECKING:
@@ -110,6 +111,37 @@ def put_back(
                 _set(written, keys, text)
         except (LookupError, TypeError, InputError):
             continue
+
+
+def put_formula(written: dict[str, Any], whole: Mapping[str, Any], place: str, text: str) -> None:
+    """Put a formula in the place of a number of a document that is to be written.
+
+    Parameters
+    ----------
+    written
+        The document, perhaps without what has its default value; it is changed.
+    whole
+        The same with all of its fields.
+    place
+        As in ``formulas``; it may hold nothing yet, where a number is optional.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such place.
+    ScenarioError
+        If it holds something else than a number.
+    """
+    keys = [_unescaped(key) for key in place.split("/")]
+    try:
+        there = _looked_up(whole, keys)
+    except (LookupError, TypeError) as error:
+        what = "number"
+        raise NotFoundError(what, place, []) from error
+    if isinstance(there, bool) or not (there is None or isinstance(there, int | float)):
+        msg = f"{place}: only a number can be computed, and this is {json.dumps(there):.60}"
+        raise ScenarioError(msg)
+    _set(written, keys, text)
 
 
 def _is_formula(text: str, key: str, values: Mapping[str, float]) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OPTIONAL = (
     "variant", "drivers", "demand", "transit", "signals", "measures", "study", "rules",
-    "parameters", "formulas",
+    "criteria", "parameters", "formulas",
 )  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")
@@ -106,7 +106,10 @@ def without_defaults(scenario: Scenario, field: str) -> Any:
     if value is None:
         return None
     if isinstance(value, tuple):
-        return [part.model_dump(mode="json", exclude_defaults=True) for part in value]
+        return [
+            part if isinstance(part, str) else part.model_dump(mode="json", exclude_defaults=True)
+            for part in value
+        ]
     return value.model_dump(mode="json", exclude_defaults=True)
 
 

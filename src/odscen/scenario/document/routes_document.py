@@ -35,7 +35,8 @@ class RouteChoice(Part):
     By ``length`` each takes the shortest. By ``travel_time`` the run is repeated, at most
     ``iterations`` times, and each time some trips change to the route that was quickest, until
     ``gap``, the share of travel time that could be saved, is small enough. Travel times are means
-    of ``interval`` seconds.
+    of ``interval`` seconds. With a ``spread`` drivers tell routes apart only roughly: of two routes
+    one of which takes longer by that share of the time, it is taken ``e`` times as rarely.
 
     ``informed`` is the share of drivers who look for a quicker route on the way, every ``period``
     seconds, whichever route they began with. ``shares`` deal out trips to routes beforehand.
@@ -45,6 +46,7 @@ class RouteChoice(Part):
     iterations: Annotated[int, Field(ge=1, le=100)] = 20
     gap: Annotated[float, Field(ge=0, lt=1)] = 0.01
     interval: Annotated[float, Field(ge=60, le=3600)] = 900.0
+    spread: Annotated[float, Field(ge=0, le=1)] = 0.03
     informed: Annotated[float, Field(ge=0, le=1)] = 0.0
     period: Annotated[float, Field(ge=1, le=3600)] = 60.0
     shares: Annotated[tuple[SharedRoutes, ...], Field(max_length=1000)] = ()

@@ -17,6 +17,7 @@ from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.parameters_document import Parameter, ParameterName
+from odscen.scenario.document.parking_document import TripParking
 from odscen.scenario.document.routes_document import RouteChoice
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
@@ -37,6 +38,7 @@ STEP_WITH_RULES: Final = 0.1
 
 Prose = Annotated[str, Field(max_length=10_000, pattern=_PROSE)]
 Speed = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+InitialSpeed = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 Number = Annotated[float, Field(ge=0, le=1e7, allow_inf_nan=False)]
 """How many road users; a fraction is a probability."""
 Share = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
@@ -44,6 +46,16 @@ Share = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 Mix = dict[Category, Annotated[float, Field(gt=0)]]
 """Share of each category; shares are relative, they need not sum to one."""
 
+
+Criterion = Annotated[
+    str,
+    Field(
+        max_length=200,
+        pattern=r"^\s*[A-Za-z_]\w*\s*(\(\s*[^()\s]+\s*\)\s*)?(>=|<=|==|>|<)\s*[-+.0-9eE]+\s*"
+        r"(%|[A-Za-z][A-Za-z/0-9]*)?\s*$",
+    ),
+]
+"""What must come out of a run: ``NAME OP NUMBER [UNIT]``, of one actor ``NAME(ACTOR) ...``."""
 
 _ANY_NAME = WithJsonSchema(
     {"type": "object", "additionalProperties": {"type": "number"}}, mode="serialization"
@@ -75,7 +87,8 @@ class Actor(Part):
     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
     positive to the left of the driving direction. ``style`` is a driving style or the id of a
     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
-    ``None`` is from rest.
+    ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
+    their order; an open goal is one that can be reached from the last of them.
     """
 
     id: Identifier
@@ -83,10 +96,11 @@ class Actor(Part):
     model: Label | None = None
     spawn: Label
     goal: Label | None = None
+    via: Annotated[tuple[Label, ...], Field(max_length=50)] = ()
     speed: Speed | None = None
     lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
     depart: Seconds = 0.0
-    initial_speed: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] | None = None
+    initial_speed: InitialSpeed | None = None
     style: Identifier = "normal"
     ego: bool = False
     crosses_anywhere: bool = False
@@ -98,7 +112,8 @@ class Flow(Part):
 
     Pedestrian nodes take pedestrians only, lane nodes the other six. With ``goal`` ``None`` each
     actor of the flow draws its own goal from the candidates. With a ``profile``, ``per_hour`` is
-    the mean of a day, and the profile says when there are more and when fewer.
+    the mean of a day, and the profile says when there are more and when fewer. ``initial_speed``
+    is that of its vehicles at departure, m/s; ``None`` is from rest.
     """
 
     id: Identifier
@@ -109,6 +124,7 @@ class Flow(Part):
     end: Seconds = 3600.0
     mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
     speed: Speed | None = None
+    initial_speed: InitialSpeed | None = None
     profile: Identifier | None = None
 
 
@@ -223,7 +239,7 @@ class VehicleInput(Window):
 class Demand(Part):
     """Traffic around the placed actors; ``clock`` is the time of day at the start, seconds.
 
-    ``routes`` says how its trips choose their routes.
+    ``routes`` says how its trips choose their routes, ``parking`` which of them park.
     """
 
     clock: Annotated[float, Field(ge=0, lt=86_400)] = 0.0
@@ -234,6 +250,7 @@ class Demand(Part):
     counts: tuple[Counts, ...] = ()
     background: tuple[Background, ...] = ()
     routes: RouteChoice = RouteChoice()
+    parking: TripParking = TripParking()
 
     @property
     def parts(self) -> tuple[tuple[str, VehicleInput | Matrix | Counts | Background], ...]:
@@ -309,6 +326,8 @@ class Scenario(Part):
         Warm-up and interval of the figures, s.
     rules
         What actors do, and when.
+    criteria
+        What must come out of a run for it to pass, as expectations of a suite are written.
     parameters
         Named numbers that others are computed from.
     formulas
@@ -337,6 +356,7 @@ class Scenario(Part):
     simulation: Simulation = Simulation()
     study: Study = Study()
     rules: tuple[StoryRule, ...] = ()
+    criteria: Annotated[tuple[Criterion, ...], Field(max_length=200)] = ()
     parameters: dict[ParameterName, Parameter] = Field(default_factory=dict, max_length=200)
     formulas: dict[str, str] = Field(default_factory=dict)
 

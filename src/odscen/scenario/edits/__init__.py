@@ -21,30 +21,41 @@ from odscen.scenario.edits.demand_edits import (
     set_counts,
     set_input,
     set_matrix,
+    set_parking,
     set_profile,
     set_routes,
     set_zone,
 )
 from odscen.scenario.edits.flow_edits import add_flow, change_flow, remove_flow
 from odscen.scenario.edits.measure_edits import remove_measure, set_measure
+from odscen.scenario.edits.parameter_edits import remove_parameter, set_formula, set_parameter
 from odscen.scenario.edits.roi_edits import (
     eligible_segments,
+    extend_roi,
     grow_roi,
     removable_segments,
     shrink_roi,
 )
 from odscen.scenario.edits.rule_edits import remove_rule, set_rule
 from odscen.scenario.edits.settings_edits import (
-    clear_timing,
     new_scenario,
     rename,
+    set_criteria,
     set_drivers,
     set_environment,
     set_seed,
-    set_signal_control,
     set_simulation,
-    set_timing,
 )
+from odscen.scenario.edits.signal_edits import (
+    clear_timing,
+    set_green,
+    set_offset,
+    set_signal_control,
+    set_stage,
+    set_timing,
+    set_turn,
+)
+from odscen.scenario.edits.study_edits import set_study
 from odscen.scenario.edits.transit_edits import remove_transit, set_line, set_stop
 
 __all__ = [
@@ -55,6 +66,7 @@ __all__ = [
     "clear_timing",
     "copy_actors",
     "eligible_segments",
+    "extend_roi",
     "fill_roi",
     "grow_roi",
     "move_actor",
@@ -64,28 +76,38 @@ __all__ = [
     "remove_demand",
     "remove_flow",
     "remove_measure",
+    "remove_parameter",
     "remove_rule",
     "remove_transit",
     "rename",
     "set_background",
     "set_clock",
     "set_counts",
+    "set_criteria",
     "set_drivers",
     "set_ego",
     "set_environment",
+    "set_formula",
     "set_goal",
+    "set_green",
     "set_input",
     "set_line",
     "set_matrix",
     "set_measure",
+    "set_offset",
+    "set_parameter",
+    "set_parking",
     "set_profile",
     "set_routes",
     "set_rule",
     "set_seed",
     "set_signal_control",
     "set_simulation",
+    "set_stage",
     "set_stop",
+    "set_study",
     "set_timing",
+    "set_turn",
     "set_zone",
     "shrink_roi",
 ]

@@ -5,7 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Any
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.checks.actor_checks import (
+    Subject,
+    goal_problems,
+    spawn_problems,
+    via_problems,
+)
 from odscen.scenario.checks.scenario_checks import duplicate_ids, roi_problems, shared_nodes
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.sampling_config import SamplingConfig, overridden
@@ -70,14 +75,23 @@ def add_actor(
 
 @edit("Move {actor}")
 def move_actor(scenario: Scenario, graph: MapGraph, actor: str, *, spawn: str) -> Scenario:
-    """Place an actor on another node; a goal that cannot be reached from there is opened."""
+    """Place an actor on another node; a goal that cannot be reached from there is opened.
+
+    If places that its route leads through cannot be, it leads through none.
+    """
     index = index_of(scenario.actors, actor)
     moved = with_actor(scenario, index, spawn=spawn)
     region = Region.of(graph, scenario.roi)
     subject = Subject.actor(moved, region, index)
     place, problems = spawn_problems(subject)
     refuse_errors([*problems, *shared_nodes(moved)])
-    if place is not None and any(p.severity == "error" for p in goal_problems(subject, place)):
+    if place is None:
+        return moved
+    last, _ = via_problems(subject, place)
+    if last is None:
+        moved, last = with_actor(moved, index, via=()), place
+        subject = Subject.actor(moved, region, index)
+    if any(p.severity == "error" for p in goal_problems(subject, last)):
         return with_actor(moved, index, goal=None)
     return moved
 
@@ -102,7 +116,8 @@ def change_actor(scenario: Scenario, actor: str, **fields: Annotated[Any, Actor]
     """Change fields of an actor that have no rule on the graph, for example ``speed`` or ``style``.
 
     A new category drops the model, unless one is given with it. For ``spawn``, ``goal`` and ``ego``
-    there are :func:`move_actor`, :func:`set_goal` and :func:`set_ego`.
+    there are :func:`move_actor`, :func:`set_goal` and :func:`set_ego`. Whether a route leads
+    through the places of ``via`` is for the checks to say.
 
     Raises
     ------

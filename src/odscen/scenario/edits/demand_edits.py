@@ -8,6 +8,7 @@ from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.demand_checks import demand_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
 from odscen.scenario.document.document_parts import Identifier  # noqa: TC001 (read at run time)
+from odscen.scenario.document.parking_document import TripParking
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.routes_document import RouteChoice
 from odscen.scenario.document.scenario_document import (
@@ -58,6 +59,21 @@ def set_routes(
     old = scenario.demand.routes
     kept = {name: getattr(old, name) for name in RouteChoice.model_fields}
     return _checked(_changed(scenario, routes=validated(RouteChoice, {**kept, **fields})), graph)
+
+
+@edit("Parking of trips")
+def set_parking(scenario: Scenario, **fields: Annotated[Any, TripParking]) -> Scenario:
+    """Change which trips of the demand begin and end in parking places.
+
+    Parameters
+    ----------
+    fields
+        Fields of :class:`~odscen.scenario.document.parking_document.TripParking`, such as ``end``;
+        those not given stay as they are.
+    """
+    old = scenario.demand.parking
+    kept = {name: getattr(old, name) for name in TripParking.model_fields}
+    return _changed(scenario, parking=validated(TripParking, {**kept, **fields}))
 
 
 @edit("Zone {zone}")

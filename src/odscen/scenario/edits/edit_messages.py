@@ -13,7 +13,15 @@ import operator
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, create_model
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    create_model,
+)
 
 from odscen.base.errors import ScenarioError
 from odscen.scenario.document import document_parts, scenario_document, signals_document
@@ -93,10 +101,18 @@ def _message(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
 def _optional_fields(part: type[Part]) -> dict[str, Any]:
     """Fields of a part of the document, none of which must be given.
 
-    Whether a value is possible is for the edit to say, in its own words.
+    Whether a value is possible is for the edit to say, in its own words. Where the document has a
+    short form of a value, such as a number for a distribution, so does the message.
     """
     left_out = Field(default=None, json_schema_extra=_without_default)
-    return {name: (field.annotation, left_out) for name, field in part.model_fields.items()}
+    fields: dict[str, Any] = {}
+    for name, field in part.model_fields.items():
+        read: Any = field.annotation
+        for one in field.metadata:
+            if isinstance(one, BeforeValidator):
+                read = Annotated[read, one]
+        fields[name] = (read, left_out)
+    return fields
 
 
 def _without_default(schema: dict[str, Any]) -> None:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from itertools import count
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from odscen.base.errors import NotFoundError
-from odscen.scenario.checks.actor_checks import Subject, goal_problems, spawn_problems
+from odscen.scenario.checks.actor_checks import (
+    Subject,
+    goal_problems,
+    spawn_problems,
+    via_problems,
+)
 from odscen.scenario.checks.scenario_checks import duplicate_ids, shared_nodes
 from odscen.scenario.document.document_parts import Part
 from odscen.scenario.document.problems import Problem, refuse_errors
@@ -22,6 +27,15 @@ if TYPE_CHECKING:
 
 PlacedOne = TypeVar("PlacedOne", bound=Actor | Flow)
 DocumentPart = TypeVar("DocumentPart", bound=Part)
+NamedPart = TypeVar("NamedPart", bound="HasId")
+
+
+class HasId(Protocol):
+    """A part of a list of the document, with an id that is its alone."""
+
+    @property
+    def id(self) -> str:
+        """What it is called by."""
 
 
 def with_fields(scenario: Scenario, **changes: Any) -> Scenario:
@@ -44,6 +58,40 @@ def with_actor(scenario: Scenario, index: int, **changes: Any) -> Scenario:
 def replaced_at(ones: tuple[PlacedOne, ...], index: int, one: PlacedOne) -> tuple[PlacedOne, ...]:
     """Copy of a tuple with another element at ``index``."""
     return (*ones[:index], one, *ones[index + 1 :])
+
+
+def put_part(
+    parts: tuple[NamedPart, ...], part: NamedPart, *, what: str, instead_of: str | None = None
+) -> tuple[tuple[NamedPart, ...], int]:
+    """Copy of a tuple with a part in the place of that with its id, or at its end; and where it is.
+
+    ``what`` it is, for the message; ``instead_of`` is the id that is replaced if it is another one.
+
+    Raises
+    ------
+    NotFoundError
+        If no part has the id ``instead_of``.
+    """
+    ids = [one.id for one in parts]
+    if instead_of is not None and instead_of not in ids:
+        raise NotFoundError(what, instead_of, ids)
+    name = part.id if instead_of is None else instead_of
+    index = ids.index(name) if name in ids else len(ids)
+    return (*parts[:index], part, *parts[index + 1 :]), index
+
+
+def drop_part(parts: tuple[NamedPart, ...], what: str, name: str) -> tuple[NamedPart, ...]:
+    """Copy of a tuple without the part with this id; ``what`` it is, for the message.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
+    left = tuple(one for one in parts if one.id != name)
+    if len(left) == len(parts):
+        raise NotFoundError(what, name, [one.id for one in parts])
+    return left
 
 
 def all_placed(scenario: Scenario) -> tuple[Actor | Flow, ...]:
@@ -88,6 +136,9 @@ def refuse_placement(
     subject = subject_of(scenario, Region.of(graph, scenario.roi), index)
     place, problems = spawn_problems(subject)
     found: list[Problem] = [*problems, *shared_nodes(scenario), *duplicate_ids(scenario)]
+    if place is not None:
+        place, passing = via_problems(subject, place)
+        found += passing
     if place is not None and subject.one.goal is not None:
         found += goal_problems(subject, place)
     refuse_errors(found)

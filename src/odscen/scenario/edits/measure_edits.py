@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
 from odscen.scenario.document.measures_document import Measure  # noqa: TC001 (read at run time)
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import with_fields
+from odscen.scenario.edits.edited_parts import drop_part, put_part, with_fields
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
@@ -20,10 +19,17 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.light import Light
 
+_WHAT = "measure"
+
 
 @edit("Measure {measure.id}")
 def set_measure(
-    scenario: Scenario, graph: MapGraph, lights: Sequence[Light] | None = None, *, measure: Measure
+    scenario: Scenario,
+    graph: MapGraph,
+    lights: Sequence[Light] | None = None,
+    *,
+    measure: Measure,
+    instead_of: str | None = None,
 ) -> Scenario:
     """Add a measure, or put it in the place of that with its id; of another kind, too.
 
@@ -31,18 +37,21 @@ def set_measure(
     ----------
     lights
         Traffic lights of the map, for the rules on outages.
+    instead_of
+        Id of the measure that it replaces, if that has another one: it is renamed.
 
     Raises
     ------
     ScenarioError
         If the map has no such place or light, or the id is taken.
+    NotFoundError
+        If there is no measure ``instead_of``.
     """
-    old = scenario.measures
-    if all(one.id != measure.id for one in old):
-        return _checked(scenario, graph, lights, (*old, measure))
-    return _checked(
-        scenario, graph, lights, tuple(measure if one.id == measure.id else one for one in old)
-    )
+    measures, _ = put_part(scenario.measures, measure, what=_WHAT, instead_of=instead_of)
+    scenario = with_fields(scenario, measures=measures)
+    region = Region.of(graph, scenario.roi)
+    refuse_errors([*measure_problems(scenario, region, lights), *duplicate_ids(scenario)])
+    return scenario
 
 
 @edit("Remove {measure}")
@@ -54,21 +63,4 @@ def remove_measure(scenario: Scenario, *, measure: str) -> Scenario:
     NotFoundError
         If there is none.
     """
-    left = tuple(one for one in scenario.measures if one.id != measure)
-    if len(left) == len(scenario.measures):
-        what = "measure"
-        raise NotFoundError(what, measure, [one.id for one in scenario.measures])
-    return with_fields(scenario, measures=left)
-
-
-def _checked(
-    scenario: Scenario,
-    graph: MapGraph,
-    lights: Sequence[Light] | None,
-    measures: tuple[Measure, ...],
-) -> Scenario:
-    """Return the scenario if its measures can act; what is only unusual passes."""
-    scenario = with_fields(scenario, measures=measures)
-    region = Region.of(graph, scenario.roi)
-    refuse_errors([*measure_problems(scenario, region, lights), *duplicate_ids(scenario)])
-    return scenario
+    return with_fields(scenario, measures=drop_part(scenario.measures, _WHAT, measure))

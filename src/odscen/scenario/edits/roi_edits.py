@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import NotFoundError, ScenarioError
 from odscen.base.ids import SegmentId
-from odscen.lanegraph.query import neighbours, removable
+from odscen.lanegraph.query import is_connected, neighbours, removable
+from odscen.scenario.checks.actor_checks import vias
 from odscen.scenario.edits.edit_registry import edit
 from odscen.scenario.edits.edited_parts import (
     PlacedOne,
@@ -17,6 +18,8 @@ from odscen.scenario.edits.edited_parts import (
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import (
         Actor,
@@ -58,6 +61,34 @@ def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     return with_fields(scenario, roi=(*scenario.roi, segment))
 
 
+@edit("Extend the region")
+def extend_roi(scenario: Scenario, graph: MapGraph, segments: Sequence[str]) -> Scenario:
+    """Add several segments to the region of interest at once, in any order (R29).
+
+    Parameters
+    ----------
+    segments
+        Those that are inside already change nothing.
+
+    Raises
+    ------
+    ScenarioError
+        If the region would then be in several pieces, or if nothing is added.
+    NotFoundError
+        If the map has no such segment.
+    """
+    for segment in segments:
+        _known_segment(graph, segment)
+    roi = tuple(dict.fromkeys((*scenario.roi, *segments)))
+    if len(roi) == len(scenario.roi):
+        msg = "all of these segments are in the region of interest already"
+        raise ScenarioError(msg)
+    if not is_connected(graph.segments, roi):
+        msg = "with these segments the region of interest would be in several pieces"
+        raise ScenarioError(msg)
+    return with_fields(scenario, roi=roi)
+
+
 @edit("Remove segment {segment}")
 def shrink_roi(
     scenario: Scenario, graph: MapGraph, segment: str, *, with_actors: bool = False
@@ -67,8 +98,9 @@ def shrink_roi(
     Parameters
     ----------
     with_actors
-        Also remove the actors and flows that start in the segment, and open goals that lie in it
-        (they are then drawn). Without, the segment must be free of both.
+        Also remove the actors and flows that start in the segment, open goals that lie in it
+        (they are then drawn), and let no route lead through places in it. Without, the segment
+        must be free of all of them.
 
     Raises
     ------
@@ -109,13 +141,19 @@ def _inside(region: Region, node: str | None) -> bool:
 
 
 def _uses(region: Region, one: Actor | Flow) -> bool:
-    return _inside(region, one.spawn) or _inside(region, one.goal)
+    return any(_inside(region, node) for node in (one.spawn, one.goal, *vias(one)))
 
 
 def _clear(region: Region, ones: tuple[PlacedOne, ...]) -> tuple[PlacedOne, ...]:
-    """Those that do not start in the region, with goals in it opened."""
+    """Those that do not start in the region, without goals and places to pass in it."""
     return tuple(
-        changed_part(one, {"goal": None}) if _inside(region, one.goal) else one
+        changed_part(one, _without(region, one)) if _uses(region, one) else one
         for one in ones
         if not _inside(region, one.spawn)
     )
+
+
+def _without(region: Region, one: Actor | Flow) -> dict[str, Any]:
+    changes: dict[str, Any] = {"goal": None} if _inside(region, one.goal) else {}
+    kept = tuple(node for node in vias(one) if not _inside(region, node))
+    return changes if kept == vias(one) else changes | {"via": kept}

@@ -4,25 +4,37 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import NotFoundError
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import StoryRule  # noqa: TC001 (read at run time)
 from odscen.scenario.edits.edit_registry import edit
-from odscen.scenario.edits.edited_parts import with_fields
+from odscen.scenario.edits.edited_parts import (
+    changed_part,
+    drop_part,
+    put_part,
+    with_fields,
+)
 from odscen.scenario.placing.region import Region
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.conditions_document import Condition
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.light import Light
+
+_WHAT = "rule"
 
 
 @edit("Rule {rule.id}")
 def set_rule(
-    scenario: Scenario, graph: MapGraph, lights: Sequence[Light] | None = None, *, rule: StoryRule
+    scenario: Scenario,
+    graph: MapGraph,
+    lights: Sequence[Light] | None = None,
+    *,
+    rule: StoryRule,
+    instead_of: str | None = None,
 ) -> Scenario:
     """Add a rule, or put it in the place of that with its id.
 
@@ -30,19 +42,31 @@ def set_rule(
     ----------
     lights
         Traffic lights of the map, for the checks of signals.
+    instead_of
+        Id of the rule that it replaces, if that has another one: it is renamed, and rules that wait
+        for it do so by the new name.
 
     Raises
     ------
     ScenarioError
-        If the rule names an actor, place, light or rule that is not there. What is wrong with other
-        rules is left to the checks, so that they can be mended one after another.
+        If the rule names an actor, place, light or rule that is not there, or its id is taken.
+        What is wrong with other rules is left to the checks, so that they can be mended one after
+        another.
+    NotFoundError
+        If there is no rule ``instead_of``.
     """
-    ids = [one.id for one in scenario.rules]
-    index = ids.index(rule.id) if rule.id in ids else len(ids)
-    rules = (*scenario.rules[:index], rule, *scenario.rules[index + 1 :])
+    rules, index = put_part(scenario.rules, rule, what=_WHAT, instead_of=instead_of)
+    if instead_of is not None:
+        rules = tuple(
+            changed_part(one, {"when": _waiting(one.when, instead_of, rule.id)}) for one in rules
+        )
     scenario = with_fields(scenario, rules=rules)
     problems = rule_problems(scenario, Region.of(graph, scenario.roi), lights)
-    refuse_errors([one for one in problems if one.where.startswith(f"rules[{index}]")])
+    refuse_errors(
+        one
+        for one in problems
+        if one.where.startswith(f"rules[{index}]") or one.code == "duplicate_id"
+    )
     return scenario
 
 
@@ -55,8 +79,17 @@ def remove_rule(scenario: Scenario, *, rule: str) -> Scenario:
     NotFoundError
         If there is none.
     """
-    left = tuple(one for one in scenario.rules if one.id != rule)
-    if len(left) == len(scenario.rules):
-        what = "rule"
-        raise NotFoundError(what, rule, [one.id for one in scenario.rules])
-    return with_fields(scenario, rules=left)
+    return with_fields(scenario, rules=drop_part(scenario.rules, _WHAT, rule))
+
+
+def _waiting(condition: Condition, old: str, new: str) -> Condition:
+    """Copy of a condition that waits for the rule ``new`` wherever it waited for ``old``."""
+    changes: dict[str, object] = {}
+    if condition.rule is not None and condition.rule.id == old:
+        changes["rule"] = changed_part(condition.rule, {"id": new})
+    if condition.not_ is not None:
+        changes["not_"] = _waiting(condition.not_, old, new)
+    for join in ("all", "any"):
+        if (parts := getattr(condition, join)) is not None:
+            changes[join] = tuple(_waiting(one, old, new) for one in parts)
+    return changed_part(condition, changes)

@@ -53,7 +53,7 @@ GOAL = "goal"
 
 _JSON = (
     "variant", "roi", "environment", "drivers", "demand", "transit", "signals", "measures",
-    "simulation", "study", "rules", "parameters", "formulas",
+    "simulation", "study", "rules", "criteria", "parameters", "formulas",
 )  # fmt: skip
 """Graph attributes that hold JSON."""
 
@@ -173,8 +173,9 @@ def _write(graph: nx.MultiDiGraph, prefix: str, order: int, one: Actor | Flow) -
             raise ScenarioError(msg, element=f"{prefix}s[{order}].{what}")
     data = one.model_dump(mode="json", exclude={"spawn", "goal"}, exclude_none=True)
     attributes = {
-        f"{prefix}_{name}": json.dumps(value) if isinstance(value, dict) else value
+        f"{prefix}_{name}": json.dumps(value) if isinstance(value, dict | list) else value
         for name, value in data.items()
+        if value != []
     }
     graph.nodes[one.spawn].update({f"{prefix}_order": order, **attributes})
     if one.goal is not None:
@@ -197,8 +198,8 @@ def _read(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> Iterator[_O
         fields["spawn"], fields["goal"] = str(node), _goal(graph, node)
         if "id" not in fields:
             fields["id"] = next(free)
-        if "mix" in fields:
-            fields["mix"] = _from_json("mix", fields["mix"])
+        for name in {"mix", "via"} & fields.keys():
+            fields[name] = _from_json(name, fields[name])
         yield _checked(model, fields)
 
 

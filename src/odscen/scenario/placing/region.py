@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from odscen.lanegraph.query import (
 from odscen.lanegraph.shortest_paths import Router, WalkRouter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from odscen.base.arrays import BoolArray, Int32Array
     from odscen.lanegraph.graphs import LaneGraph, MapGraph, PedestrianGraph
@@ -33,6 +34,10 @@ class NodePlace(NamedTuple):
 
     walk: bool
     node: int
+
+
+_MOST = 200_000
+"""Pairs of places that a region remembers; then it begins anew."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +61,8 @@ class Region:
 
     @classmethod
     def of(cls, graph: MapGraph, segments: Iterable[str]) -> Region:
-        """Make the region of these segments; names that the map does not have are left out."""
-        known = set(graph.segments.ids)
-        inside = tuple(SegmentId(name) for name in dict.fromkeys(segments) if name in known)
-        roi = induced(graph, inside)
-        return cls(graph, inside, roi.nodes, roi.walk_nodes)
+        """The region of these segments; names that the map does not have are left out."""
+        return _region(graph, tuple(segments))
 
     @cached_property
     def router(self) -> Router:
@@ -109,14 +111,25 @@ class Region:
             known = bool(self.router_of(spawn).reachable(spawn.node)[goal.node])
         return known
 
+    def path_over(self, nodes: Sequence[int], *, walk: bool) -> Int32Array:
+        """Nodes of the path from node to node, each leg the shortest; empty if there is none."""
+        router = self.walk_router if walk else self.router
+        found = [router.path(here, there) for here, there in pairwise(nodes)]
+        if not all(len(one) for one in found):
+            return np.empty(0, dtype=np.int32)
+        return np.concatenate([found[0], *(one[1:] for one in found[1:])])
+
     def look_up(self, pairs: Iterable[tuple[str, str | None]]) -> None:
         """Find the paths between many spawns and goals at once, for :meth:`leads` to remember."""
         places = {(self.place(spawn), self.place(goal)) for spawn, goal in pairs if goal}
+        if len(self._leads) > _MOST:
+            self._leads.clear()
         for router, walk in ((self.router, False), (self.walk_router, True)):
             asked = [
                 (spawn, goal)
-                for spawn, goal in places - self._leads.keys()
+                for spawn, goal in places
                 if spawn and goal and spawn.walk == goal.walk == walk
+                if (spawn, goal) not in self._leads
                 if self.holds(spawn) and self.holds(goal)
             ]
             if asked:
@@ -137,6 +150,15 @@ class Region:
         return self.graph.segments.ids[int(self.nodes_of(place).segment[place.node])]
 
 
+@lru_cache(maxsize=4)
+def _region(graph: MapGraph, segments: tuple[str, ...]) -> Region:
+    """One region for all scenarios of a batch that have it, with what is known of its paths."""
+    known = set(graph.segments.ids)
+    inside = tuple(SegmentId(name) for name in dict.fromkeys(segments) if name in known)
+    roi = induced(graph, inside)
+    return Region(graph, inside, roi.nodes, roi.walk_nodes)
+
+
 def place_of(graph: MapGraph, node: str) -> NodePlace | None:
     """Where a node id leads; ``None`` if the map has no such node."""
     walk = is_walk_node_id(node)
@@ -145,6 +167,12 @@ def place_of(graph: MapGraph, node: str) -> NodePlace | None:
     except NotFoundError:
         return None
     return NodePlace(walk, row)
+
+
+def turns_round(path: Int32Array) -> int | None:
+    """Node at which a path goes back the way it came; ``None`` if there is none."""
+    turns = np.flatnonzero(path[2:] == path[:-2])
+    return int(path[turns[0] + 1]) if len(turns) else None
 
 
 def on_foot(category: Category) -> bool:

@@ -35,7 +35,7 @@ from odscen.scenario.placing.usable_nodes import Usable
 from odscen.scenario.sampling.sampled_behaviour import draw_behaviour
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.base.arrays import Int32Array
     from odscen.base.ids import SegmentId
@@ -124,6 +124,7 @@ def sample_scenario(
     name: str,
     usable: Usable | None = None,
     roi: Iterable[str] | None = None,
+    place: Callable[[Region, Crew], tuple[Actor, ...]] | None = None,
 ) -> Scenario:
     """Sample a scenario.
 
@@ -133,6 +134,8 @@ def sample_scenario(
         What the simulator that will run it can use of the map; everything if not given.
     roi
         Segments of the region of interest; drawn by the configuration if not given.
+    place
+        Places the actors in a region; they are placed at random if not given.
 
     Raises
     ------
@@ -145,7 +148,11 @@ def sample_scenario(
     for attempt in range(attempts):
         segments = tuple(roi) if roi is not None else _draw_roi(graph, config, seed, attempt)
         region = Region.of(graph, segments)
-        actors = _sample_actors(region, config, usable, fill=fill, seed=seed)
+        crew = wanted_crew(region, config, usable, fill=fill)
+        if place is not None and (crew.vehicles or crew.walkers or fill == 0):
+            actors = place(region, crew)
+            break
+        actors = _sample_actors(region, config, usable, crew, seed)
         if actors or fill == 0:
             break
     else:
@@ -240,9 +247,17 @@ class _ScenarioDraft(NamedTuple):
     fields: dict[str, object]
 
 
-def _sample_actors(
-    region: Region, config: SamplingConfig, usable: Usable, *, fill: float, seed: int
-) -> tuple[Actor, ...]:
+class Crew(NamedTuple):
+    """How many road users are wanted in a region, and where they may be."""
+
+    vehicles: int
+    walkers: int
+    road_places: Supply
+    walk_places: Supply
+
+
+def wanted_crew(region: Region, config: SamplingConfig, usable: Usable, *, fill: float) -> Crew:
+    """Find the places of a region, and how many road users a share of them amounts to."""
     supply = vehicle_supply(region, config.places, config.vehicles, usable)
     walkers = walker_supply(region, usable)
     cars, people = numbers_to_place(
@@ -252,6 +267,13 @@ def _sample_actors(
         pedestrian_share=config.pedestrian_share,
         most=config.actors_max,
     )
+    return Crew(cars, people, supply, walkers)
+
+
+def _sample_actors(
+    region: Region, config: SamplingConfig, usable: Usable, crew: Crew, seed: int
+) -> tuple[Actor, ...]:
+    cars, people, supply, walkers = crew
     rng = stream(seed, "places")
     drafts = [
         *_drafts(region, config, usable, place_at_random(supply, cars, rng), supply, seed=seed),

@@ -76,21 +76,40 @@ _GAP_GAIN = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ActionKind:
-    """An entry of the registry: for the table in the documents, and for the run.
+    """A kind of action: an entry of the registry, or the object of an entry point.
 
-    ``begin`` takes over what the action needs and gives the instant at which it is over, infinity
-    if that is not known yet. ``update`` is asked at the beginning of each further step, and gets
-    and gives that instant. ``finish`` says what comes after it. An action with ``ask`` has no
-    ``begin``: it is done by the simulator, and its actor need not be on the road. ``says`` gives
-    what is reported when it has begun, of those that no motion follows from.
+    Attributes
+    ----------
+    name
+        How documents name it.
+    meaning, unit
+        In words, for the table in the documents.
+    sumo, openscenario, carla
+        What it is there.
+    begin
+        Gets the part of the document and an
+        :class:`~odscen.scenario.story.acting_actor.ActingActor`, takes over what the action needs,
+        and gives the instant at which it is over, infinity if that is not known yet.
+    update
+        Is asked at the beginning of each further step, and gets and gives that instant.
+    finish
+        Says what comes after it.
+    vehicles_only, persons_only
+        Whose action it is.
+    ask
+        In place of ``begin``: it is done by the simulator, and its actor need not be on the road.
+    says
+        What is reported when it has begun, of those that no motion follows from.
+    check
+        Says what is wrong with the part of a document, in words, ``None`` if nothing is.
     """
 
     name: str
     meaning: str
-    unit: str
-    sumo: str
-    openscenario: str
-    carla: str
+    unit: str = ""
+    sumo: str = "`setSpeed` or `moveToXY`"
+    openscenario: str = "none"
+    carla: str = "mirrored"
     begin: Callable[[Any, ActingActor], float] | None = None
     update: Callable[[Any, ActingActor, float], float] | None = None
     finish: Callable[[Any, ActingActor], None] | None = None
@@ -98,6 +117,7 @@ class ActionKind:
     persons_only: bool = False
     ask: Callable[[Any, str, RoadView], Wanted] | None = None
     says: Callable[[Any], str] | None = None
+    check: Callable[[Any], str | None] | None = None
 
 
 def _speed(part: SpeedChange, one: ActingActor) -> float:
@@ -169,10 +189,11 @@ def _follow(part: GapKeeping, one: ActingActor) -> None:
     me = one.actor
     c, s = math.cos(me.hdg), math.sin(me.hdg)
     ahead = (other.x - me.x) * c + (other.y - me.y) * s
-    gap = ahead - (me.length + other.length) / 2.0
+    gap = (-ahead if part.ahead else ahead) - (me.length + other.length) / 2.0
     speed = one.speed
-    wanted = part.metres if part.metres is not None else (part.seconds or 0.0) * speed
-    error = gap - wanted
+    behind = other.speed if part.ahead else speed
+    wanted = part.metres if part.metres is not None else (part.seconds or 0.0) * behind
+    error = wanted - gap if part.ahead else gap - wanted
     # Far away no faster than half the rate can take back in time.
     faster = min(_GAP_GAIN * abs(error), math.sqrt(part.rate * abs(error)))
     target = max(0.0, other.speed + math.copysign(faster, error))
@@ -248,7 +269,8 @@ ACTIONS = {
             move_aside, lane_lasts, leave_line, vehicles_only=True,
         ),
         ActionKind(
-            "keep_gap", "follow `to` at a free gap of `metres`, or of `seconds` at the own speed, "
+            "keep_gap", "follow `to`, or drive `ahead` of it, at a free gap of `metres`, or of "
+            "`seconds` at the speed of the one behind, "
             "with `rate` at most; for `lasting` seconds", "m, s, m/s²", "`setSpeed` each step",
             "LongitudinalDistanceAction", _MIRRORED, _keep_gap, _follow_on, _keep,
             vehicles_only=True,
@@ -313,6 +335,10 @@ ACTIONS = {
         ActionKind(
             "release", "SUMO drives as if there had been no rule", "", "all of the above undone",
             "ActivateControllerAction", _MIRRORED, _release,
+        ),
+        ActionKind(
+            "own", "a `kind` that an installed package gives, with its `values`", "its own",
+            "its own", "none", _MIRRORED,
         ),
     )
 }  # fmt: skip

@@ -115,6 +115,11 @@ class Channel:
     _laws: list[tuple[float, AnyLaw]] = field(default_factory=list)
     _forced: bool = False
 
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is taken over, nor will be: another one would do as well."""
+        return self.law is None and self.line is None and not (self.leaves or self.settles)
+
     def begin_step(self, view: ActorView, time: float) -> None:
         """Begin a step at ``time``: from here on laws follow one another."""
         if self.leaves:

@@ -57,24 +57,38 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ConditionKind:
-    """An entry of the registry: for the table in the documents, and for the run.
+    """A kind of condition: an entry of the registry, or the object of an entry point.
 
-    ``read`` gets the part of the document, the rule's actor and what is seen; ``None`` is what it
-    gives where an actor is not on the road.
+    Attributes
+    ----------
+    name
+        How documents name it.
+    meaning, unit
+        In words, for the table in the documents.
+    sumo, openscenario, carla
+        What it is there.
+    read
+        Gets the part of the document, the id of the rule's actor and what is seen, a
+        :class:`~odscen.scenario.story.road_view.RoadView`; ``None`` is what it gives where an actor
+        is not on the road.
+    check
+        Says what is wrong with the part of a document, in words, ``None`` if nothing is.
     """
 
     name: str
     meaning: str
-    unit: str
-    sumo: str
-    openscenario: str
-    carla: str
-    read: Callable[[Any, str, RoadView], Reading | None] | None
+    unit: str = ""
+    sumo: str = "read each step"
+    openscenario: str = "none"
+    carla: str = "mirrored"
+    read: Callable[[Any, str, RoadView], Reading | None] | None = None
+    check: Callable[[Any], str | None] | None = None
 
 
 def _bounded(part: Bounded, value: float, rate: float | None = None) -> Reading:
-    if part.below is not None:
-        return Reading(value, part.below - value, None if rate is None else -rate)
+    below = part.below
+    if below is not None:
+        return Reading(value, below - value, None if rate is None else -rate)
     return Reading(value, value - (part.above or 0.0), rate)
 
 
@@ -110,17 +124,20 @@ def _lengthwise(one: ActorView, other: ActorView) -> _Lengthwise:
     c, s = math.cos(guide.hdg), math.sin(guide.hdg)
     dx, dy = other.x - one.x, other.y - one.y
     ahead, aside = dx * c + dy * s, dy * c - dx * s
-    (ax, ay), (bx, by) = one.velocity, other.velocity
-    faster = (ax - bx) * c + (ay - by) * s
-    front, rear = (other, one) if ahead >= 0.0 else (one, other)
-    half = sum(_reach(each, guide.hdg) for each in (one, other))
-    closing = faster if front is other else -faster
-    return _Lengthwise(ahead, aside, closing, abs(ahead) - half, rear)
+    faster = one.speed * math.cos(one.hdg - guide.hdg) - other.speed * math.cos(
+        other.hdg - guide.hdg
+    )
+    gap = abs(ahead) - _reach(one, guide.hdg) - _reach(other, guide.hdg)
+    if ahead >= 0.0:
+        return _Lengthwise(ahead, aside, faster, gap, one)
+    return _Lengthwise(ahead, aside, -faster, gap, other)
 
 
 def _reach(body: ActorView, hdg: float) -> float:
     """Metres from the centre of a body to its farthest point in a direction."""
     turned = body.hdg - hdg
+    if turned == 0.0:  # half of all that is asked
+        return body.length / 2.0
     across = body.width * abs(math.sin(turned))
     return (body.length * abs(math.cos(turned)) + across) / 2.0
 
@@ -335,6 +352,10 @@ CONDITIONS = {
             "off_road", "the centre of the body is on no lane", "", "on whole steps",
             "OffroadCondition", _MIRRORED, _off_road,
         ),
+        ConditionKind(
+            "own", "a `kind` that an installed package gives, with its `values`", "its own",
+            "read each step", "none", _MIRRORED,
+        ),
     )
 }  # fmt: skip
-"""All kinds by name; a rule has no function, for what it is about is not on the road."""
+"""All kinds by name; what a rule is about is not on the road, and an own kind has its function."""

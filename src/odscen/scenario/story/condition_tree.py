@@ -10,16 +10,17 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from odscen.scenario.story.condition_kinds import CONDITIONS
 from odscen.scenario.story.flips import Flips, together
+from odscen.scenario.story.own_kinds import condition_kind
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from odscen.scenario.document.conditions_document import Condition
     from odscen.scenario.story.condition_kinds import Reading
     from odscen.scenario.story.road_view import RoadView
 
+_ALWAYS, _NEVER = Flips(was=True), Flips(was=False)
 _CLOSE = 1e-6
 """Of a margin: as good as on the bound, so that what was said before stays."""
 
@@ -33,23 +34,30 @@ class LeafMemory(NamedTuple):
 
 
 class _Node(NamedTuple):
-    """A condition, taken apart once: its kind, its part, its key if it is a leaf, what is below."""
+    """A condition, taken apart once.
+
+    ``read`` and ``key`` are those of a leaf; ``late`` says that it has a delay or an edge.
+    """
 
     kind: str
     part: Any
-    key: str | None
+    late: bool
+    key: str | None = None
+    read: Callable[[Any, str, RoadView], Reading | None] | None = None
     children: tuple[tuple[Condition, str], ...] = ()
 
 
 def _node(condition: Condition, where: str) -> _Node:
     kind = condition.kind
     part = getattr(condition, kind)
+    late = bool(condition.delay) or condition.edge == "rising"
     if kind == "not_":
-        return _Node(kind, part, None, ((part, f"{where}.not"),))
+        return _Node(kind, part, late, children=((part, f"{where}.not"),))
     if kind in ("all", "any"):
         below = tuple((one, f"{where}.{kind}[{n}]") for n, one in enumerate(part))
-        return _Node(kind, part, None, below)
-    return _Node(kind, part, None if kind == "rule" else f"{where}.{kind}")
+        return _Node(kind, part, late, children=below)
+    read = condition_kind(condition).read
+    return _Node(kind, part, late, None if read is None else f"{where}.{kind}", read)
 
 
 @dataclass
@@ -63,7 +71,6 @@ class ConditionTrees:
     """
 
     step: float
-    _values: dict[str, tuple[float, float]] = field(default_factory=dict)
     _nodes: dict[str, _Node] = field(default_factory=dict)
     _leaves: dict[str, LeafMemory] = field(default_factory=dict)
     _past: dict[str, Flips] = field(default_factory=dict)
@@ -80,9 +87,9 @@ class ConditionTrees:
         node = self._nodes.get(where)
         if node is None:
             node = self._nodes[where] = _node(condition, where)
-        kind, part, key, children = node
-        if key is not None:
-            flips = self._leaf(kind, part, key, actor, view)
+        kind, part, late, key, read, children = node
+        if key is not None and read is not None:
+            flips = self._seen.get(key) or self._leaf(read, part, key, actor, view)
         elif kind == "rule":
             flips = Flips(False, view.rule_changes(part.id, part.has)[:1]).after(view.time)
         elif kind == "not_":
@@ -91,7 +98,7 @@ class ConditionTrees:
         else:
             parts = [self.look(one, below, actor, view) for one, below in children]
             flips = together(parts, every=kind == "all")
-        if condition.delay or condition.edge == "rising":
+        if late:
             flips = self._later(condition, where, flips, view.time)
         return flips
 
@@ -103,11 +110,15 @@ class ConditionTrees:
         start
             Of their places in the tree; they are named by what comes after it.
         """
-        return {
-            key.removeprefix(start).lstrip("."): value + (rate * seconds if seconds else 0.0)
-            for key, (value, rate) in self._values.items()
-            if key.startswith(start) and abs(value) < math.inf
-        }
+        found = {}
+        for key, (_, _, value) in self._new_leaves.items():
+            if value is not None and key.startswith(start):
+                before = self._leaves.get(key)
+                last = None if before is None else before.value
+                rate = 0.0 if last is None else (value - last) / self.step
+                name = key.removeprefix(start).lstrip(".")
+                found[name] = value + (rate * seconds if seconds else 0.0)
+        return found
 
     def next_step(self) -> None:
         """Keep what was seen in this step."""
@@ -127,42 +138,48 @@ class ConditionTrees:
         self._leaves = {key: LeafMemory(*value) for key, value in state["leaves"].items()}
         self._past = {key: Flips(was, tuple(at)) for key, (was, at) in state["past"].items()}
 
-    def _leaf(self, name: str, part: Any, where: str, actor: str, view: RoadView) -> Flips:
-        known = self._seen.get(where)
-        if known is not None:
-            return known
-        kind = CONDITIONS[name]
-        reading = kind.read(part, actor, view) if kind.read else None
+    def _leaf(
+        self,
+        read: Callable[[Any, str, RoadView], Reading | None],
+        part: Any,
+        where: str,
+        actor: str,
+        view: RoadView,
+    ) -> Flips:
+        reading = read(part, actor, view)
         before = self._leaves.get(where)
         if reading is None:
-            self._values.pop(where, None)
             was = before is not None and before.holds
             flips = Flips(was, (view.time,) if was else ())
             self._new_leaves[where] = LeafMemory(None, holds=False)
         else:
-            value = _finite(reading.value)
-            last = before.value if before is not None else None
-            rate = 0.0 if value is None or last is None else (value - last) / self.step
-            self._values[where] = reading.value, rate
-            flips = self._read(reading, before, view.time)
-            self._new_leaves[where] = LeafMemory(_finite(reading.margin), flips.last, value)
+            value, margin, rate = reading
+            flips = self._read(margin, rate, before, view.time)
+            near = -math.inf < margin < math.inf
+            far = not -math.inf < value < math.inf
+            self._new_leaves[where] = LeafMemory(
+                margin if near else None, flips.last, None if far else value
+            )
         self._seen[where] = flips
         return flips
 
-    def _read(self, reading: Reading, before: LeafMemory | None, time: float) -> Flips:
-        margin = reading.margin
-        holds = margin >= 0.0
-        was = holds if before is None else before.holds
-        if before is not None and abs(margin) <= _CLOSE:
-            holds = before.holds
-        at = (time,) if holds != was else ()
-        rate = reading.rate
-        if rate is None and before is not None and before.margin is not None:
-            rate = (margin - before.margin) / self.step
-        if rate and abs(margin) < math.inf and (rate > 0.0) != holds:
+    def _read(
+        self, margin: float, rate: float | None, before: LeafMemory | None, time: float
+    ) -> Flips:
+        was = holds = margin >= 0.0
+        if before is not None:
+            last, was, _ = before
+            if abs(margin) <= _CLOSE:
+                holds = was
+            if rate is None and last is not None:
+                rate = (margin - last) / self.step
+        at = () if holds == was else (time,)
+        if rate and (rate > 0.0) != holds and abs(margin) < math.inf:
             turn = max(time - margin / rate, time)
             if turn < time + self.step:
                 at = (*at, turn)
+        if not at:  # nearly always
+            return _ALWAYS if was else _NEVER
         return Flips(was, at)
 
     def _later(self, condition: Condition, where: str, flips: Flips, time: float) -> Flips:
@@ -173,7 +190,3 @@ class ConditionTrees:
         if condition.edge == "rising":
             whole = whole.risings(self.step)
         return whole.shifted(condition.delay).after(time)
-
-
-def _finite(number: float) -> float | None:
-    return number if abs(number) < math.inf else None

@@ -58,6 +58,8 @@ class Flips(NamedTuple):
         """First instant from ``begin`` on, before ``end``, at which it is true."""
         if begin >= end:
             return None
+        if not self.at:  # the usual case, asked of each rule in each step
+            return begin if self.was else None
         if self.holds(begin):
             return begin
         return next((one for one in self.at if begin < one < end and self.holds(one)), None)
@@ -72,6 +74,8 @@ def together(parts: Sequence[Flips], *, every: bool) -> Flips:
     """What is true where all parts are (``every``), or any of them."""
     meet = all if every else any
     was = meet(part.was for part in parts)
+    if not any(part.at for part in parts):
+        return Flips(was)
     changes, now = [], was
     for instant in sorted({one for part in parts for one in part.at}):
         if (holds := meet(part.holds(instant) for part in parts)) != now:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -54,15 +55,22 @@ class OnLine(NamedTuple):
     hdg: float
 
 
-def line_length(line: Sequence[Point]) -> float:
+@lru_cache(maxsize=256)
+def line_length(line: tuple[Point, ...]) -> float:
     """Metres of a line."""
     return sum(math.dist(a, b) for a, b in itertools.pairwise(line))
 
 
-def point_on(line: Sequence[Point], along: float, *, left: float = 0.0) -> OnLine:
+@lru_cache(maxsize=256)
+def _pieces(line: tuple[Point, ...]) -> list[tuple[Point, Point, float]]:
+    """Straight pieces of a line with their lengths; asked for the same lines in each step."""
+    return [(a, b, math.dist(a, b)) for a, b in itertools.pairwise(line) if a != b]
+
+
+def point_on(line: tuple[Point, ...], along: float, *, left: float = 0.0) -> OnLine:
     """Point of a line, moved to the left; the line goes on straight before and behind its ends."""
     rest = along
-    pieces = [(a, b, math.dist(a, b)) for a, b in itertools.pairwise(line) if a != b]
+    pieces = _pieces(line)
     for index, (a, b, length) in enumerate(pieces):
         if rest <= length or index == len(pieces) - 1:
             ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length

@@ -21,7 +21,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SpeedLaw:
-    """From ``begin`` on, within ``duration`` seconds, from ``v0`` to ``v1``."""
+    """From ``begin`` on, within ``duration`` seconds, from ``v0`` to ``v1``.
+
+    Attributes
+    ----------
+    begin, duration
+        Instant, and seconds from there to the last speed.
+    v0, v1
+        First and last speed, m/s.
+    shape
+        ``linear`` or ``cosine``.
+    """
 
     begin: float
     v0: float

@@ -12,15 +12,16 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.story.acting_actor import ActingActor, CannotAct
-from odscen.scenario.story.action_kinds import ACTIONS, ActionKind
 from odscen.scenario.story.channels import Channel, WantedMove
 from odscen.scenario.story.condition_tree import ConditionTrees
+from odscen.scenario.story.own_kinds import action_kind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.scenario.document.actions_document import Action
     from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.story.action_kinds import ActionKind
     from odscen.scenario.story.asked_actions import Wanted
     from odscen.scenario.story.road_view import RoadView
 
@@ -28,6 +29,7 @@ STARTED, ENDED, FAILED, OVERRIDDEN = "started", "ended", "failed", "overridden"
 ACTED = "acted"
 """What can be said of a rule."""
 
+_FREE = WantedMove()
 _MOST_TURNS = 1000
 """Instants in one step; a rule that restarts at once, for ever, must not hold up the run."""
 
@@ -131,6 +133,8 @@ class StoryEngine:
         for name, channel in sorted(self._channels.items()):
             if (one := view.actor(name)) is not None:
                 moves[name] = channel.end_step(view.time, self._step, person=one.person)
+                if moves[name] == _FREE and channel.idle and not one.person:
+                    del self._channels[name]
         return moves, self._events
 
     def state(self) -> dict[str, Any]:
@@ -235,7 +239,7 @@ class StoryEngine:
     def _begin(
         self, view: RoadView, now: float, rule: StoryRule, action: Action, one: _Running
     ) -> None:
-        kind, part = ACTIONS[action.kind], getattr(action, action.kind)
+        kind, part = action_kind(action), getattr(action, action.kind)
         try:
             if kind.ask is not None:
                 self._asked.append(kind.ask(part, rule.actor, view))
@@ -277,7 +281,7 @@ class StoryEngine:
         if view.actor(rule.actor) is None or state.item is None:
             return
         action = rule.then[state.item].parts[one.number]
-        kind = ACTIONS[action.kind]
+        kind = action_kind(action)
         if kind.update is None:
             return
         try:
@@ -288,7 +292,7 @@ class StoryEngine:
 
     def _finish(self, view: RoadView, now: float, rule: StoryRule, one: _Running) -> None:
         action = rule.then[self._states[rule.id].item or 0].parts[one.number]
-        kind = ACTIONS[action.kind]
+        kind = action_kind(action)
         if kind.finish is not None and view.actor(rule.actor) is not None:
             kind.finish(getattr(action, action.kind), self._acting(view, now, rule, one))
 

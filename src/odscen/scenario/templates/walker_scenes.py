@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from enum import Enum
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Category
@@ -24,7 +26,7 @@ from odscen.scenario.templates.scene_actors import (
 from odscen.scenario.templates.scene_template import SceneTemplate, TemplateParameter, TemplateScene
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.templates.lane_stretches import LaneStretch
     from odscen.scenario.templates.scene_template import TemplateSite
@@ -36,22 +38,32 @@ _EGO_SPEEDS = tuple(speed / 3.6 for speed in (40, 35, 30, 25, 20))
 """m/s; of the protocol's 10 to 60 km/h in steps of 5, those that are tried."""
 _BEYOND = 12.0
 """Metres of the stretch behind the place where the paths meet."""
+_KERB, _HIDDEN = 0.1, 1.0
+"""Metres beside the lane at which a vehicle is parked, and at which a hidden one is at least."""
+_FOR_EVER = 3600.0
 _REACHES = (4.0, 7.0, 10.0, 14.0)
 """Metres from the sidewalk to that place, at most; short ones first, they need the least road."""
 
 
+class _HiddenBy(Enum):
+    """Where the vehicle stands that hides a pedestrian."""
+
+    NOTHING = "nothing"
+    IN_LANE = "lane"
+    AT_KERB = "kerb"
+
+
 def _runs_out(
-    site: TemplateSite, values: Mapping[str, float], *, walker: str, hidden: bool
+    site: TemplateSite, values: Mapping[str, float], *, walker: str, hidden: Sequence[_HiddenBy]
 ) -> TemplateScene:
     given = values.get("ego_speed")
     speeds = _EGO_SPEEDS if given is None else (given,)
-    for speed in speeds:
-        for reach in _REACHES:
-            try:
-                wanted = {**values, "ego_speed": speed}
-                return _within(site, wanted, reach, walker=walker, hidden=hidden)
-            except NoPlaceError as error:
-                refused = error
+    for hides, speed, reach in product(hidden, speeds, _REACHES):
+        try:
+            wanted = {**values, "ego_speed": speed}
+            return _within(site, wanted, reach, walker=walker, hidden=hides)
+        except NoPlaceError as error:
+            refused = error
     raise refused
 
 
@@ -61,7 +73,7 @@ def _within(
     reach: float,
     *,
     walker: str,
-    hidden: bool,
+    hidden: _HiddenBy,
 ) -> TemplateScene:
     speed, walking = values["ego_speed"], values["walking_speed"]
     lead_in = speed * values["approach"] + body_length(site, Category.CAR) / 2.0
@@ -69,9 +81,10 @@ def _within(
 
     def place(stretch: LaneStretch) -> TemplateScene:
         near = near_side(site, stretch)
-        parked_lane = beside(site, stretch, near) if hidden else None
+        parked_lane = beside(site, stretch, near) if hidden is _HiddenBy.IN_LANE else None
         along = stretch.along[-1] - _BEYOND
-        crossing = site.sides.crossing(stretch, along, near=near)
+        beyond = _HIDDEN if hidden is _HiddenBy.AT_KERB else 0.0
+        crossing = site.sides.crossing(stretch, along, near=near, beyond=beyond)
         if crossing.metres > reach:
             msg = f"are more than {reach:.0f} m from the sidewalk"
             raise Unfit(msg)
@@ -85,6 +98,13 @@ def _within(
             actors.append(_parked(site, parked_lane, crossing.along - values["clearance"]))
             rules.append(at_once("parked", "parked", {"stop": {}}))
             seen = " It is hidden by a vehicle stopped in the lane at the kerb."
+        elif hidden is _HiddenBy.AT_KERB:
+            at = crossing.along - values["clearance"]
+            parked, pose = _at_kerb(site, stretch, at, near)
+            actors.append(parked)
+            stays = [[0.0, *pose], [_FOR_EVER, *pose]]
+            rules.append(at_once("parked", "parked", {"replay": {"rows": stays}}))
+            seen = " It is hidden by a vehicle parked beside the lane."
         rules.append(_crosses(walker, crossing, distance, walking))
         duration = values["approach"] + crossing.metres / walking + 20.0
         return TemplateScene(
@@ -116,6 +136,23 @@ def _parked(site: TemplateSite, lane: LaneStretch, front: float) -> dict[str, An
     return vehicle(site, "parked", node, last, speed=CHILD, moving=False)
 
 
+def _at_kerb(
+    site: TemplateSite, lane: LaneStretch, front: float, near: int
+) -> tuple[dict[str, Any], list[float]]:
+    """Make a vehicle that is parked beside a lane, and the pose of its body's centre."""
+    body = site.usable.bodies[Category.CAR]
+    centre = front - body.length / 2.0
+    node = node_near(site, lane, centre)
+    lanes = site.region.graph.lanes
+    hdg, ahead = float(lanes.hdg[node]), centre - metres_at(lane, node)
+    aside = near * (float(lanes.width[node]) / 2.0 + body.width / 2.0 + _KERB)
+    c, s = math.cos(hdg), math.sin(hdg)
+    x = float(lanes.x[node]) + ahead * c - aside * s
+    y = float(lanes.y[node]) + ahead * s + aside * c
+    parked = vehicle(site, "parked", node, int(lane.nodes[-1]), speed=CHILD, moving=False)
+    return parked, [round(x, 3), round(y, 3), round(math.remainder(hdg, math.tau), 5)]
+
+
 def _crosses(
     walker: str, crossing: RoadCrossing, distance: float, walking: float
 ) -> dict[str, Any]:
@@ -128,11 +165,11 @@ def _crosses(
 
 
 def _child(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
-    return _runs_out(site, values, walker="child", hidden=True)
+    return _runs_out(site, values, walker="child", hidden=(_HiddenBy.IN_LANE, _HiddenBy.AT_KERB))
 
 
 def _mid_block(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
-    return _runs_out(site, values, walker="walker", hidden=False)
+    return _runs_out(site, values, walker="walker", hidden=(_HiddenBy.NOTHING,))
 
 
 _SPEEDS = (
@@ -154,7 +191,7 @@ HIDDEN_CHILD = SceneTemplate(
     summary="A child comes out in front of a vehicle stopped at the kerb, into the ego's path.",
     source="Euro NCAP AEB VRU, CPNCO-50 (nearside child from obstruction): child at 5 km/h, hit at "
     "50 % of the width; the ego at 10 to 60 km/h, here at 40 or less.",
-    needs="two lanes of one direction, a sidewalk on either side",
+    needs="a sidewalk on either side of a road; where it has one lane, the vehicle is beside it",
     parameters=(
         *_SPEEDS,
         TemplateParameter(

@@ -1,0 +1,149 @@
+"""Two scenarios held against each other by what acts: order, names and ways of saying it apart."""
+
+from __future__ import annotations
+
+import json
+from itertools import product
+from typing import TYPE_CHECKING, Any, Final
+
+from odscen.base.categories import Category
+from odscen.changes.scenario_differences import field_differences
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from odscen.changes.scenario_differences import ScenarioChange
+    from odscen.scenario.document.scenario_document import Scenario
+
+Parts = dict[str, Any]
+_DIGITS: Final = 4
+"""Of metres, seconds and radians: a file may round more than a document does."""
+_MOST_GROUPS: Final = 256
+_ALWAYS: Final[Parts] = {"time": {"after": 0.0}}
+
+
+def acting_differences(before: Scenario, after: Scenario) -> tuple[ScenarioChange, ...]:
+    """Find what two scenarios do differently.
+
+    Names of scenarios and rules, the order of lists of which it does not matter, and differences
+    below 0.0001 do not count; nor does whether conditions are nested, who a condition is about is
+    said, or a rule brakes, stops, or changes its speed to 0 likewise. Places are as of
+    :func:`~odscen.changes.scenario_differences.scenario_differences`, but ``when`` is whole and
+    ``then`` has numbers: ``("rules", "cut-in", "then", "0")``.
+    """
+    old, new = _plain(before), _plain(after)
+    old["rules"] = {rule["id"]: _rule(rule, old, {}) for rule in old["rules"]}
+    new["rules"] = _renamed(new, old["rules"])
+    return tuple(field_differences(old, new))
+
+
+def _plain(scenario: Scenario) -> Parts:
+    data: Parts = _rounded(scenario.model_dump(mode="json", exclude={"name", "formulas"}))
+    data["roi"] = sorted(data["roi"])
+    for name in ("actors", "flows", "measures"):
+        data[name] = {one["id"]: one for one in data[name]}
+    for rule in data["rules"]:
+        own = data["actors"].get(rule["actor"], {}).get("initial_speed")
+        for part in _parts(rule["then"]):
+            if part.get("appear") and part["appear"].get("speed") is None:
+                part["appear"]["speed"] = own or 0.0
+    return data
+
+
+def _parts(then: list[Parts]) -> Iterator[Parts]:
+    """Actions of a rule, those that run together one by one."""
+    for item in then:
+        yield item
+        yield from _parts(item.get("together") or [])
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, _DIGITS) + 0.0
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    return value
+
+
+def _renamed(new: Parts, old: Mapping[str, Parts]) -> Parts:
+    """Rules by name, those with a new name by that of a rule with the same content in ``old``."""
+    there = {rule["id"] for rule in new["rules"]}
+    free = {_text(rule): name for name, rule in old.items() if name not in there}
+    names: dict[str, str] = {}
+    for _ in new["rules"]:  # those that wait for others are found after them
+        before = len(names)
+        for rule in new["rules"]:
+            if rule["id"] not in old and rule["id"] not in names:
+                known = free.pop(_text(_rule(rule, new, names)), None)
+                names |= {} if known is None else {rule["id"]: known}
+        if len(names) == before:
+            break
+    return {names.get(one["id"], one["id"]): _rule(one, new, names) for one in new["rules"]}
+
+
+def _text(part: Parts) -> str:
+    return json.dumps(part, sort_keys=True)
+
+
+def _rule(rule: Parts, scenario: Parts, names: Mapping[str, str]) -> Parts:
+    actor = scenario["actors"].get(rule["actor"], {})
+    walks = actor.get("category") == Category.PEDESTRIAN
+    groups = _groups(rule["when"], rule["actor"], names, negated=False, delay=0.0)
+    when = sorted({json.dumps(sorted(group)) for group in groups})
+    then = {str(n): _action(one, walks=walks) for n, one in enumerate(rule["then"])}
+    return {"actor": rule["actor"], "when": when, "then": then, "times": rule["times"]}
+
+
+def _groups(
+    when: Parts, actor: str, names: Mapping[str, str], *, negated: bool, delay: float
+) -> list[set[str]]:
+    """Groups of conditions, any of which is enough; conditions as texts."""
+    delay += when["delay"]
+    (kind,) = (key for key in when if key not in ("delay", "edge") and when[key] is not None)
+    rising = when["edge"] == "rising"
+    if kind in ("all", "any", "not") and not rising:
+        if kind == "not":
+            return _groups(when["not"], actor, names, negated=not negated, delay=delay)
+        parts = [_groups(one, actor, names, negated=negated, delay=delay) for one in when[kind]]
+        if (kind == "any") != negated:
+            return [group for part in parts for group in part]
+        if len(list(product(*parts))) <= _MOST_GROUPS:
+            return [_without_always(set().union(*one)) for one in product(*parts)]
+    part = when[kind]
+    if isinstance(part, dict):
+        part = part | ({"of": actor} if part.get("of", "") is None else {})
+        part |= {"id": names.get(part["id"], part["id"])} if kind == "rule" else {}
+        part, negated = _bounded(part, negated=negated)
+    said = {kind: part, "delay": delay, "negated": negated, "rising": rising}
+    return [{json.dumps(said, sort_keys=True)}]
+
+
+def _bounded(part: Parts, *, negated: bool) -> tuple[Parts, bool]:
+    """A bound that does not hold is the other one."""
+    if not negated or "below" not in part or "above" not in part:
+        return part, negated
+    return part | {"below": part["above"], "above": part["below"]}, False
+
+
+def _without_always(group: set[str]) -> set[str]:
+    said = json.dumps(_ALWAYS | {"delay": 0.0, "negated": False, "rising": False}, sort_keys=True)
+    return group - {said} or group
+
+
+def _action(action: Parts, *, walks: bool) -> Parts:
+    if action["together"] is not None:
+        return {"together": [_action(one, walks=walks) for one in action["together"]]}
+    (kind,) = (key for key in action if action[key] is not None)
+    part: Parts = action[kind]
+    if not walks and kind == "brake" and part["hold"] is None:
+        return {"speed": _to_zero(rate=part["by"])}
+    if not walks and kind == "stop":
+        return {"speed": _to_zero(within=part["within"])}
+    return {kind: part}
+
+
+def _to_zero(*, rate: float | None = None, within: float | None = None) -> Parts:
+    shape = "step" if rate is None and within is None else "linear"
+    return {"to": 0.0, "shape": shape, "rate": rate, "over": None, "within": within}

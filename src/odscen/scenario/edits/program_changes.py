@@ -1,0 +1,191 @@
+"""The timing of a light with one thing changed: the green of a stage, the offset, a stage.
+
+A green that becomes another changes the cycle where the document says one, or the stage after it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from odscen.base.errors import InputError, NotFoundError, ScenarioError
+from odscen.scenario.checks.signal_timing import LEAST_GREEN
+from odscen.scenario.edits.edited_parts import changed_part
+from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage
+from odscen.scenario.signals.stage_sequence import cycle_length
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.scenario.document.signals_document import DayPlan, JunctionTiming
+    from odscen.scenario.signals.light import Light
+
+
+def with_green(
+    timing: JunctionTiming,
+    light: Light,
+    *,
+    stage: str,
+    green: float,
+    plan: str | None,
+    keep_cycle: bool,
+) -> JunctionTiming:
+    """Give a stage another green.
+
+    Parameters
+    ----------
+    stage
+        Id; of the map's stages its number from 1.
+    green
+        Seconds.
+    plan
+        Plan of the day, of a program that has several.
+    keep_cycle
+        The next stage gives or takes the seconds, so that the cycle stays.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such stage or plan.
+    ScenarioError
+        If the green of this stage, or of the next one, becomes too short.
+    """
+    stages = _stages(timing, light, plan)
+    old = {one.id: one.green for one in stages}
+    if stage not in old:
+        what = f"stage of the light of junction {timing.junction!r}"
+        raise NotFoundError(what, stage, list(old))
+    greens = {stage: green}
+    if keep_cycle:
+        other = _next_stage(stages, stage)
+        greens[other] = round(old[other] + old[stage] - green, 6)
+    for name, seconds in greens.items():
+        _refuse_short(timing, name, seconds, old[name], given=name == stage)
+    if not timing.stages:
+        return changed_part(
+            timing, {"green": tuple(greens.get(one.id, one.green) for one in stages)}
+        )
+    return _with_greens(timing, light, greens, plan)
+
+
+def _next_stage(stages: Sequence[PlannedStage], stage: str) -> str:
+    """The stage that gives or takes seconds: the next one that is not on call."""
+    ids = [one.id for one in stages]
+    at = ids.index(stage)
+    turned = (*stages[at + 1 :], *stages[:at])
+    found = next((one.id for one in turned if not one.on_call), None)
+    if found is None:
+        msg = f"stage {stage!r} has no stage beside it that could give or take its seconds"
+        raise ScenarioError(msg)
+    return found
+
+
+def _refuse_short(
+    timing: JunctionTiming, stage: str, green: float, before: float, *, given: bool
+) -> None:
+    """Raise for a green that drivers would not take for one; shorter ones of before may stay."""
+    if green >= min(LEAST_GREEN, before):
+        return
+    where = f"the light of junction {timing.junction!r}"
+    msg = (
+        f"{green:g} s is too short for a green; give stage {stage} of {where} at least "
+        f"{LEAST_GREEN:g} s"
+        if given
+        else f"stage {stage} of {where} would have {green:g} s of green, but needs at least "
+        f"{LEAST_GREEN:g} s; let the cycle become longer instead"
+    )
+    raise ScenarioError(msg)
+
+
+def _stages(timing: JunctionTiming, light: Light, plan: str | None) -> tuple[PlannedStage, ...]:
+    """Stages with their greens in one plan; of a light with the map's stages those."""
+    if timing.stages:
+        designed = DesignedProgram(timing, light, "fixed").plans()
+        if timing.plans:
+            plan = _plan(timing, plan).id
+            return next(one.stages for one in designed if one.id == plan)
+        return designed[0].stages
+    greens = timing.green if len(timing.green) == len(light.green) else light.green
+    none: frozenset[str] = frozenset()
+    return tuple(
+        PlannedStage(str(n + 1), none, none, green, green, green, on_call=False)
+        for n, green in enumerate(greens)
+    )
+
+
+def _plan(timing: JunctionTiming, name: str | None) -> DayPlan:
+    ids = [one.id for one in timing.plans]
+    if name is None:
+        msg = (
+            f"the light of junction {timing.junction!r} has plans of the day: name one of "
+            f"{', '.join(ids)}"
+        )
+        raise InputError(msg)
+    if name not in ids:
+        what = "plan of the day"
+        raise NotFoundError(what, name, ids)
+    return timing.plans[ids.index(name)]
+
+
+def _with_greens(
+    timing: JunctionTiming, light: Light, greens: Mapping[str, float], plan: str | None
+) -> JunctionTiming:
+    if not timing.plans:
+        stages = tuple(
+            changed_part(one, {"green": greens[one.id]}) if one.id in greens else one
+            for one in timing.stages
+        )
+        return fitted_cycles(changed_part(timing, {"stages": stages}), light)
+    own = _plan(timing, plan)
+    new = changed_part(own, {"green": {**own.green, **greens}})
+    return fitted_cycles(_with_plan(timing, new), light)
+
+
+def fitted_cycles(timing: JunctionTiming, light: Light) -> JunctionTiming:
+    """Let the cycles that a program says be what its greens and intergreens add up to."""
+    lengths = {
+        one.id: cycle_length(DesignedProgram(timing, light, "fixed"), one.stages)
+        for one in DesignedProgram(timing, light, "fixed").plans()
+        if one.cycle is not None
+    }
+    if not lengths:
+        return timing
+    if not timing.plans:
+        return changed_part(timing, {"cycle": next(iter(lengths.values()))})
+    for plan in timing.plans:
+        if plan.id in lengths:
+            timing = _with_plan(timing, changed_part(plan, {"cycle": lengths[plan.id]}))
+    return timing
+
+
+def _with_plan(timing: JunctionTiming, new: DayPlan) -> JunctionTiming:
+    plans = tuple(new if one.id == new.id else one for one in timing.plans)
+    return changed_part(timing, {"plans": plans})
+
+
+def with_offset(timing: JunctionTiming, offset: float, *, plan: str | None) -> JunctionTiming:
+    """Let a program, or one plan of the day, begin so many seconds into the scenario.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such plan.
+    """
+    if not timing.plans:
+        return changed_part(timing, {"offset": offset})
+    return _with_plan(timing, changed_part(_plan(timing, plan), {"offset": offset}))
+
+
+def with_stage(timing: JunctionTiming, stage: str, fields: Mapping[str, Any]) -> JunctionTiming:
+    """Change fields of a stage.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such stage.
+    """
+    ids = [one.id for one in timing.stages]
+    if stage not in ids:
+        what = f"stage of the light of junction {timing.junction!r}"
+        raise NotFoundError(what, stage, ids)
+    stages = tuple(changed_part(one, fields) if one.id == stage else one for one in timing.stages)
+    return changed_part(timing, {"stages": stages})

@@ -1,0 +1,241 @@
+"""Changes to traffic lights: control, greens, offset, stages, turns, and whole timings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from odscen.base.errors import InputError, NotFoundError
+from odscen.scenario.checks.signal_timing import signal_problems
+from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.signals_document import JunctionTiming, ProgramStage
+from odscen.scenario.edits.edit_registry import edit
+from odscen.scenario.edits.edited_parts import changed_part, with_fields
+from odscen.scenario.edits.program_changes import with_green, with_offset, with_stage
+from odscen.scenario.edits.turn_treatment import with_turn
+from odscen.scenario.signals.light import find_light
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.document.signals_document import Control
+    from odscen.scenario.signals.light import Light
+
+
+@edit("Traffic lights {control}")
+def set_signal_control(scenario: Scenario, *, control: Control) -> Scenario:
+    """Say how all traffic lights are run that have no control of their own."""
+    return with_fields(scenario, signals=changed_part(scenario.signals, {"control": control}))
+
+
+@edit("Timing of light {junction}")
+def set_timing(
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    **fields: Annotated[Any, JunctionTiming],
+) -> Scenario:
+    """Change how the traffic light of one junction is timed.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map.
+    fields
+        Fields of a :class:`~odscen.scenario.document.signals_document.JunctionTiming`,
+        such as ``green``; those not given stay as they are.
+
+    Raises
+    ------
+    ScenarioError
+        If no light is in the junction, or if it cannot be timed so.
+    """
+    _, old = _timing(scenario, lights, junction)
+    return _with_timing(scenario, lights, changed_part(old, fields), strict="green" in fields)
+
+
+@edit("Timing of light {junction} as in the map")
+def clear_timing(scenario: Scenario, junction: str) -> Scenario:
+    """Give the traffic light of one junction back to the map's program.
+
+    Raises
+    ------
+    NotFoundError
+        If the scenario has no timing for it.
+    """
+    timings = scenario.signals.junctions
+    names = [one.junction for one in timings]
+    if junction not in names:
+        what = "timing of junction"
+        raise NotFoundError(what, junction, names)
+    left = tuple(one for one in timings if one.junction != junction)
+    return with_fields(scenario, signals=changed_part(scenario.signals, {"junctions": left}))
+
+
+@edit("Green of stage {stage} in junction {junction}")
+def set_green(
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    *,
+    stage: str,
+    green: float,
+    plan: str | None = None,
+    keep_cycle: bool = False,
+) -> Scenario:
+    """Give one stage of a light another green; intergreens stay.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map.
+    stage
+        Id; of the map's stages its number from 1.
+    green
+        Seconds.
+    plan
+        Plan of the day, of a program that has several.
+    keep_cycle
+        Take the seconds from the next stage, or give them to it; else the cycle becomes another.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such stage or plan.
+    ScenarioError
+        If no light is in the junction, or a green is too short or out of the stage's bounds.
+    """
+    light, old = _timing(scenario, lights, junction)
+    if light is None:
+        return _with_timing(scenario, lights, old)
+    new = with_green(old, light, stage=stage, green=green, plan=plan, keep_cycle=keep_cycle)
+    return _with_timing(scenario, lights, new, strict=True)
+
+
+@edit("Offset of light {junction}")
+def set_offset(
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    *,
+    offset: float,
+    plan: str | None = None,
+) -> Scenario:
+    """Let the program of a light begin so many seconds into the scenario.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such plan.
+    ScenarioError
+        If no light is in the junction.
+    """
+    _, old = _timing(scenario, lights, junction)
+    return _with_timing(scenario, lights, with_offset(old, offset, plan=plan))
+
+
+@edit("Stage {stage} in junction {junction}")
+def set_stage(
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    stage: str,
+    **fields: Annotated[Any, ProgramStage],
+) -> Scenario:
+    """Change fields of a stage of a program of the scenario's own, such as ``on_call``.
+
+    Raises
+    ------
+    InputError
+        If the light has no program of its own, or the stage is to have another id.
+    NotFoundError
+        If there is no such stage.
+    ScenarioError
+        If greens conflict, or the stage cannot be timed so.
+    """
+    if "id" in fields:
+        msg = f"stage {stage!r} keeps its id: detectors and plans of the day refer to it"
+        raise InputError(msg)
+    _, old = _own(scenario, lights, junction)
+    return _with_timing(scenario, lights, with_stage(old, stage, fields))
+
+
+@edit("Turn from {approach}: {treatment}")
+def set_turn(
+    scenario: Scenario,
+    lights: Sequence[Light],
+    junction: str,
+    *,
+    approach: str,
+    treatment: Literal["permissive", "protected", "both"],
+    turn: Literal["left", "right"] = "left",
+) -> Scenario:
+    """Let a turn across oncoming traffic go through its gaps, with an arrow of its own, or both.
+
+    Parameters
+    ----------
+    lights
+        Traffic lights of the map.
+    approach
+        Segment before the junction.
+    treatment
+        ``protected``: only in a stage in which nobody meets it, which is made if there is none;
+        ``both``: there and, giving way, with its approach.
+
+    Raises
+    ------
+    InputError
+        If the light has no program of its own, the approach has no such turn, or the turn has no
+        lane for itself.
+    ScenarioError
+        If greens would conflict.
+    """
+    light, old = _own(scenario, lights, junction)
+    new = with_turn(old, light, approach=approach, turn=turn, treatment=treatment)
+    return _with_timing(scenario, lights, new)
+
+
+def _timing(
+    scenario: Scenario, lights: Sequence[Light], junction: str
+) -> tuple[Light | None, JunctionTiming]:
+    """The light in a junction, and what the scenario says of it."""
+    light = find_light(lights, junction)
+    names = () if light is None else light.names
+    known = (one for one in scenario.signals.junctions if one.junction in names)
+    return light, next(known, JunctionTiming(junction=junction))
+
+
+def _own(
+    scenario: Scenario, lights: Sequence[Light], junction: str
+) -> tuple[Light, JunctionTiming]:
+    """A light with a program of the scenario's own."""
+    light, timing = _timing(scenario, lights, junction)
+    if light is None or not timing.stages:
+        msg = (
+            f"the light of junction {junction!r} has no program of this scenario; take over that "
+            "of the map first"
+        )
+        raise InputError(msg)
+    return light, timing
+
+
+def _with_timing(
+    scenario: Scenario, lights: Sequence[Light], new: JunctionTiming, *, strict: bool = False
+) -> Scenario:
+    """Put a timing in the place of that of its junction, or at the end.
+
+    ``strict`` if its greens are new: a file may have greens of a former network, but who changes
+    them now gives one for each stage.
+    """
+    timings = scenario.signals.junctions
+    names = [one.junction for one in timings]
+    index = names.index(new.junction) if new.junction in names else len(names)
+    changed = (*timings[:index], new, *timings[index + 1 :])
+    signals = changed_part(scenario.signals, {"junctions": changed})
+    place = f"signals.junctions[{index}].green"
+    refuse_errors(
+        replace(one, severity="error") if strict and one.where == place else one
+        for one in signal_problems(signals, lights)
+    )
+    return with_fields(scenario, signals=signals)
