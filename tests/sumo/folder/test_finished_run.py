@@ -8,7 +8,7 @@ import pytest
 
 from odscen.app.runs import run
 from odscen.base.errors import InputError, NotFoundError
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings

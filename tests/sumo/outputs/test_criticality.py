@@ -93,6 +93,7 @@ def test_time_to_collision_is_that_of_the_trajectories(whole: Path):
     assert len(same) >= 0.8 * len(both)
 
 
+@pytest.mark.slow
 def test_a_run_in_slices_and_another_time_has_its_conflicts_as_well(
     long: PreparedRun, whole: Path, tmp_path: Path
 ):

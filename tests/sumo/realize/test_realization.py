@@ -99,6 +99,26 @@ def test_a_vehicle_has_place_and_speed_factor_and_speed_in_the_files() -> None:
     assert "insertionChecks" not in late.attrib
 
 
+def test_a_vehicle_changes_lanes_to_pass_a_place() -> None:
+    straight = Actor(id="a", category=Category.CAR, spawn="1.0.-1.5", goal="3.0.-1.49")
+    round_ = straight.model_copy(update={"id": "b", "via": ("3.0.-2.20",)})
+    plan = realize(scenario(actors=(straight, round_)), sumo_map()).plan
+    lengths = {actor.id: actor.route_length for actor in plan.actors}
+    # Out of its lane and back into it: two changes of 3.5 m, each over a node's distance of 2 m.
+    assert lengths["a"] < lengths["b"] < lengths["a"] + 2 * (3.5**2 + 2**2) ** 0.5
+
+
+def test_a_person_walks_through_its_places_in_one_walk() -> None:
+    walker = Actor(
+        id="w", category=Category.PEDESTRIAN, spawn="ped.1.0.-3.5", goal="ped.3.0.-3.40",
+        via=("ped.1.0.-3.30", "ped.3.0.-3.10"),
+    )  # fmt: skip
+    realized = realize(scenario(actors=(walker,)), sumo_map())
+    assert realized.problems == ()
+    [person] = routes(realized).iterfind("person")
+    assert [stage.attrib["edges"] for stage in person.iterfind("walk")] == ["in out"]
+
+
 def test_an_open_goal_is_drawn_by_the_seed() -> None:
     goals = {
         realize(scenario(), sumo_map(), settings=RunSettings(seed=s)).plan.actors[0].goal
@@ -186,6 +206,16 @@ def test_flows_are_drawn_member_by_member() -> None:
     cars = sum(actor.category == "car" for actor in plan.actors)
     assert cars / len(plan.actors) == pytest.approx(0.75, abs=0.08)
     assert len({actor.goal for actor in plan.actors}) == 2
+
+
+def test_members_of_a_flow_depart_with_its_initial_speed() -> None:
+    flow = Flow(id="f", spawn="1.0.-2.3", per_hour=3600, end=50.0, initial_speed=7.0)
+    at_rest = flow.model_copy(update={"id": "g", "initial_speed": None})
+    vehicles = routes(realize(scenario(actors=(), flows=(flow, at_rest)), sumo_map()))
+    speeds = {v.attrib["id"][0]: set[str]() for v in vehicles.iterfind("vehicle")}
+    for vehicle in vehicles.iterfind("vehicle"):
+        speeds[vehicle.attrib["id"][0]].add(vehicle.attrib["departSpeed"])
+    assert speeds == {"f": {"7"}, "g": {"0"}}
 
 
 def test_a_shorter_run_has_the_first_members_of_the_same_flow() -> None:

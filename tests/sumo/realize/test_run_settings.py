@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.run_settings import RunSettings
 

@@ -24,6 +24,8 @@ from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.workspace.store import Workspace
 from tests.sumo.runner.test_long_runs import TOWN, killed, results
 
+pytestmark = pytest.mark.slow(together=True)
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -94,6 +96,21 @@ def test_the_same_scenario_finds_the_same_routes(
     assert again.found == assigned.found
     assert again.paths.keys() == assigned.paths.keys()
     assert all(np.array_equal(again.paths[name], path) for name, path in assigned.paths.items())
+
+
+def test_trips_that_are_not_run_choose_routes_too(workspace: Workspace, town: LoadedMap) -> None:
+    net, wanted = workspace.map("town_5x5").checked("net"), {**BY_TIME, "iterations": 2}
+    more = {"background": [{"id": "b", "trips": 900.0, "end": 600.0}], "routes": wanted}
+    found = assign_routes(
+        scenario(town, wanted),
+        town.sumo,
+        net,
+        settings=RunSettings(),
+        wider=scenario(town, wanted, demand=more),
+    )
+    assert {f"b.{number}" for number in range(900)} == found.paths.keys()
+    first = assign_routes(scenario(town, wanted), town.sumo, net, settings=RunSettings())
+    assert found.found.steps[0].travel_time == first.found.steps[0].travel_time
 
 
 def test_placed_actors_keep_the_shortest_route(town: LoadedMap, assigned: AssignedRoutes) -> None:

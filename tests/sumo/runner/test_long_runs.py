@@ -12,7 +12,7 @@ import pytest
 from bench.kills import traffic
 from odscen.app.runs import check_file, prepare_run
 from odscen.base.errors import ConflictError, NotFoundError, SimulationError, WorkspaceError
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import EventKind, events_from_json
 from odscen.sumo.folder import checkpoint, layout, run_status
@@ -113,6 +113,7 @@ KILLS = [
 """The worker makes 14 changes, the process that completes slices 59."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("who", "change"), KILLS)
 def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_bytes(
     long: PreparedRun,
@@ -135,6 +136,7 @@ def test_killed_before_any_change_of_its_files_a_resumed_run_ends_with_the_same_
     assert len(told) == 1
 
 
+@pytest.mark.slow
 def test_a_town_resumed_after_any_slice_ends_with_the_bytes_of_the_run_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from odscen.base.errors import InputError, WorkspaceError
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import actors_from_json
 from odscen.results.records.run_records import EventKind, events_from_json
 from odscen.sumo.realize.run_settings import RunSettings

@@ -75,6 +75,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_killed_after_any_slice_a_run_with_rules_ends_with_the_same_bytes(
     alone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int

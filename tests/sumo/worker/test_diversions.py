@@ -101,6 +101,7 @@ MEASURES = (EventKind.MEASURE_BEGIN, EventKind.MEASURE_END)
 SHUT = {"id": "shut", "kind": "closure", "begin": 300.0, "end": 700.0, "places": ["r25"]}
 
 
+@pytest.mark.slow
 def test_nobody_enters_a_closed_road_and_the_parallel_roads_get_more(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:
@@ -170,6 +171,7 @@ def test_a_closed_turn_is_driven_around_and_only_by_those_that_it_is_closed_to(
     assert turns <= free
 
 
+@pytest.mark.slow
 def test_a_sliced_run_that_is_killed_while_measures_act_ends_with_the_same_bytes(
     workspace: Workspace, town: LoadedMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -227,6 +229,7 @@ def test_the_vehicle_of_an_incident_stops_where_and_when_it_is_to(
     assert "broken" not in run.outcomes  # it is no actor, and in no figure of actors
 
 
+@pytest.mark.slow
 def test_the_queue_before_an_accident_grows_and_dissolves(
     workspace: Workspace, tmp_path: Path
 ) -> None:

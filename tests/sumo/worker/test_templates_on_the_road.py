@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from shapely import LineString, affinity, box
 
 from odscen.lanegraph.query import node_index, walk_node_index
 from odscen.scenario.document.json_form import dumps, loads
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from odscen.scenario.document.scenario_document import Scenario
 
-STEPS = (0.05, 0.1, 0.5)
+STEPS = (pytest.param(0.05, marks=pytest.mark.slow), 0.1, pytest.param(0.5, marks=pytest.mark.slow))
 MAPS = {
     "cut-in": "motorway_weave",
     "lead-brakes": "rural_hills",
@@ -202,6 +203,7 @@ def test_a_template_has_the_geometry_that_its_numbers_say(
     CHECKS[name](scenario, run(scenario, tmp_path / "run"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_a_template_gives_the_same_bytes_twice(tmp_path: Path, name: str) -> None:
     scenario = scene(name)
@@ -210,9 +212,36 @@ def test_a_template_gives_the_same_bytes_twice(tmp_path: Path, name: str) -> Non
         assert (first / file).read_bytes() == (second / file).read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cut-in", "lead-brakes", "mid-block", "oncoming"])
 def test_a_template_has_its_geometry_amid_300_others(tmp_path: Path, name: str) -> None:
     scenario = amid_traffic(scene(name))
     found = run(scenario, tmp_path / "run")
     assert len(found.tracks) > 150
     CHECKS[name](scenario, found)
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("name", ["roundabout", "left_hand_crossing"])
+def test_on_a_road_of_one_lane_the_child_is_hidden_by_a_vehicle_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, step: float
+) -> None:
+    monkeypatch.setitem(MAPS, "hidden-child", name)
+    scenario = scene("hidden-child", step=step)
+    found = run(scenario, tmp_path / "run")
+    check_walker(scenario, found)
+    assert not found.of_rule("parked", "failed")
+    ego, parked, child = (found.tracks[one] for one in ("ego", "parked", "child"))
+    there = np.array([parked.centre(time) for time in parked.time[parked.time > 2.0 * step]])
+    assert np.ptp(there, axis=0) == pytest.approx(0.0, abs=0.01)
+    begins = found.instant("cross")
+    before = ego.speed[ego.time < begins]
+    assert before == pytest.approx(before[0], abs=0.01)  # nothing is in its lane
+    sight = LineString([ego.at(begins - 0.5), child.centre(begins - 0.5)])
+    x, y = parked.centre(begins)
+    hdg = at(parked, begins, "hdg")
+    body = affinity.translate(
+        affinity.rotate(box(-2.2, -0.85, 2.2, 0.85), hdg, origin=(0, 0), use_radians=True), x, y
+    )
+    assert sight.intersects(body)
+    assert not body.intersects(LineString(np.stack([ego.x, ego.y], axis=1)).buffer(0.9))

@@ -17,12 +17,17 @@ from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     import polars as pl
 
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
+
+
+_HOUR = 3600.0
+_TOGETHER = 1e-6
+"""Seconds between two slices that follow each other."""
 
 
 class CountFit(NamedTuple):
@@ -36,6 +41,22 @@ class CountFit(NamedTuple):
     modelled: int
     geh: float
     why: str
+
+    @property
+    def met(self) -> bool:
+        """Whether GEH is good."""
+        return self.geh <= GOOD
+
+
+class HourFit(NamedTuple):
+    """The counts of a place over a whole hour from ``begin`` on, and what traffic makes of them."""
+
+    counts: str
+    place: str
+    begin: float
+    counted: float
+    modelled: int
+    geh: float
 
     @property
     def met(self) -> bool:
@@ -68,6 +89,20 @@ class CountFits:
         return sum(row.met for row in self.rows) / len(self.rows) if self.rows else None
 
     @property
+    def hours(self) -> tuple[HourFit, ...]:
+        """Whole hours that are made of shorter slices, for which GEH is defined."""
+        groups: dict[tuple[str, str], list[CountFit]] = {}
+        for row in self.rows:
+            groups.setdefault((row.counts, row.place), []).append(row)
+        return tuple(one for rows in groups.values() for one in _whole_hours(rows))
+
+    @property
+    def hours_met(self) -> float | None:
+        """Share of the hours with a good GEH; ``None`` if no hour is made of slices."""
+        hours = self.hours
+        return sum(one.met for one in hours) / len(hours) if hours else None
+
+    @property
     def rmse(self) -> float | None:
         """Root of the mean squared difference, vehicles per slice."""
         if not self.rows:
@@ -82,6 +117,8 @@ class CountFits:
             "counts": len(self.rows),
             "met": sum(row.met for row in self.rows),
             "share_met": self.share_met,
+            "hours": len(self.hours),
+            "hours_met": self.hours_met,
             "rmse": self.rmse,
             "vehicles": self.vehicles,
             "observations": sum(row.counted for row in self.rows),
@@ -89,6 +126,26 @@ class CountFits:
             "contradictions": list(self.contradictions),
             "rows": [{**row._asdict(), "met": row.met} for row in self.rows],
         }
+
+
+def _whole_hours(rows: Sequence[CountFit]) -> Iterator[HourFit]:
+    """Yield hours of one place that slices without gaps between them make up."""
+    slices: list[CountFit] = []
+    for row in sorted(rows, key=lambda one: one.begin):
+        if slices and abs(row.begin - slices[-1].end) > _TOGETHER:
+            slices = []
+        slices.append(row)
+        lasts = row.end - slices[0].begin
+        if lasts < _HOUR - _TOGETHER:
+            continue
+        if len(slices) > 1 and lasts < _HOUR + _TOGETHER:
+            counted, modelled = (
+                sum(one.counted for one in slices),
+                sum(one.modelled for one in slices),
+            )
+            value = geh(modelled, counted, _HOUR)
+            yield HourFit(row.counts, row.place, slices[0].begin, counted, modelled, value)
+        slices = []
 
 
 def planned_fit(scenario: Scenario, sumo_map: SumoMap) -> CountFits:

@@ -238,7 +238,7 @@ def stretched(
     if least > cycle:
         msg = (
             f"the light of junction {', '.join(shown.junctions)} needs a cycle of {least:g} s for "
-            f"its least greens and intergreens, but that of the corridor is {cycle:g} s"
+            f"its least greens and intergreens, but it is to be {cycle:g} s"
         )
         raise InputError(msg)
     if abs(before.cycle - cycle) < _SAME:

@@ -293,21 +293,32 @@ def whole_trips(cells: Sequence[MatrixCell], trips: FloatArray) -> FloatArray:
     return result
 
 
-def _sampled(scenario: Scenario) -> tuple[dict[str, Pair], Scenario]:
-    """Give a scenario so many trips of each pair, and nothing else; which row each name is of."""
-    named: dict[str, Pair] = {}
+def with_more_trips(scenario: Scenario) -> Scenario:
+    """Give each pair of places of matrices so many trips that routes between them can be seen.
+
+    The first trips of a row are those that it has in the scenario.
+    """
     matrices = []
     for matrix in scenario.demand.matrices:
         if Category.PEDESTRIAN in matrix.mix:
+            matrices.append(matrix)
             continue
-        named |= {f"{matrix.id}.{a}-{b}": (a, b) for a, b, _ in matrix.trips}
         rows = tuple(
             (a, b, float(np.clip(np.ceil(number), SAMPLE, 10 * SAMPLE)))
             for a, b, number in matrix.trips
         )
         matrices.append(matrix.model_copy(update={"trips": rows}))
-    demand = scenario.demand.model_copy(
-        update={"matrices": tuple(matrices), "inputs": (), "background": (), "counts": ()}
+    demand = scenario.demand.model_copy(update={"matrices": tuple(matrices)})
+    return scenario.model_copy(update={"demand": demand})
+
+
+def _sampled(scenario: Scenario) -> tuple[dict[str, Pair], Scenario]:
+    """Keep the matrices of vehicles, with more trips; which row each name is of."""
+    more = with_more_trips(scenario).demand
+    matrices = tuple(one for one in more.matrices if Category.PEDESTRIAN not in one.mix)
+    named = {f"{matrix.id}.{a}-{b}": (a, b) for matrix in matrices for a, b, _ in matrix.trips}
+    demand = more.model_copy(
+        update={"matrices": matrices, "inputs": (), "background": (), "counts": ()}
     )
     return named, scenario.model_copy(update={"demand": demand, "actors": (), "flows": ()})
 

@@ -7,7 +7,7 @@ busiest hour, fewer are made, and more of the others.
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -24,8 +24,12 @@ from odscen.sumo.realize.passages import each_passing
 from odscen.sumo.realize.realization import all_road_users
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from odscen.base.arrays import FloatArray
+    from odscen.base.categories import Category
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.sumo_map import SumoMap
 
 TOWN_MIX = {"car": 80, "van": 8, "truck": 4, "bus": 2, "motorcycle": 3, "bicycle": 3}
@@ -48,6 +52,8 @@ OFTEN = 5.0
 """Times as often as on average that a trip is made at most, however free its route is."""
 STEP = 0.9
 """Times the trips, if the junctions do not carry so many."""
+_MOST = 20_000.0
+"""Trips an hour anywhere at most, where no junction limits them."""
 
 
 class Load(NamedTuple):
@@ -61,6 +67,14 @@ class Load(NamedTuple):
     place: str
     volume: float
     capacity: float
+
+    def times(self, factor: float) -> Load:
+        """What so many times the trips ask."""
+        return self._replace(
+            trips=self.trips * factor,
+            peak_trips=self.peak_trips * factor,
+            volume=self.volume * factor,
+        )
 
 
 def town_day(
@@ -85,10 +99,62 @@ def town_day(
     InputError
         If no trips are possible on the map.
     """
+    users, uses, capacity, places = _sampled(scenario, sumo_map, TOWN_MIX)
+    share = peak_share(day)
+    weights = balanced(uses, SPARE * capacity, trips * share)
+    while weights is None:
+        trips = round(STEP * trips, -2)
+        weights = balanced(uses, SPARE * capacity, trips * share)
+    volume = uses.T @ weights
+    busiest = int(np.argmax(volume / capacity))
+    load = Load(
+        trips,
+        trips * share,
+        places[busiest],
+        float(volume[busiest]),
+        float(capacity[busiest]),
+    )
+    ids, segment = sumo_map.graph.segments.ids, sumo_map.graph.lanes.segment
+    numbers: Counter[tuple[str, str]] = Counter()
+    for user, weight in zip(users, weights.tolist(), strict=True):
+        numbers[str(ids[segment[user.spawn]]), str(ids[segment[user.goal]])] += weight / share
+    rows = ((*pair, round(number, 2)) for pair, number in sorted(numbers.items()))
+    return tuple(row for row in rows if row[2] > 0), load
+
+
+def carried_background(
+    scenario: Scenario, sumo_map: SumoMap, *, mix: Mapping[Category, float]
+) -> float:
+    """Random trips an hour with which no approach gets more than :data:`SPARE` of its capacity.
+
+    Raises
+    ------
+    InputError
+        If no trips are possible in the region.
+    """
+    users, uses, capacity, _ = _sampled(scenario, sumo_map, mix)
+    passed = uses.sum(axis=0) / len(users)
+    return SPARE * float(np.min(capacity[passed > 0] / passed[passed > 0], initial=_MOST))
+
+
+class _Sampled(NamedTuple):
+    """Trips anywhere in a region.
+
+    ``uses`` is how often each passes each approach to a junction, shape ``(trips, places)``;
+    ``capacity`` and ``places`` are those of the approaches.
+    """
+
+    users: list[RoadUser]
+    uses: sparse.csr_array
+    capacity: FloatArray
+    places: Sequence[str]
+
+
+def _sampled(scenario: Scenario, sumo_map: SumoMap, mix: Mapping[Any, float]) -> _Sampled:
     region = Region.of(sumo_map.graph, scenario.roi)
     carried = approach_capacities(sumo_map)
     passing = Passing(sumo_map.graph, sorted(carried))
-    sample = Background.model_validate({"id": "sample", "trips": SAMPLE, "mix": TOWN_MIX})
+    sample = Background.model_validate({"id": "sample", "trips": SAMPLE, "mix": mix})
     drawn = scenario.model_copy(update={"demand": Demand(background=(sample,))})
     users, _ = all_road_users(drawn, sumo_map, region, until=DAY)
     drivable = Router(sumo_map.graph, region.lanes & sumo_map.drivable)
@@ -105,26 +171,7 @@ def town_day(
         shape=(len(routes), len(passing.places)),
     )
     capacity = np.array([carried[place] for place in passing.places])
-    share = peak_share(day)
-    weights = balanced(uses, SPARE * capacity, trips * share)
-    while weights is None:
-        trips = round(STEP * trips, -2)
-        weights = balanced(uses, SPARE * capacity, trips * share)
-    volume = uses.T @ weights
-    busiest = int(np.argmax(volume / capacity))
-    load = Load(
-        trips,
-        trips * share,
-        passing.places[busiest],
-        float(volume[busiest]),
-        float(capacity[busiest]),
-    )
-    ids, segment = sumo_map.graph.segments.ids, sumo_map.graph.lanes.segment
-    numbers: Counter[tuple[str, str]] = Counter()
-    for (user, _), weight in zip(routes, weights.tolist(), strict=True):
-        numbers[str(ids[segment[user.spawn]]), str(ids[segment[user.goal]])] += weight / share
-    rows = ((*pair, round(number, 2)) for pair, number in sorted(numbers.items()))
-    return tuple(row for row in rows if row[2] > 0), load
+    return _Sampled([user for user, _ in routes], uses, capacity, passing.places)
 
 
 def balanced(uses: sparse.csr_array, most: FloatArray, total: float) -> FloatArray | None:

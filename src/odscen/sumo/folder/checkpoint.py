@@ -63,8 +63,8 @@ class Checkpoint:
     files
         SHA-256 by name.
     story
-        What rules remember, see :meth:`odscen.sumo.worker.story_run.StoryRun.state`; nothing if
-        there are none.
+        What rules remember, see :meth:`odscen.sumo.worker.story.story_run.StoryRun.state`; nothing
+        if there are none.
     """
 
     number: int

@@ -299,6 +299,8 @@ class Run:
     def to_dict(self) -> dict[str, Any]:
         """Return the summary with the folder and absolute paths of its files."""
         files = {name: str(self.folder / file) for name, file in self.summary["files"].items()}
+        if self.report is not None:  # perhaps written later
+            files["report"] = str(self.report)
         return {**self.summary, "folder": str(self.folder), "files": files}
 
     def _text(self, name: str) -> str:

@@ -11,6 +11,7 @@ from odscen.sumo.folder.layout import (
     LANES_FILE,
     LIGHT_STATES_FILE,
     RECORDED,
+    STAYS_FILE,
     TRAJECTORIES_FILE,
     TRIPS_FILE,
     VISITS_FILE,
@@ -49,6 +50,22 @@ def recorded_files(run: Path, file: str) -> list[Path]:
 def trajectory_files(run: Path) -> list[Path]:
     """Parquet files of the trajectories; empty if none were recorded, or no road user was there."""
     return recorded_files(run, TRAJECTORIES_FILE)
+
+
+IN_MEMORY = 8 << 20
+"""Bytes of trajectories that are read once and kept, instead of each time that they are used."""
+
+
+def scan_trajectories(run: Path) -> pl.LazyFrame | None:
+    """Trajectories to compute with; ``None`` if none were recorded, or no road user was there."""
+    import polars as pl
+
+    files = trajectory_files(run)
+    if not files:
+        return None
+    if sum(file.stat().st_size for file in files) > IN_MEMORY:
+        return pl.scan_parquet(files)
+    return pl.read_parquet(files).lazy()
 
 
 def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
@@ -154,6 +171,18 @@ def read_visits(run: Path) -> pl.DataFrame | None:
     In order of departure; ``None`` if the scenario has no lines.
     """
     return _read(run, VISITS_FILE)
+
+
+def read_stays(run: Path) -> pl.DataFrame | None:
+    """Read which car was in which parking area when.
+
+    Returns
+    -------
+    Columns of :func:`odscen.sumo.outputs.stop_table.stay_table`, in order of arrival; ``None`` if
+    no trip of the scenario parks.
+    """
+    stays = _read(run, STAYS_FILE)
+    return None if stays is None else stays.sort("arrival", "actor")
 
 
 def _read(run: Path, file: str) -> pl.DataFrame | None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+from odscen.base.stored_files import stored_document
 from odscen.results.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
 from odscen.results.by_place.control_delay import vehicle_passages
 from odscen.results.by_place.facilities import (
     FacilityData,
+    has_highways,
     heavy_share,
     highway_density,
     movement_facilities,
@@ -15,6 +18,7 @@ from odscen.results.by_place.facilities import (
 )
 from odscen.results.by_place.group_figures import group_sums
 from odscen.results.by_place.lane_places import LanePlaces
+from odscen.results.by_place.parking_use import ParkingUse
 from odscen.results.by_place.queues import queue_lengths
 from odscen.results.by_place.station_figures import station_figures
 from odscen.results.by_place.traffic import traffic_figures
@@ -22,15 +26,17 @@ from odscen.results.measures.figure import RunData
 from odscen.results.measures.signal_use import signal_use, write_signal_use
 from odscen.results.measures.traffic_files import figures_json, write_stations, write_tables
 from odscen.results.records.light_programs import programs_from_json
-from odscen.results.records.run_records import Plan
+from odscen.results.records.planned_stations import PlannedStation
+from odscen.results.records.run_records import PLAN_FORMAT, VERSION, Plan
 from odscen.sumo.folder import layout
 from odscen.sumo.folder.recorded import (
     read_conflicts,
     read_lanes,
     read_light_states,
+    read_stays,
     read_trips,
     read_visits,
-    trajectory_files,
+    scan_trajectories,
 )
 from odscen.sumo.outputs.net_facts import read_net_facts
 
@@ -40,6 +46,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.results.by_place.facilities import NetFacts
     from odscen.results.by_place.traffic import TrafficFigures
     from odscen.results.measures.summary import ActorOutcome
     from odscen.results.records.light_programs import LightProgram
@@ -67,59 +74,88 @@ def read_figures(
     InputError
         If the places of lanes cannot be read, or times do not fit what was measured.
     """
-    import polars as pl
+    return _figures(_Records(run, meso=meso), end=end, times=times)
 
-    lanes = read_lanes(run)
-    file = run / layout.LANE_PLACES_FILE
-    if lanes is None or not file.is_file():
+
+class _Records:
+    """What is in the folder of a run; each thing is read once, when it is first asked for."""
+
+    def __init__(self, run: Path, *, meso: bool) -> None:
+        self.run = run
+        self.meso = meso
+
+    @cached_property
+    def lanes(self) -> pl.DataFrame | None:
+        return read_lanes(self.run)
+
+    @cached_property
+    def places(self) -> LanePlaces | None:
+        file = self.run / layout.LANE_PLACES_FILE
+        if not file.is_file():
+            return None
+        return LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
+
+    @cached_property
+    def trajectories(self) -> pl.LazyFrame | None:
+        return scan_trajectories(self.run)
+
+    @property
+    def rows(self) -> pl.LazyFrame | None:
+        """Trajectories in which vehicles are stopped: not those of a mesoscopic run."""
+        return None if self.meso else self.trajectories
+
+    @cached_property
+    def facts(self) -> NetFacts | None:
+        return read_net_facts(self.run)
+
+    @cached_property
+    def lights(self) -> tuple[tuple[LightProgram, ...], pl.DataFrame | None]:
+        """Programs of lights and what they showed; none if the map has no lights."""
+        states, file = read_light_states(self.run), self.run / layout.LIGHTS_FILE
+        if states is None or not file.is_file():
+            return (), None
+        return programs_from_json(file.read_text(encoding="utf-8", errors="replace")), states
+
+
+def _figures(records: _Records, *, end: float, times: AnalysisTimes) -> TrafficFigures | None:
+    lanes, places, rows = records.lanes, records.places, records.rows
+    if lanes is None or places is None:
         return None
-    places = LanePlaces.from_json(file.read_text(encoding="utf-8", errors="replace"))
-    files = trajectory_files(run)
-    rows = pl.scan_parquet(files) if files and not meso else None
     clock = times.clock(lanes, end=end)
+    lanes = on_clock(lanes, clock)
     return traffic_figures(
         lanes,
         places,
         end=end,
         queues=None if rows is None else queue_lengths(rows, places, clock),
-        facilities=_facilities(run, on_clock(lanes, clock), places, rows, clock),
+        facilities=_facilities(records, lanes, places, clock),
         times=times,
+        clock=clock,
     )
 
 
 def _facilities(
-    run: Path,
-    lanes: pl.DataFrame,
-    places: LanePlaces,
-    rows: pl.LazyFrame | None,
-    clock: pl.DataFrame,
+    records: _Records, lanes: pl.DataFrame, places: LanePlaces, clock: pl.DataFrame
 ) -> FacilityData | None:
     """Kinds of facilities, control delay and density; ``None`` without the run's SUMO files."""
-    facts = read_net_facts(run)
+    facts, rows = records.facts, records.rows
     if facts is None:
         return None
     movements = movement_facilities(places, facts)
     passed = None if rows is None else vehicle_passages(rows, places, facts)
     groups = group_of = None
     if rows is not None and passed is not None:
-        programs, states = _lights(run)
+        programs, states = records.lights
         groups, group_of = group_sums(
             rows, passed, places, facts, clock, programs=programs, states=states
         )
     by_junction, by_movement = (
         (None, None) if passed is None else passage_sums(passed, movements, clock)
     )
-    heavy = None if rows is None else heavy_share(rows, facts, clock)
+    graded = rows is not None and has_highways(places, facts)
+    heavy = heavy_share(rows, facts, clock) if rows is not None and graded else None
     density = highway_density(lanes, places, facts, heavy)
     return FacilityData(movements, by_junction, by_movement, density, groups, group_of)
-
-
-def _lights(run: Path) -> tuple[tuple[LightProgram, ...], pl.DataFrame | None]:
-    """Programs of lights and what they showed; none if the map has no lights."""
-    states, file = read_light_states(run), run / layout.LIGHTS_FILE
-    if states is None or not file.is_file():
-        return (), None
-    return programs_from_json(file.read_text(encoding="utf-8", errors="replace")), states
 
 
 def read_run_data(
@@ -140,33 +176,44 @@ def read_run_data(
     InputError
         If the places of lanes cannot be read, or times do not fit what was measured.
     """
-    first = times.warm_up
+    first, records = times.warm_up, _Records(run, meso=meso)
     return RunData(
         outcomes=[one for one in outcomes if one.depart >= first],
-        traffic=read_figures(run, end=end, meso=meso, times=times),
+        traffic=_figures(records, end=end, times=times),
         trips=_since(read_trips(run), "depart", first),
         conflicts=_since(read_conflicts(run), "begin", first),
         end=end,
-        signals=read_signal_use(run, end=end, meso=meso),
+        signals=_signal_use(records, end=end),
         visits=read_visits(run),
-        stations=None if meso else _stations(run, end=end, times=times),
+        stations=None if meso else _stations(records, end=end, times=times),
+        parking=read_parking(run, begin=first, end=end),
     )
 
 
-def _stations(run: Path, *, end: float, times: AnalysisTimes) -> pl.DataFrame | None:
-    """What the stations of the study counted; ``None`` if there are none, or no trajectories."""
-    import polars as pl
-
-    file = run / layout.PLAN_FILE
-    files, lanes = trajectory_files(run), read_lanes(run)
-    if not (file.is_file() and files) or lanes is None:
+def read_parking(run: Path, *, begin: float = 0.0, end: float) -> ParkingUse | None:
+    """Read the use of parking areas from ``begin`` to ``end`` (s); ``None`` if no trip parks."""
+    stays = read_stays(run)
+    if stays is None:
         return None
-    stations = Plan.from_json(file.read_text(encoding="utf-8", errors="replace")).stations
-    facts = read_net_facts(run) if stations else None
+    plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8", errors="replace"))
+    return ParkingUse.of(stays, plan, begin=begin, end=end)
+
+
+def _stations(records: _Records, *, end: float, times: AnalysisTimes) -> pl.DataFrame | None:
+    """What the stations of the study counted; ``None`` if there are none, or no trajectories."""
+    file = records.run / layout.PLAN_FILE
+    rows, lanes = records.trajectories, records.lanes
+    if not file.is_file() or rows is None or lanes is None:
+        return None
+    text = file.read_text(encoding="utf-8", errors="replace")
+    with stored_document(
+        text, form=PLAN_FORMAT, version=VERSION, what="a plan of a run"
+    ) as data:  # actor by actor it takes longer to read
+        stations = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
+    facts = records.facts if stations else None
     if facts is None:
         return None
-    clock = times.clock(lanes, end=end)
-    found = station_figures(pl.scan_parquet(files), stations, facts, clock)
+    found = station_figures(rows, stations, facts, times.clock(lanes, end=end))
     return None if found is None else times.analysed(found)
 
 
@@ -174,32 +221,13 @@ def _since(table: pl.DataFrame | None, column: str, first: float) -> pl.DataFram
     return table if table is None or not first else table.filter(table[column] >= first)
 
 
-def read_signal_use(run: Path, *, end: float, meso: bool = False) -> pl.DataFrame | None:
-    """How signal groups were used in a run that lasted ``end`` seconds.
-
-    Returns
-    -------
-    See :func:`odscen.results.measures.signal_use.signal_use`; ``None`` if the map has no lights.
-
-    Raises
-    ------
-    InputError
-        If the programs of lights cannot be read.
-    """
-    import polars as pl
-
-    programs, states = _lights(run)
+def _signal_use(records: _Records, *, end: float) -> pl.DataFrame | None:
+    """How signal groups were used; ``None`` if the map has no lights."""
+    programs, states = records.lights
     if states is None:
         return None
-    files = trajectory_files(run)
-    rows = pl.scan_parquet(files) if files and not meso else None
-    places = run / layout.LANE_PLACES_FILE
-    ways = (
-        LanePlaces.from_json(places.read_text(encoding="utf-8", errors="replace")).ways
-        if places.is_file()
-        else None
-    )
-    return signal_use(programs, states, end=end, rows=rows, ways=ways)
+    ways = None if records.places is None else records.places.ways
+    return signal_use(programs, states, end=end, rows=records.rows, ways=ways)
 
 
 def write_figures(run: Path, data: RunData) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,9 +54,26 @@ def read_net_facts(run: Path) -> NetFacts | None:
 
 
 def _facts(net: Path, routes: Path) -> NetFacts:
+    # Runs on one map have its network as the same file, see write_sumo_files.
+    stat = net.stat()
+    same = stat.st_dev, stat.st_ino, stat.st_size, stat.st_mtime_ns
+    return replace(_net_facts(_NetFile(net, same)), drivers=_drivers(routes))
+
+
+@dataclass(frozen=True, slots=True)
+class _NetFile:
+    """A network file, equal to every link to it."""
+
+    path: Path = field(compare=False)
+    same: tuple[int, ...]
+
+
+@lru_cache(maxsize=4)
+def _net_facts(net: _NetFile) -> NetFacts:
+    """Facts of a network, without drivers."""
     import polars as pl
 
-    content = net.read_bytes()
+    content = net.path.read_bytes()
     root = read_xml(content, huge=True)
     lanes = [(edge, lane) for edge in root.iterfind("edge") for lane in edge.iterfind("lane")]
     limits = [
@@ -69,6 +88,7 @@ def _facts(net: Path, routes: Path) -> NetFacts:
     ring = {name for one in root.iterfind("roundabout") for name in one.get("edges", "").split()}
     known = read_net(content)
     yields = _giving_way(known)
+    mirrored = str.maketrans("lLrR", "rRlL") if root.get("lefthand") == "true" else {}
     links = {
         via: (
             via,
@@ -77,6 +97,7 @@ def _facts(net: Path, routes: Path) -> NetFacts:
             one.get("to") in ring,
             one.get("from") in ring,
             yields.get(via, []),
+            one.get("dir", "s").translate(mirrored),
         )
         for one in root.iterfind("connection")
         if (via := one.get("via"))
@@ -102,10 +123,11 @@ def _facts(net: Path, routes: Path) -> NetFacts:
                 "state": pl.String,
                 **flags,
                 "yields_to": pl.List(pl.String),
+                "turn": pl.String,
             },
             orient="row",
         ),
-        drivers=_drivers(routes),
+        drivers=pl.DataFrame(),
     )
 
 

@@ -16,18 +16,23 @@ from odscen.sumo.folder.layout import (
     EMISSIONS_FILE,
     EVENTS_FILE,
     LANES_FILE,
+    STAYS_FILE,
     STOPINFO_FILE,
     TRIPINFO_FILE,
     TRIPS_FILE,
     VISITS_FILE,
 )
 from odscen.sumo.outputs.lane_measures import lane_table
-from odscen.sumo.outputs.stop_table import stop_table
-from odscen.sumo.outputs.trip_table import trip_table
+from odscen.sumo.outputs.stop_table import stay_table, stop_table
+from odscen.sumo.outputs.trip_table import ParkedCar, Stay, trip_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping
     from pathlib import Path
+
+    import polars as pl
+
+    from odscen.results.records.run_records import Plan
 
 
 def outputs_to(folder: Path, sumo: Path) -> list[str]:
@@ -44,8 +49,10 @@ def outputs_to(folder: Path, sumo: Path) -> list[str]:
 def tidy_outputs(
     folder: Path,
     lengths: Mapping[str, Mapping[str, float]],
+    plan: Plan,
     *,
     present: Mapping[str, int],
+    parked: Collection[str] = (),
     last: bool,
 ) -> None:
     """Replace SUMO's lane data, emissions, tripinfo and stops by our tables.
@@ -54,6 +61,10 @@ def tidy_outputs(
     ----------
     lengths, present
         As of :func:`odscen.sumo.outputs.lane_measures.lane_table`.
+    plan
+        Says who parks.
+    parked
+        Those who have ended their trips parked before this slice, and were still there.
     last
         Whether the run has ended, so that trips without an arrival are trips.
 
@@ -66,7 +77,7 @@ def tidy_outputs(
     from polars.exceptions import PolarsError
 
     lanes, emissions = folder / LANES_FILE, folder / EMISSIONS_FILE
-    tripinfo, stopinfo = folder / TRIPINFO_FILE, folder / STOPINFO_FILE
+    tripinfo = folder / TRIPINFO_FILE
     try:
         if lanes.is_file():
             rows = lane_table(lanes, emissions if emissions.is_file() else None, lengths, present)
@@ -74,17 +85,46 @@ def tidy_outputs(
             if rows.height:
                 rows.write_parquet(lanes)
             emissions.unlink(missing_ok=True)
+        stays = _tidy_stops(folder, plan, last=last)
         if tripinfo.is_file():
-            trips = trip_table(tripinfo, unfinished=last)
+            trips = trip_table(tripinfo, parked=_parked(plan, stays, parked), unfinished=last)
             if trips.height:
                 trips.write_parquet(folder / TRIPS_FILE)
             tripinfo.unlink()
-        if stopinfo.is_file():
-            stop_table(stopinfo).write_parquet(folder / VISITS_FILE)
-            stopinfo.unlink()
     except (etree.XMLSyntaxError, PolarsError) as error:
         msg = f"SUMO has not written its measurements to the end; the disk may be full: {error}"
         raise SimulationError(msg) from error
+
+
+def _tidy_stops(folder: Path, plan: Plan, *, last: bool) -> pl.DataFrame | None:
+    """Replace SUMO's log of stops by tables; returns stays in parking places if trips park."""
+    stopinfo = folder / STOPINFO_FILE
+    if not stopinfo.is_file():
+        return None
+    visits, stays = stop_table(stopinfo), None
+    if visits.height or not plan.parking:
+        visits.write_parquet(folder / VISITS_FILE)
+    if plan.parking:
+        stays = stay_table(stopinfo, (one.id for one in plan.parking), unfinished=last)
+        stays.write_parquet(folder / STAYS_FILE)
+    stopinfo.unlink()
+    return stays
+
+
+def _parked(
+    plan: Plan, stays: pl.DataFrame | None, before: Collection[str]
+) -> dict[str, ParkedCar]:
+    """Cars whose trips begin or end parked, with what is known of their stays."""
+    if stays is None:
+        return {}
+    known = {
+        (actor, begins): Stay(came, left) for actor, _, begins, came, left in stays.iter_rows()
+    }
+    return {
+        one.id: ParkedCar(known.get((one.id, True)), known.get((one.id, False)), one.id in before)
+        for one in plan.actors
+        if one.begins_in is not None or one.ends_in is not None
+    }
 
 
 def trips_in(file: Path) -> dict[str, Trip]:

@@ -14,27 +14,63 @@ time_loss           s lost by driving (walking) below the speed it wished for; n
                     person who had not arrived
 =================== ==================================================================
 
+Of a car that begins or ends its trip in a parking place, the trip is from leaving the one to
+taking the other.
+
 XML, because SUMO 1.28 ends with an error when it is to write vehicles and persons as Parquet.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.sumo.outputs.xml_rows import elements
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import polars as pl
 
 
-def trip_table(tripinfo: Path, *, unfinished: bool) -> pl.DataFrame:
+NOT_PARKED: Mapping[str, ParkedCar] = MappingProxyType({})
+
+
+class Stay(NamedTuple):
+    """When a car took a parking place and left it, s; ``left`` ``None`` if it is still there."""
+
+    came: float
+    left: float | None
+
+
+class ParkedCar(NamedTuple):
+    """A car whose trip begins or ends parked, with what is known of that.
+
+    The stay at its beginning is not known if it was in an earlier slice; ``counted`` is set if the
+    trip ended in an earlier slice and the stay after it, too.
+    """
+
+    first: Stay | None
+    last: Stay | None
+    counted: bool = False
+
+    @property
+    def left_out(self) -> bool:
+        """Whether its trip is in another table, or it has not left where it begins."""
+        waits = self.first is not None and self.first.left is None
+        return waits or (self.counted and self.last is None)
+
+
+def trip_table(
+    tripinfo: Path, *, unfinished: bool, parked: Mapping[str, ParkedCar] = NOT_PARKED
+) -> pl.DataFrame:
     """Read SUMO's tripinfo file; in order of arrival, then of ids, the unfinished last.
 
     Parameters
     ----------
+    parked
+        Cars whose trips begin or end parked, by id.
     unfinished
         Whether those who have not arrived are trips too: not at a boundary between slices, where
         SUMO writes all who are on the road.
@@ -57,29 +93,52 @@ def trip_table(tripinfo: Path, *, unfinished: bool) -> pl.DataFrame:
         "waiting_count": pl.Int64,
         "time_loss": pl.Float64,
     }
-    rows = [row for row in _rows(tripinfo) if unfinished or row[3] is not None]
+    rows = [row for row in _rows(tripinfo, parked) if unfinished or row[3] is not None]
     table = pl.DataFrame(rows, schema=schema, orient="row")
     return table.sort("arrival", "depart", "id", nulls_last=True)
 
 
-def _rows(tripinfo: Path) -> Iterator[tuple[Any, ...]]:
+def _rows(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tuple[Any, ...]]:
     for element in elements(tripinfo, "tripinfo", "personinfo"):
-        yield _walk(element) if element.tag == "personinfo" else _drive(element)
+        if element.tag == "personinfo":
+            yield _walk(element)
+            continue
+        car = parked.get(element.get("id") or "")
+        if car is None or not car.left_out:
+            yield _drive(element, car)
 
 
-def _drive(trip: Any) -> tuple[Any, ...]:
+def _drive(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
     value = trip.get
+    depart, arrival = float(value("depart")), _known(value("arrival"))
+    duration = float(value("duration"))
+    if car is not None:
+        depart, arrival, duration = _between_stays(trip, car, depart, arrival, duration)
     return (
         value("id"),
         False,
-        float(value("depart")),
-        _known(value("arrival")),
-        float(value("duration")),
+        depart,
+        arrival,
+        duration,
         float(value("routeLength")),
         float(value("waitingTime")),
         int(value("waitingCount")),
         float(value("timeLoss")),
     )
+
+
+def _between_stays(
+    trip: Any, car: ParkedCar, depart: float, arrival: float | None, duration: float
+) -> tuple[float, float | None, float]:
+    """Departure, arrival and duration from leaving a parking place to taking one."""
+    stopped = float(trip.get("stopTime"))
+    over = depart + duration if arrival is None else arrival
+    end = car.last
+    if end is not None:
+        stopped += 0.0 if end.left is None else over - end.left
+        arrival = end.came
+    driven = duration - stopped
+    return round((over if end is None else end.came) - driven, 4), arrival, round(driven, 4)
 
 
 def _walk(person: Any) -> tuple[Any, ...]:

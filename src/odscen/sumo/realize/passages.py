@@ -31,6 +31,8 @@ Passages = Counter[tuple[str, float, float]]
 
 UNKNOWN_LIMIT = 13.89
 """m/s assumed where the map gives no limit: 50 km/h."""
+_MOST_BETWEEN = 8
+"""Segments without a record, between two with one, that are filled in at most."""
 
 
 def planned_passages(
@@ -90,6 +92,9 @@ def seen_passages(
 ) -> tuple[Passages, int]:
     """Count vehicles at the places of observations, as a run's trajectories have them.
 
+    Who goes to the end of a segment ends with its front in the junction behind it, and has not
+    passed from the one to the other.
+
     Parameters
     ----------
     trajectories
@@ -116,15 +121,19 @@ def seen_passages(
             lane=pl.col("vehicle_lane").cast(pl.String),
         )
         .join(known.lazy(), on="lane", how="inner")
+        .with_columns(arrived=pl.col("time").max().over("id") < pl.col("time").max())
         .sort("id", "time")
         .filter((pl.col("segment") != pl.col("segment").shift(1).over("id")).fill_null(value=True))
         .group_by("id", maintain_order=True)
-        .agg("time", "segment")
+        .agg("time", "segment", pl.col("arrived").first())
         .collect()
     )
     between = _Between(sumo_map.graph)
-    for times, route in zip(changes["time"].to_list(), changes["segment"].to_list(), strict=True):
+    junctions = np.array(sumo_map.graph.segments.kinds) == "junction"
+    for times, route, arrived in changes.select("time", "segment", "arrived").iter_rows():
         whole, moments = between.filled(route, times)
+        if arrived and junctions[whole[-1]]:
+            whole, moments = whole[:-1], moments[:-1]
         for place, step in passing.of(whole):
             clock.count(found, passing.places[place], moments[step])
     return found, len(changes)
@@ -148,27 +157,50 @@ class _Slices:
 
 
 class _Between:
-    """Fills segments in that a vehicle crossed from one record to the next, such as a junction."""
+    """Fills segments in that a vehicle crossed from one record to the next.
+
+    Such as a junction, or several short sections of a road that are one SUMO lane together.
+    """
 
     def __init__(self, graph: MapGraph) -> None:
         row = {str(name): index for index, name in enumerate(graph.segments.ids)}
         self._onwards = {
             row[one]: {row[other] for other in others} for one, others in transitions(graph).items()
         }
+        self._known: dict[tuple[int, int], tuple[int, ...]] = {}
 
     def filled(self, route: Sequence[int], times: Sequence[float]) -> tuple[list[int], list[float]]:
         """Segments and times of a route with what lies between two that do not touch."""
         whole, moments = [route[0]], [times[0]]
         for segment, time in zip(route[1:], times[1:], strict=True):
-            onwards = self._onwards.get(whole[-1], set())
-            if segment not in onwards:
-                steps = [one for one in sorted(onwards) if segment in self._onwards.get(one, ())]
-                if len(steps) == 1:
-                    whole.append(steps[0])
-                    moments.append(time)
-            whole.append(segment)
-            moments.append(time)
+            gap = whole[-1], segment
+            if gap not in self._known:
+                self._known[gap] = self._shortest(*gap)
+            steps = (*self._known[gap], segment)
+            whole += steps
+            moments += [time] * len(steps)
         return whole, moments
+
+    def _shortest(self, one: int, other: int) -> tuple[int, ...]:
+        """Segments between two on the shortest sequence; none if there are several of a length."""
+        fronts: list[dict[int, list[int]]] = [{one: []}]
+        reached = {one}
+        while fronts[-1] and len(fronts) <= _MOST_BETWEEN + 1:
+            front: dict[int, list[int]] = defaultdict(list)
+            for near in fronts[-1]:
+                for far in self._onwards.get(near, set()) - reached:
+                    front[far].append(near)
+            fronts.append(front)
+            reached |= front.keys()
+            if other in front:
+                break
+        steps = [other]
+        for front in fronts[:0:-1]:
+            before = front.get(steps[-1], [])
+            if len(before) != 1:
+                return ()
+            steps.append(before[0])
+        return tuple(steps[-2:0:-1])
 
 
 def _times(lanes: LaneGraph, path: np.ndarray) -> np.ndarray:

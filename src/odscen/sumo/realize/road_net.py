@@ -7,12 +7,14 @@ not parsed again. Ids are only ever looked up.
 from __future__ import annotations
 
 import heapq
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Container, Iterable, Sequence
 
 PEDESTRIAN = "pedestrian"
 
@@ -203,6 +205,61 @@ class RoadNet:
                 via = link.via
                 return (self.lanes[via], *self.leaving(via)) if via else (self.lanes[link.target],)
         return None
+
+    def room_to_stop(
+        self, lane: str, pos: float, edges: Sequence[str], signalled: Container[str] = ()
+    ) -> float:
+        """Metres within which SUMO wants a vehicle that departs to be able to stop.
+
+        That is to the first junction at which it may have to give way, or where road only follows
+        road before that, to the end of the last lane but one: SUMO looks no further.
+
+        Parameters
+        ----------
+        lane, pos
+            Where the vehicle is; metres along the lane.
+        edges
+            Normal edges of its route, that of the lane first.
+        signalled
+            Edges that end at a traffic light.
+
+        Returns
+        -------
+        Infinite if there is no such junction before the end of the route.
+        """
+        room = before = self.lanes[lane].length - pos
+        for here, there in pairwise(edges):
+            if here in signalled or not self._is_joint(here):
+                return before
+            before, room = room, room + self.edge_length(there)
+        return math.inf
+
+    def _is_joint(self, edge: str) -> bool:
+        """Whether no two edges at the end of an edge lead to the same one, and none to several."""
+        junction = self.ends.get(edge, ("", ""))[1]
+        targets = [self._targets.get(other, frozenset()) for other in self._into.get(junction, ())]
+        return all(len(one) <= 1 for one in targets) and len(frozenset().union(*targets)) == sum(
+            map(len, targets)
+        )
+
+    @cached_property
+    def _into(self) -> dict[str, tuple[str, ...]]:
+        """Edges that lead to each junction."""
+        found: dict[str, list[str]] = {}
+        for edge, (_, junction) in self.ends.items():
+            found.setdefault(junction, []).append(edge)
+        return {junction: tuple(edges) for junction, edges in found.items()}
+
+    @cached_property
+    def _targets(self) -> dict[str, frozenset[str]]:
+        """Normal edges that each edge has links to."""
+        found: dict[str, set[str]] = {}
+        for link in self.links:
+            if not self.lanes[link.target].internal:
+                found.setdefault(self.lanes[link.source].edge, set()).add(
+                    self.lanes[link.target].edge
+                )
+        return {edge: frozenset(targets) for edge, targets in found.items()}
 
     def leaving(self, internal: str) -> tuple[RoadNetLane, ...]:
         """Return the lanes after an internal lane, up to the normal lane that it leads to.

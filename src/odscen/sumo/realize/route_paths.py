@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph
     from odscen.lanegraph.paths_to_goal import PathsTo
-    from odscen.lanegraph.shortest_paths import Router
+    from odscen.lanegraph.shortest_paths import Router, WalkRouter
     from odscen.scenario.placing.region import Region
     from odscen.sumo.realize.road_user import RoadUser
 
@@ -80,7 +80,8 @@ def each_path(
                 paths |= _from_spawn(spawn, rest, bodies, router, leads)
         for index in group:
             path = paths.get(index, _NOWHERE)
-            yield index, _through(path, users[index].places, drivable) if len(path) else path
+            routers = (region.walk_router,) if person else (drivable, region.router)
+            yield index, _through(path, users[index].places, routers) if len(path) else path
     ways = quickest or CostRouter(drivable, region.graph.lanes)
     yield from _paths_of_trips(users, by_goal, region, ways, bodies)
 
@@ -163,10 +164,16 @@ def _joined_paths(one: Int32Array, other: Int32Array) -> Int32Array:
     return np.concatenate([one, other[1:]])
 
 
-def _through(path: Int32Array, places: Sequence[int], router: Router) -> Int32Array:
-    """A path to the first of some places, and on to the others; empty if there is none."""
+def _through(
+    path: Int32Array, places: Sequence[int], routers: Sequence[Router | WalkRouter]
+) -> Int32Array:
+    """A path to the first of some places, and on to the others; empty if there is none.
+
+    Each leg is that of the first router that has one.
+    """
     for here, there in pairwise(places):
-        further = router.path(here, there)
+        found = (router.path(here, there) for router in routers)
+        further = next((one for one in found if len(one)), _NOWHERE)
         if not len(further):
             return _NOWHERE
         path = _joined_paths(path, further)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 from odscen.base.categories import Category
+from odscen.results.records.run_records import begin_area
 from odscen.sumo.realize.driving import number
+from odscen.sumo.realize.road_user import appears_at
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -83,12 +85,13 @@ class RoutesFile:
         looks_every
             Seconds after which the driver looks for a quicker route again; ``None`` is never.
         """
+        appears = appears_at(user)
         attributes = [
             ("id", user.id),
             ("type", self._type(user.category.value, driver)),
-            ("depart", number(user.depart)),
+            ("depart", number(appears)),
             ("departLane", str(route.depart_lane)),
-            ("departPos", number(route.depart_pos, digits=4)),
+            ("departPos", "stop" if user.begins else number(route.depart_pos, digits=4)),
             # That of the vehicles ahead: a free lane then takes what HCM gives it. With "max" a
             # lane of a motorway takes a tenth less at steps of 1 s.
             ("departSpeed", "avg" if user.entering else number(_bounded(speed), digits=4)),
@@ -105,11 +108,13 @@ class RoutesFile:
         lines = [
             f"    <vehicle{_xml(attributes)}>",
             f'        <route edges="{" ".join(route.edges)}"/>',
+            *_first_stay(user),
             *(_stop(visit, bay=visit.stop in bays) for visit in user.visits),
+            *_last_stay(user),
             *_rerouting(looks_every),
             "    </vehicle>",
         ]
-        self._lines.append((user.depart, user.id, lines))
+        self._lines.append((appears, user.id, lines))
 
     def add_walk(self, user: RoadUser, driver: Driver, walk: Walk) -> None:
         """Add a person that walks ``walk``."""
@@ -190,6 +195,24 @@ def _stop(visit: StopVisit, *, bay: bool) -> str:
     if bay:
         attributes.append(("parking", "true"))
     return f"        <stop{_xml(attributes)}/>"
+
+
+def _first_stay(user: RoadUser) -> list[str]:
+    if user.begins is None:
+        return []
+    given = (
+        ("parkingArea", begin_area(user.begins.area)),
+        ("duration", "0"),
+        ("until", number(user.depart)),
+    )
+    return [f"        <stop{_xml(given)}/>"]
+
+
+def _last_stay(user: RoadUser) -> list[str]:
+    if user.ends is None:
+        return []
+    given = (("parkingArea", user.ends.area), ("duration", number(user.ends.seconds)))
+    return [f"        <stop{_xml(given)}/>"]
 
 
 def _bounded(speed: float) -> float:

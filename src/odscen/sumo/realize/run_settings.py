@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from odscen.base.errors import InputError
 from odscen.results.by_place.analysis_times import AnalysisTimes
-from odscen.results.measures.expectations import Expectation, needs_criticality, parse_expectation
+from odscen.results.judging.criteria import criteria_of
+from odscen.results.judging.expectations import Expectation, needs_criticality, parse_expectation
 from odscen.scenario.sampling.redrawn_traffic import REDRAWS
 from odscen.sumo.realize.recording import Recording
 
@@ -114,6 +115,14 @@ class RunSettings:
     def recorded(self) -> Recording:
         """What is recorded: criticality too where an expectation asks for it."""
         return self.recording.with_criticality(needs_criticality(self.expectations))
+
+    def recorded_of(self, scenario: Scenario) -> Recording:
+        """What is recorded of a scenario: criticality too where one of its criteria asks for it.
+
+        Not in meso, where it cannot be measured; such a criterion then has no value.
+        """
+        wanted = () if self.meso else criteria_of(scenario.criteria)
+        return self.recorded.with_criticality(needs_criticality(wanted))
 
     def times(self, scenario: Scenario) -> tuple[float, float]:
         """End of a run of a scenario and length of its steps, seconds.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from functools import lru_cache
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -50,6 +51,7 @@ class _JunctionPath(NamedTuple):
     movement: str
 
 
+@lru_cache(maxsize=4)
 def lane_places(sumo_map: SumoMap) -> LanePlaces:
     """Places of all lanes that vehicles may use.
 

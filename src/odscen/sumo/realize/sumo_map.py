@@ -10,6 +10,7 @@ import numpy as np
 
 from odscen.base.ids import LaneKey, Roadside
 from odscen.lanegraph.graphs import Relation
+from odscen.lanegraph.parking_areas import NO_PARKING
 from odscen.sumo.realize.road_net import Link, RoadNet, RoadNetLane
 from odscen.sumo.realize.route_planner import NodePositions
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.convert.lane_table.table import LaneTable, SumoLight
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
+    from odscen.lanegraph.parking_areas import MapParking
 
 NORMAL = "normal"
 INTERNAL = "internal"
@@ -47,6 +49,8 @@ class SumoMap:
     lane_names
         OpenDRIVE lanes (``12.0.-1``) at the stop lines of lights, and where one comes out behind
         them, by SUMO lane.
+    parking
+        Where cars can park.
     """
 
     graph: MapGraph
@@ -57,6 +61,7 @@ class SumoMap:
     elevation: bool = False
     lights: tuple[SumoLight, ...] = ()
     lane_names: Mapping[str, str] = field(default_factory=dict)
+    parking: MapParking = NO_PARKING
 
     @cached_property
     def drivable(self) -> BoolArray:
@@ -71,7 +76,7 @@ class SumoMap:
         return known[lanes.lane]
 
     @classmethod
-    def of(cls, graph: MapGraph, table: LaneTable) -> SumoMap:
+    def of(cls, graph: MapGraph, table: LaneTable, *, parking: MapParking = NO_PARKING) -> SumoMap:
         """Bring graph and lane table together."""
         lanes, walks = graph.lanes, graph.walks
         net = _road_net(table)
@@ -91,6 +96,7 @@ class SumoMap:
             elevation=table.elevation,
             lights=table.lights,
             lane_names=_lane_names(table),
+            parking=parking,
         )
 
 

@@ -13,6 +13,7 @@ from odscen.sumo.folder.layout import (
     CLOSURES_FILE,
     MEASURES_FILE,
     NET_FILE,
+    PARKING_FILE,
     REGION_FILE,
     ROUTES_FILE,
     SIGNALS_FILE,
@@ -79,6 +80,8 @@ class SumocfgSettings:
         Whether there are programs of traffic lights beside the network's own.
     stops
         Whether there are stops of lines, and what vehicles do there is recorded.
+    parking
+        Whether trips park, and when they take and leave their places is recorded.
     closures
         Whether measures of the scenario close lanes or set limits.
     recording
@@ -101,6 +104,7 @@ class SumocfgSettings:
     elevation: bool = False
     signals: bool = False
     stops: bool = False
+    parking: bool = False
     closures: bool = False
     recording: Recording = field(default_factory=Recording)
     measures: bool = False
@@ -115,6 +119,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
     additional = [SIGNALS_FILE] if settings.signals else []
     if settings.stops:
         additional.append(STOPS_FILE)
+    additional += [PARKING_FILE] if settings.parking else []
     additional += [CLOSURES_FILE] if settings.closures else []
     if recording.region is not None:
         additional.append(REGION_FILE)
@@ -184,8 +189,9 @@ def _outputs(settings: SumocfgSettings) -> dict[str, str]:
         "tripinfo-output.write-unfinished": "true",
         "precision": "4",
     }
-    if settings.stops:
-        trips = {"stop-output": STOPINFO_FILE, **trips}
+    if settings.stops or settings.parking:
+        unended = {"stop-output.write-unfinished": "true"} if settings.parking else {}
+        trips = {"stop-output": STOPINFO_FILE, **unended, **trips}
     if not recording.trajectories:
         return trips
     outputs = {

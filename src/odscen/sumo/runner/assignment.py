@@ -4,6 +4,10 @@ The method of successive averages: after iteration ``n`` one in ``n + 1`` of the
 route that is quickest in the interval of its departure, by the mean travel times of all iterations
 so far, those first who would save the largest share of their time (Sbayti, Lu and Mahmassani 2007,
 Transportation Research Record 2029). Of all iterations the routes with the smallest gap are kept.
+
+Where two routes take nearly as long, which of them is quickest is chance, and all would take it.
+With a spread trips are shared by the logit model among the routes that have been quickest so far,
+and the method finds a stochastic user equilibrium (Sheffi and Powell 1982, Networks 12(2)).
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from odscen.sumo.folder.recorded import read_lanes, read_trips
 from odscen.sumo.realize.realization import all_road_users, as_run
 from odscen.sumo.realize.recording import Recording
 from odscen.sumo.realize.route_choice.chosen_paths import RoutesOfDemand
+from odscen.sumo.realize.route_choice.known_routes import KnownRoutes, chosen_route, taste
 from odscen.sumo.realize.route_choice.travel_times import (
     EdgeSteps,
     TimedNetwork,
@@ -41,14 +46,18 @@ from odscen.sumo.runner.run_folder import write_run_folder
 from odscen.sumo.runner.worker_process import run_worker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from odscen.base.arrays import FloatArray, Int32Array
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.realization import ModelSizes
+    from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.runner.run_folder import PreparedRun
+
+
+_SETTLED = 0.05
+"""Share of trips that may want another route when, with a spread, routes are found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +117,7 @@ def assign_routes(
     assets: ModelSizes | None = None,
     *,
     settings: RunSettings,
+    wider: Scenario | None = None,
     on_step: Callable[[AssignmentStep], None] | None = None,
 ) -> AssignedRoutes:
     """Find routes by travel time for the trips of a scenario.
@@ -116,6 +126,10 @@ def assign_routes(
     ----------
     sumo_map, net, assets, settings
         As of :func:`odscen.sumo.runner.prepare.prepare`.
+    wider
+        The scenario with more trips in its rows. These choose routes as the others do, but are not
+        run, and the gap is without them: which routes are taken can then be told where a row has
+        one trip.
     on_step
         Called after each iteration.
 
@@ -127,7 +141,11 @@ def assign_routes(
         If a run fails.
     """
     choice = scenario.demand.routes
-    search = _Search(as_run(scenario, settings), sumo_map, until=settings.times(scenario)[0])
+    until = settings.times(scenario)[0]
+    search = _Search(as_run(scenario, settings), sumo_map, until=until)
+    if wider is not None:
+        real = search.paths()
+        search = _Search(as_run(wider, settings), sumo_map, until=until, real=real.keys())
     plain = replace(
         settings,
         recording=Recording(trajectories=False, emissions=False),
@@ -142,34 +160,49 @@ def assign_routes(
         with tempfile.TemporaryDirectory(prefix="odscen-routes-") as name:
             folder = Path(name)
             write_run_folder(prepared, folder)
-            ended = run_worker(folder, time_limit=settings.time_limit)
+            ended = run_worker(folder, time_limit=settings.time_limit, forked=True)
             if ended.done is None:
                 msg = f"iteration {iteration} of the assignment: {ended.error}"
                 raise SimulationError(msg)
             times = search.measured(folder)
             outcome = _outcome(folder, vehicles=sum(not one.person for one in prepared.plan.actors))
-        gain = search.compare(times)
+        wanting = search.compare(times)
         travel_time, *counts = outcome
         steps.append(AssignmentStep(iteration, round(search.gap, 6), travel_time, changed, *counts))
         if search.gap <= min(step.gap for step in steps):
             best = search.paths()
         if on_step is not None:
             on_step(steps[-1])
-        if search.gap <= choice.gap or not (gain > 0).any():
+        settled = not choice.spread or wanting <= _SETTLED
+        if (search.gap <= choice.gap and settled) or not wanting:
             break
-        changed = search.change(gain, share=1.0 / (iteration + 1.0))
+        changed = search.change(share=1.0 / (iteration + 1.0))
     used = min(steps, key=lambda step: (step.gap, step.iteration)).iteration
     return AssignedRoutes(best, Assignment(choice.gap, used, tuple(steps)))
 
 
 class _Search:
-    """The trips of one scenario that choose, with the paths they have and the quickest ones."""
+    """The trips of one scenario that choose, with the paths they have and the quickest ones.
 
-    def __init__(self, scenario: Scenario, sumo_map: SumoMap, *, until: float) -> None:
+    Parameters
+    ----------
+    real
+        Ids of the trips that are run, and make the gap; all without.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        sumo_map: SumoMap,
+        *,
+        until: float,
+        real: Collection[str] | None = None,
+    ) -> None:
         region = Region.of(sumo_map.graph, scenario.roi)
         users, _ = all_road_users(scenario, sumo_map, region, until=until)
         self.gap = 0.0
-        self._until, self._interval = until, scenario.demand.routes.interval
+        choice = scenario.demand.routes
+        self._until, self._interval, self._spread = until, choice.interval, choice.spread
         self._lanes = sumo_map.graph.lanes
         self._network = TimedNetwork(sumo_map)
         self._closings = measure_actions(scenario, sumo_map, until=until).closings
@@ -183,7 +216,14 @@ class _Search:
         self._paths = [found[index] for index in kept]
         self._steps = [self._edges.of(path) for path in self._paths]
         self._departs = np.array([user.depart for user in self._trips])
-        self._quick = list(self._paths)
+        self._real = np.array([real is None or user.id in real for user in self._trips])
+        self._known = [
+            KnownRoutes([one], [steps]) for one, steps in zip(self._paths, self._steps, strict=True)
+        ]
+        self._taste = np.array([taste(user.id) for user in self._trips])
+        self._wants = np.zeros(len(self._paths), dtype=np.bool_)
+        self._wanted = np.zeros(len(self._paths), dtype=np.int64)
+        self._gain = np.zeros(len(self._paths))
         self._mean: TravelTimes | None = None
         self._iterations = 0
 
@@ -208,44 +248,58 @@ class _Search:
             rows, until=self._until, interval=self._interval, closings=self._closings
         )
 
-    def compare(self, times: TravelTimes) -> FloatArray:
-        """Measure the gap, and find the paths that are quickest by the mean of all iterations.
+    def compare(self, times: TravelTimes) -> float:
+        """Measure the gap, and find what each trip wants by the means of all iterations.
 
         Returns
         -------
-        What each trip would save by these means, as a share of its time, shape ``(trips,)``.
+        Share of the trips that want another route than they have.
         """
         rows = times.row(self._departs)
-        own, best, _ = self._compared(times, rows)
-        self.gap = float((own - best).sum() / max(best.sum(), 1e-9))
+        own = path_costs(times, self._steps, rows)
+        quick = [self._edges.of(path) for path in self._quickest(times, rows)]
+        best = np.minimum(own, path_costs(times, quick, rows))
+        self.gap = float((own - best)[self._real].sum() / max(best[self._real].sum(), 1e-9))
         self._iterations += 1
         if self._mean is None:
             self._mean = times
         else:
             more = (times.costs - self._mean.costs) / self._iterations
             self._mean = TravelTimes(times.interval, self._mean.costs + more)
-        own, best, self._quick = self._compared(self._mean, rows)
-        return np.asarray((own - best) / np.maximum(own, 1e-9))
+        for known, path in zip(self._known, self._quickest(self._mean, rows), strict=True):
+            known.learn(path, self._edges)
+        return self._want(path_costs(self._mean, self._steps, rows), self._mean, rows)
 
-    def _compared(
-        self, times: TravelTimes, rows: Int32Array
-    ) -> tuple[FloatArray, FloatArray, list[Int32Array]]:
-        """Seconds of each trip on its path and on the quickest, and the latter."""
-        own = path_costs(times, self._steps, rows)
-        quick = self._quickest(times, rows)
-        best = path_costs(times, [self._edges.of(path) for path in quick], rows)
-        return own, np.minimum(own, best), quick
+    def _want(self, own: FloatArray, times: TravelTimes, rows: Int32Array) -> float:
+        counts = [len(known.steps) for known in self._known]
+        steps = [one for known in self._known for one in known.steps]
+        costs = path_costs(times, steps, np.repeat(rows, counts))
+        of_each = np.split(costs, np.cumsum(counts)[:-1]) if counts else []
+        for index, seconds in enumerate(of_each):
+            wanted = chosen_route(seconds, self._taste[index], spread=self._spread)
+            self._wanted[index] = wanted
+            self._gain[index] = (own[index] - seconds[wanted]) / max(own[index], 1e-9)
+        if self._spread:
+            wants = [
+                self._steps[index] is not known.steps[wanted]
+                for index, (known, wanted) in enumerate(
+                    zip(self._known, self._wanted.tolist(), strict=True)
+                )
+            ]
+            self._wants = np.array(wants, dtype=np.bool_)
+        else:
+            self._wants = self._gain > 0.0
+        return float(np.mean(self._wants)) if len(self._wants) else 0.0
 
-    def change(self, gain: FloatArray, *, share: float) -> int:
-        """Give a share of the trips the quickest paths; how many have changed."""
-        most = max(1, round(share * len(gain)))
-        order = np.argsort(-gain, kind="stable")[:most]
-        changed = 0
-        for index in order[gain[order] > 0].tolist():
-            self._paths[index] = self._quick[index]
-            self._steps[index] = self._edges.of(self._paths[index])
-            changed += 1
-        return changed
+    def change(self, *, share: float) -> int:
+        """Give a share of the trips what they want; how many have changed."""
+        most = max(1, round(share * len(self._gain)))
+        order = np.argsort(-self._gain, kind="stable")
+        changing = order[self._wants[order]][:most].tolist()
+        for index in changing:
+            known, wanted = self._known[index], int(self._wanted[index])
+            self._paths[index], self._steps[index] = known.paths[wanted], known.steps[wanted]
+        return len(changing)
 
     def _quickest(self, times: TravelTimes, rows: Int32Array) -> list[Int32Array]:
         groups: dict[int, dict[int, dict[int, int]]] = defaultdict(lambda: defaultdict(dict))

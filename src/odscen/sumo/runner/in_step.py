@@ -11,7 +11,15 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.base.frames import SumoPose
 from odscen.sumo.worker.lockstep import COLUMNS
-from odscen.sumo.worker.protocol import Command, EgoPose, Lockstep, MoreRules, State, encode
+from odscen.sumo.worker.protocol import (
+    Command,
+    EgoPose,
+    Lockstep,
+    MoreRules,
+    Outside,
+    State,
+    encode,
+)
 
 if TYPE_CHECKING:
     import subprocess
@@ -80,9 +88,15 @@ class InStep:
     rules
         Whether rules may be given between steps, with :meth:`add_rules`.
 
+    Attributes
+    ----------
+    failure
+        Why the run was stopped, if that is a failure.
+
     Notes
     -----
-    Without either SUMO makes its next step while ``on_step`` works on the last one.
+    Without any of these and without :meth:`show_outside` SUMO makes its next step while
+    ``on_step`` works on the last one.
     """
 
     def __init__(
@@ -106,6 +120,7 @@ class InStep:
         self._walks = np.array([actor.category == Category.PEDESTRIAN for actor in plan.actors])
         self._lanes: list[str] = []
         self._lights: dict[str, str] = {}
+        self.failure: str | None = None
         self._stdin: IO[bytes] | None = None
         self._stopped = False
 
@@ -123,7 +138,8 @@ class InStep:
         """Work on a step."""
         if not isinstance(message, State):
             return
-        if not self._waits and not self._stopped:
+        waited = self._waits
+        if not waited and not self._stopped:
             self._say(Command("step"))
         step = self._step(message, payload)
         if self._stopped:
@@ -131,7 +147,7 @@ class InStep:
         driven = self._on_step(step)
         if driven is not None:
             self._say(driven)
-        if self._waits and not self._stopped:
+        if waited and not self._stopped:
             self._say(Command("step"))
 
     def detach(self) -> None:
@@ -141,17 +157,27 @@ class InStep:
                 self._stdin.close()
         self._stdin = None
 
-    def stop(self) -> None:
-        """End the run; its results so far are written."""
+    def stop(self, failure: str | None = None) -> None:
+        """End the run, which has failed if there is a reason; its results so far are written."""
+        self.failure = self.failure or failure
         if not self._stopped:
             self._stopped = True
             self._say(Command("stop"))
+
+    def show_outside(self, outside: Outside) -> None:
+        """Let SUMO see what other programs drive and switch; it waits for that from now on.
+
+        To be called by ``on_step``. SUMO sees it in its next step; the first time, in the one after
+        that, unless it waits already.
+        """
+        self._waits = True
+        self._say(outside)
 
     def add_rules(self, story: str) -> None:
         """Give the worker rules, the text of a story file, while it waits for the next step."""
         self._say(MoreRules(story))
 
-    def _say(self, command: Command | EgoPose | MoreRules) -> None:
+    def _say(self, command: Command | EgoPose | Outside | MoreRules) -> None:
         if self._stdin is None:
             return
         with suppress(OSError, ValueError):  # the worker has just ended

@@ -69,6 +69,10 @@ class Live:
         self._early: list[Command] = []
 
     @property
+    def failure(self) -> None:
+        """Watching never makes a run fail."""
+
+    @property
     def picture(self) -> LivePicture:
         """The newest frame."""
         return self._seen.picture

@@ -17,7 +17,7 @@ from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
 from odscen.base.to_disk import write_whole
-from odscen.results.measures.expectations import parse_expectation
+from odscen.results.judging.expectations import parse_expectation
 from odscen.results.measures.summary import summary_to_json
 from odscen.results.records.run_records import Plan
 from odscen.sumo.folder import layout

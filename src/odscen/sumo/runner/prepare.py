@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.realize.realization import ModelSizes
+    from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.run_settings import RunSettings
     from odscen.sumo.realize.sumo_map import SumoMap
 

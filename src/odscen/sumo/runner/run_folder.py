@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.version import __version__
 from odscen.results.by_place.analysis_times import AnalysisTimes
 from odscen.results.by_place.traffic import TABLES
-from odscen.results.measures.expectations import evaluate
+from odscen.results.judging.actor_measures import RunRecords
+from odscen.results.judging.criteria import criteria_rows
+from odscen.results.judging.expectations import evaluate
 from odscen.results.measures.figure import RunData, SummaryPart
 from odscen.results.measures.gridlock import find_incidents, incident_summary
 from odscen.results.measures.registry import COUNTS, figure_values
@@ -25,6 +27,7 @@ from odscen.results.records.light_programs import programs_to_json
 from odscen.results.records.outcomes import RunStatus
 from odscen.results.records.run_records import events_from_json, rounded
 from odscen.sumo.folder import layout
+from odscen.sumo.folder.judged import read_judged
 from odscen.sumo.outputs.measured import read_run_data, write_figures
 from odscen.sumo.outputs.signal_log import signal_logs
 from odscen.sumo.realize.run_settings import AS_DESIGNED
@@ -136,7 +139,7 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         "format": FORMAT,
         "version": VERSION,
         "usable": failed_run(ended.error).to_dict(),
-        "status": RunStatus.COMPLETED if done else RunStatus.FAILED,
+        "status": RunStatus.FAILED if ended.error or not done else RunStatus.COMPLETED,
         "error": ended.error,
         "stopped": bool(done and done.stopped),
         "scenario": plan.scenario,
@@ -170,10 +173,14 @@ def make_summary(prepared: PreparedRun, folder: Path, ended: Ended) -> dict[str,
         summary["gridlock"] = incident_summary(incidents)
         until = plan.until if done.stopped else None
         verdict = run_usability(outcomes, incidents, end=done.sim_seconds, until=until)
-        summary["usable"] = verdict.to_dict()
+        summary["usable"] = (failed_run(ended.error) if ended.error else verdict).to_dict()
+    judged = bool(plan.criteria or prepared.settings.expectations)
+    records = read_judged(folder) if done and judged else RunRecords()
+    if plan.criteria:
+        summary["criteria"] = criteria_rows(plan.criteria, summary, records)
     summary["expectations"] = [
         {"expectation": v.expectation, "value": v.value, "passed": v.passed}
-        for v in evaluate(prepared.settings.expectations, summary)
+        for v in evaluate(prepared.settings.expectations, summary, records)
     ]
     summary["problems"] = list(prepared.problems)
     summary["notes"] = list(prepared.notes)
@@ -216,6 +223,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "routes": f"{sumo}/{layout.ROUTES_FILE}",
         "signals": f"{sumo}/{layout.SIGNALS_FILE}",
         "stops": f"{sumo}/{layout.STOPS_FILE}",
+        "parking": f"{sumo}/{layout.PARKING_FILE}",
         "measures": f"{sumo}/{layout.MEASURES_FILE}",
         "config": f"{sumo}/{layout.CONFIG_FILE}",
         "trajectories": layout.TRAJECTORIES_FILE,
@@ -232,6 +240,8 @@ def found_files(folder: Path) -> dict[str, str]:
         "detector_call_parts": layout.CALLS_FOLDER,
         "stop_visits": layout.VISITS_FILE,
         "stop_visit_parts": layout.VISITS_FOLDER,
+        "parking_stays": layout.STAYS_FILE,
+        "parking_stay_parts": layout.STAYS_FOLDER,
         "lights": layout.LIGHTS_FILE,
         "signal_figures": f"{layout.FIGURES_FOLDER}/{SIGNALS_TABLE}",
         "station_figures": f"{layout.FIGURES_FOLDER}/{STATIONS_TABLE}",

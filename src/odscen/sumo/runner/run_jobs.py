@@ -7,6 +7,7 @@ log; nothing that goes wrong inside SUMO raises here.
 
 from __future__ import annotations
 
+import itertools
 import threading
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from odscen.sumo.folder import layout
 from odscen.sumo.folder.finished_run import Run
 from odscen.sumo.folder.run_sums import seal_run
 from odscen.sumo.runner.forecast import refuse_without_room
+from odscen.sumo.runner.forked_worker import is_ready
 from odscen.sumo.runner.long_runs import refuse_interrupted, run_lock, run_long
 from odscen.sumo.runner.run_folder import (
     PreparedRun,
@@ -52,6 +54,7 @@ def run_prepared(
     live: Companion | None = None,
     tell: Callable[[str], None] | None = None,
     simulate: Callable[[Path], Ended] | None = None,
+    several: bool = False,
 ) -> Run:
     """Run in a new folder ``out``; whatever was there is replaced.
 
@@ -70,6 +73,10 @@ def run_prepared(
         Called with what the user should know before a long run.
     simulate
         Runs what is in a folder and writes the results there, instead of SUMO's worker.
+    several
+        Whether more runs come: their processes are then forked by one that does the imports once,
+        which costs a single run more than it saves unless it has been started already. From the
+        second run of this process on it is done anyway.
 
     Raises
     ------
@@ -91,8 +98,14 @@ def run_prepared(
             write_run_folder(prepared, folder)
             if simulate is None:
                 limit = prepared.settings.time_limit
+                again = next(_RUNS) > 0
                 ended = run_worker(
-                    folder, progress=progress, time_limit=limit, live=live, keep=(lock,)
+                    folder,
+                    progress=progress,
+                    time_limit=limit,
+                    live=live,
+                    keep=(lock,),
+                    forked=(several or again) and live is None,
                 )
             else:
                 ended = simulate(folder)
@@ -107,6 +120,8 @@ def run_prepared(
         return Run(out, summary)
 
 
+_RUNS = itertools.count()
+"""One number for each run of this process."""
 _LISTEN = 0.2
 """Wall seconds after which a wait looks for Ctrl-C."""
 
@@ -145,6 +160,7 @@ def run_many(
     and the result leaves it out.
     """
     stopping = threading.Event()
+    several = len(jobs) > 1 or is_ready()
 
     def one(job: RunJob) -> Run | None:
         try:
@@ -163,7 +179,9 @@ def run_many(
                 progress(job, message)
 
         prepared = job.prepare()
-        result = run_prepared(prepared, job.out, progress=follow, finish=job.finish, tell=tell)
+        result = run_prepared(
+            prepared, job.out, progress=follow, finish=job.finish, tell=tell, several=several
+        )
         if done is not None:
             done(job, result)
         return result

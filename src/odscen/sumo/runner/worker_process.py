@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from odscen.base.system_errors import ADVICE
 from odscen.sumo.folder.layout import LOG_FILE, PLAN_FILE
-from odscen.sumo.runner.allocator import fast_allocator
+from odscen.sumo.runner.forked_worker import POSSIBLE, ForkedWorker, worker_environment
 from odscen.sumo.worker.protocol import (
     Command,
     Done,
@@ -24,6 +24,7 @@ from odscen.sumo.worker.protocol import (
     Failed,
     FrameMessage,
     MoreRules,
+    Outside,
     Progress,
     ShotMessage,
     State,
@@ -47,6 +48,10 @@ class Companion(Protocol):
     """
 
     @property
+    def failure(self) -> str | None:
+        """Why the run has failed although SUMO has not: its results until then are kept."""
+
+    @property
     def start(self) -> Pace | Lockstep:
         """How the worker is to go."""
 
@@ -67,11 +72,12 @@ class Ended:
     Attributes
     ----------
     done
-        What it reported at its end; ``None`` if the run failed.
+        What it reported at its end; ``None`` if the simulation failed.
     wall_seconds
         From starting the process to its end.
     error
-        Why it failed, with SUMO's own words where it said any.
+        Why the run failed, with SUMO's own words where it said any. Together with ``done`` it was
+        the run's companion that failed.
     """
 
     done: Done | None
@@ -86,6 +92,7 @@ def run_worker(
     time_limit: float | None = None,
     live: Companion | None = None,
     keep: tuple[int, ...] = (),
+    forked: bool = False,
 ) -> Ended:
     """Run the simulation prepared in ``folder``.
 
@@ -104,25 +111,17 @@ def run_worker(
         Makes it a run that can be watched and steered, or that goes in step with another.
     keep
         File descriptors that the process inherits.
+    forked
+        Whether its process may be forked by one that has done the imports; not for a run that is
+        live or in slices.
     """
     start = time.perf_counter()
-    command = [sys.executable, "-m", WORKER, str(folder / PLAN_FILE)]
-    if live is not None:
-        command.append(encode(live.start))
     late = threading.Event()
     # Python's own words (a traceback before the worker has opened its log) belong in the log too.
     with (
         (folder / LOG_FILE).open("ab") as log,
-        subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL if live is None else subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
-            # a failed run, and the folder of a run that was called off would appear.
-            start_new_session=True,
-            env={**_surroundings(), **os.environ},
-            pass_fds=keep,
+        _started(
+            folder / PLAN_FILE, log.fileno(), live, keep, forked=forked and POSSIBLE
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)
@@ -137,8 +136,8 @@ def run_worker(
             if live is not None:
                 live.detach()
     seconds = time.perf_counter() - start
-    if isinstance(last, Done) and process.returncode == 0:
-        return Ended(last, seconds, None)
+    if isinstance(last, Done) and not process.returncode:
+        return Ended(last, seconds, live.failure if live else None)
     if late.is_set():
         return Ended(None, seconds, f"stopped after the time limit of {time_limit:g} s")
     said = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
@@ -147,22 +146,36 @@ def run_worker(
     return Ended(None, seconds, f"{reason}\n{words}" if words else reason)
 
 
-def _surroundings() -> dict[str, str]:
-    """Environment of the worker where the user's own does not say otherwise."""
-    # One thread simulates; those that NumPy would start only wait, and burn time in doing so.
-    variables = {"OPENBLAS_NUM_THREADS": "1"}
-    allocator = fast_allocator()
-    if allocator is not None:
-        variables["LD_PRELOAD"] = allocator
-    return variables
+def _started(
+    plan: Path, log: int, live: Companion | None, keep: tuple[int, ...], *, forked: bool
+) -> subprocess.Popen[bytes] | ForkedWorker:
+    """Start the process of a simulation."""
+    if forked:
+        return ForkedWorker(plan, stderr=log, keep=keep)
+    command = [sys.executable, "-m", WORKER, str(plan)]
+    if live is not None:
+        command.append(encode(live.start))
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL if live is None else subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        # A terminal sends Ctrl-C to all of its processes. A worker that it reached would end as
+        # a failed run, and the folder of a run that was called off would appear.
+        start_new_session=True,
+        env=worker_environment(),
+        pass_fds=keep,
+    )
 
 
 def _follow(
-    process: subprocess.Popen[bytes], progress: OnProgress | None, live: Companion | None
+    process: subprocess.Popen[bytes] | ForkedWorker,
+    progress: OnProgress | None,
+    live: Companion | None,
 ) -> Done | Failed | None:
     """Pass on what the worker says; return the last thing it said of its end."""
     last: Done | Failed | None = None
-    if live is not None:
+    if live is not None and not isinstance(process, ForkedWorker):
         live.attach(process)
     for message, payload in messages(process):
         if live is not None:
@@ -174,13 +187,13 @@ def _follow(
     return last
 
 
-def messages(process: subprocess.Popen[bytes]) -> Iterator[tuple[Message, bytes]]:
+def messages(process: subprocess.Popen[bytes] | ForkedWorker) -> Iterator[tuple[Message, bytes]]:
     """Yield what the worker says, each message with the bytes that belong to it."""
     if process.stdout is None:
         return
     for line in process.stdout:
         message = decode(line)
-        if message is None or isinstance(message, Command | EgoPose | MoreRules):
+        if message is None or isinstance(message, Command | EgoPose | Outside | MoreRules):
             continue
         size = message.size if isinstance(message, FrameMessage | State | ShotMessage) else 0
         yield message, process.stdout.read(size)
@@ -198,7 +211,7 @@ def sumo_words(folder: Path, *, lines: int = 12) -> str:
 
 
 def _kill_after(
-    process: subprocess.Popen[bytes], seconds: float | None, late: threading.Event
+    process: subprocess.Popen[bytes] | ForkedWorker, seconds: float | None, late: threading.Event
 ) -> threading.Timer | None:
     if seconds is None:
         return None
@@ -213,7 +226,7 @@ def _kill_after(
     return timer
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
+def _kill(process: subprocess.Popen[bytes] | ForkedWorker) -> None:
     """End the worker and whatever it has started: its session is its own."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
@@ -241,12 +254,13 @@ _SIGNS = {
     "bad_alloc": errno.ENOMEM,
     "MemoryError": errno.ENOMEM,
     "Cannot allocate memory": errno.ENOMEM,
+    "failed to map segment from shared object": errno.ENOMEM,
 }
 """What SUMO, Python and the libraries of both say where the machine lacks something."""
 
 
-def _exit_words(code: int) -> str:
-    if code == -signal.SIGKILL:
+def _exit_words(code: int | None) -> str:
+    if code is None or code == -signal.SIGKILL:
         return (
             "SUMO's process was ended by signal SIGKILL; "
             "if you have not sent it, the memory was used up: run less at a time"

@@ -59,6 +59,8 @@ class Written:
         Of lanes for vehicles by edge, metres.
     lanes
         How many vehicles came in on each lane with the state.
+    parked
+        Those who came in with it in the places that their trips have ended in.
     """
 
     part: Path
@@ -66,6 +68,7 @@ class Written:
     events: list[Event]
     lengths: Mapping[str, Mapping[str, float]]
     lanes: Mapping[str, int]
+    parked: frozenset[str] = frozenset()
 
     def complete(self, plan: Plan, run: Path) -> None:
         """Tidy what SUMO has written and make the slice complete."""
@@ -75,7 +78,7 @@ class Written:
         if not last:
             check_state(part / STATE_FILE)
         tidy_part(part / layout.TRAJECTORIES_FILE)
-        tidy_outputs(part, self.lengths, present=self.lanes, last=last)
+        tidy_outputs(part, self.lengths, plan, present=self.lanes, parked=self.parked, last=last)
         tidy_conflicts(part, plan)
         tidy_signals(part)
         checkpoint = replace(self.checkpoint, files=fingerprints(part, _CONTENTS))

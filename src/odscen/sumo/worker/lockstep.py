@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.results.records.run_records import EventKind, event_row
-from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, State, decode
+from odscen.sumo.worker.protocol import Command, EgoPose, MoreRules, Outside, State, decode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +37,7 @@ INVALID = 1e8
 """SUMO's INVALID_DOUBLE_VALUE is -2^30; no place is this far out."""
 
 _BLOCK = 65536
-_COMMANDS = Command | EgoPose | MoreRules
+_COMMANDS = Command | EgoPose | Outside | MoreRules
 _PLAIN = (EventKind.DEPARTED, EventKind.ARRIVED)
 
 
@@ -75,7 +75,7 @@ class LockstepWatch:
         self._step_length = plan.step_length
         self._commands = commands
         self._rest = b""
-        self._queue: list[Command | EgoPose | MoreRules] = []
+        self._queue: list[Command | EgoPose | Outside | MoreRules] = []
         self._send = send
         self._steps = 0
         self._reported = 0
@@ -90,6 +90,9 @@ class LockstepWatch:
             if isinstance(command, EgoPose):
                 if self._placed is not None:
                     session.place(self._placed, command)
+            elif isinstance(command, Outside):
+                session.foreign_traffic().show(command.users)
+                session.foreign_lights.show(command.lights)
             elif isinstance(command, MoreRules):
                 self.heard.append(command.story)
             elif command.do == "step":
@@ -142,7 +145,7 @@ class LockstepWatch:
         rows[:, 7] = [pos for _, pos in places]
         return rows[(rows[:, 0] >= 0) & (np.abs(rows[:, 1]) < INVALID)]
 
-    def _next(self) -> Command | EgoPose | MoreRules:
+    def _next(self) -> Command | EgoPose | Outside | MoreRules:
         """Wait for the next command; to stop, once there is no one to give one."""
         while not self._queue:
             block = os.read(self._commands, _BLOCK)

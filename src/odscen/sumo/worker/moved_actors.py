@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ _FREE, _ON_FOOT = 2, 6
 _AHEAD = 600.0
 """Metres that a line of lanes is followed."""
 _NOWHERE = 1e8
+_INSIDE = 0.1
+"""Metres that a body has to be over a lane to be on it."""
 _RIGHT_OF_WAY, _RED = 8, 16
 """Bits of ``setSpeedMode``."""
 
@@ -34,10 +37,8 @@ LIGHT_BITS = {
 }  # fmt: skip
 """Bits of ``setSignals``."""
 
-_SEEN = (
-    "getAngle", "getSpeed", "getAcceleration", "getDistance", "getLaneID", "getLateralLanePosition"
-)  # fmt: skip
-"""Getters of :class:`SeenVehicle`, in its order."""
+_MORE = ("getAcceleration", "getDistance", "getLaneID", "getLateralLanePosition")
+"""Getters of :class:`SeenVehicle` beyond how it moves, in its order."""
 
 Shape = tuple[tuple[float, float], ...]
 
@@ -84,21 +85,29 @@ class MovedActors:
         native: Callable[[str, str], Callable[[str], Any]],
     ) -> None:
         self._position = native("vehicle", "getPosition")
-        self._seen = tuple(native("vehicle", getter) for getter in _SEEN)
+        self._angle, self._speed = native("vehicle", "getAngle"), native("vehicle", "getSpeed")
+        self._more = tuple(native("vehicle", getter) for getter in _MORE)
         self._sumo = sumo
         self._errors = errors
         self._lanes_of_edge = lanes_of_edge
         self._admits = admits
 
-    def vehicle(self, name: str) -> SeenVehicle | None:
-        """A vehicle, ``None`` if it is not on the road."""
+    def motion(self, name: str) -> tuple[float, float, float, float] | None:
+        """X, y, angle (degrees) and speed of a vehicle, ``None`` if it is not on the road."""
         try:
             x, y = self._position(name)
-            if abs(x) > _NOWHERE:
+            if x > _NOWHERE or x < -_NOWHERE:
                 return None
-            return SeenVehicle(x, y, *(getter(name) for getter in self._seen))
+            return x, y, self._angle(name), self._speed(name)
         except self._errors:
             return None
+
+    def vehicle(self, name: str) -> SeenVehicle | None:
+        """A vehicle, ``None`` if it is not on the road."""
+        moves = self.motion(name)
+        if moves is None:
+            return None
+        return SeenVehicle(*moves, *[getter(name) for getter in self._more])
 
     def person(self, name: str) -> SeenPerson | None:
         """A person, ``None`` if it is not on the road."""
@@ -110,6 +119,10 @@ class MovedActors:
             return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
         except self._errors:
             return None
+
+    def lane_of(self, name: str, *, person: bool) -> str:
+        """Lane that a road user is on; empty if it is on none."""
+        return str((self._sumo.person if person else self._sumo.vehicle).getLaneID(name))
 
     def edge_of(self, lane: str) -> str:
         """Edge of a lane."""
@@ -298,6 +311,20 @@ class MovedActors:
         """Edge for cars that is nearest, metres along it, and lane."""
         edge, pos, lane = self._sumo.simulation.convertRoad(x, y, False, "passenger")
         return edge, pos, lane
+
+    def off_lanes(self, x: float, y: float, *, width: float) -> bool:
+        """Whether a body of some width would be beside all lanes: SUMO cannot let it begin there.
+
+        It ends in a fault where a vehicle that has not departed is moved off its lanes.
+        """
+        edge, pos, lane = self.nearest_road(x, y)
+        if not edge:
+            return True
+        at = self._sumo.simulation.convert2D(edge, pos, lane)
+        return (
+            math.dist(at, (x, y))
+            > (self.lane_width(self._in_order(edge)[lane]) + width) / 2.0 - _INSIDE
+        )
 
     def light_letter(self, light: str, link: int) -> str:
         """What a link of a traffic light shows."""

@@ -47,7 +47,8 @@ class Collision(Protocol):
 class StepLists(NamedTuple):
     """What happened in one step: ids, and collisions that lasted, in SUMO's order.
 
-    ``fronts`` are of those who have departed, come back from a teleport, or brake in an emergency.
+    ``parked`` have taken a place beside the road, ``unparked`` have left one. ``fronts`` are of
+    those who have departed or left a place, come back from a teleport, or brake in an emergency.
     """
 
     departed: Sequence[str]
@@ -58,6 +59,8 @@ class StepLists(NamedTuple):
     teleports_ended: Sequence[str]
     emergency_stops: Sequence[str]
     collisions: Sequence[Collision]
+    parked: Sequence[str]
+    unparked: Sequence[str]
     fronts: Mapping[str, Front | None]
 
 

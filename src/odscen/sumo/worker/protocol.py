@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +156,39 @@ class EgoPose:
     speed: float
 
 
+class ForeignUser(NamedTuple):
+    """A road user that another program drives; front, SUMO frame, metres and m/s.
+
+    ``kind`` is SUMO's class of vehicles, or ``pedestrian``.
+    """
+
+    id: str
+    kind: str
+    x: float
+    y: float
+    angle_deg: float
+    speed: float
+    length: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """To the worker: what other programs drive and switch until the next such message.
+
+    Attributes
+    ----------
+    users
+        All road users that are driven elsewhere, the ego not among them.
+    lights
+        State of traffic lights that are switched elsewhere, by SUMO id, a letter for each link
+        (``-``: not known): those that have changed.
+    """
+
+    users: list[ForeignUser] = field(default_factory=list)
+    lights: dict[str, str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, slots=True)
 class MoreRules:
     """To the worker: rules from now on, as the text of a story file."""
@@ -185,7 +218,7 @@ Message = (
 )
 OnProgress = Callable[[Progress], None]
 
-_KINDS: dict[str, type[Message | Command | EgoPose | MoreRules]] = {
+_KINDS: dict[str, type[Message | Command | EgoPose | Outside | MoreRules]] = {
     "progress": Progress,
     "done": Done,
     "failed": Failed,
@@ -198,21 +231,25 @@ _KINDS: dict[str, type[Message | Command | EgoPose | MoreRules]] = {
     "state": State,
     "shot": ShotMessage,
     "place": EgoPose,
+    "outside": Outside,
     "rules": MoreRules,
     "command": Command,
 }
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 
-def encode(message: Message | Command | EgoPose | MoreRules) -> str:
+def encode(message: Message | Command | EgoPose | Outside | MoreRules) -> str:
     """One line, newline included."""
     return json.dumps({"kind": _NAMES[type(message)], **asdict(message)}) + "\n"
 
 
-def decode(line: str | bytes) -> Message | Command | EgoPose | MoreRules | None:
+def decode(line: str | bytes) -> Message | Command | EgoPose | Outside | MoreRules | None:
     """Inverse of :func:`encode`; ``None`` for a line that is no message."""
     try:
         data = json.loads(line)
-        return _KINDS[data.pop("kind")](**data)
+        kind = _KINDS[data.pop("kind")]
+        if kind is Outside:
+            data["users"] = [ForeignUser(*user) for user in data["users"]]
+        return kind(**data)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None

@@ -29,6 +29,48 @@ class _EventfulStep(NamedTuple):
     lists: StepLists
 
 
+class _ParkedTrips:
+    """Trips that begin when a car leaves its parking place, and end when it takes one.
+
+    Attributes
+    ----------
+    left
+        Those who have left the place that they began in.
+    parked
+        Those who have taken the place that they end in, and are still there.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._begin = {actor.id for actor in plan.actors if actor.begins_in}
+        self._end = {actor.id for actor in plan.actors if actor.ends_in}
+        self.left: set[str] = set()
+        self.parked: set[str] = set()
+
+    def still_parked(self, name: str) -> bool:
+        """Whether one that SUMO has inserted is in the place that its trip is to begin in."""
+        return name in self._begin and name not in self.left
+
+    def leaves(self, name: str) -> bool:
+        """Whether the trip of one that leaves its place begins with that."""
+        if not self.still_parked(name):
+            return False
+        self.left.add(name)
+        return True
+
+    def ends(self, name: str) -> bool:
+        """Whether the trip of one that takes a place ends with that."""
+        if name in self._end:
+            self.parked.add(name)
+            return True
+        return False
+
+    def has_ended(self, name: str) -> bool:
+        """Whether the trip of one that SUMO takes out has ended before."""
+        there = name in self.parked
+        self.parked.discard(name)
+        return there
+
+
 class Recorder:
     """Turns the session's lists into events.
 
@@ -48,6 +90,7 @@ class Recorder:
         self._departed = 0
         self._arrived = 0
         self._planned = {actor.id: actor for actor in plan.actors}
+        self._parks = _ParkedTrips(plan)
         self._offset = plan.net_offset
         self._departures: dict[str, float] = {}
         self._touching: set[tuple[str, str]] = set()
@@ -100,6 +143,8 @@ class Recorder:
             "touching": sorted(self._touching),
             "stopping": sorted(self._stopping),
             "jams": self._jams.state(),
+            "left": sorted(self._parks.left),
+            "parked": sorted(self._parks.parked),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -111,6 +156,7 @@ class Recorder:
         self._touching = {(one, other) for one, other in state["touching"]}
         self._stopping = set(state["stopping"])
         self._jams.restore(state["jams"])
+        self._parks.left, self._parks.parked = set(state["left"]), set(state["parked"])
 
     def road_is_empty(self, time: float) -> None:
         """Say that the run ends because the road is empty: every jam is over."""
@@ -159,16 +205,31 @@ class Recorder:
 
     def _record(self, time: float, lists: StepLists) -> None:
         fronts = lists.fronts
-        for name in (*lists.departed, *lists.departed_persons):
-            self._depart(time, name, fronts[name])
+        self._departures_of(time, lists)
         for vehicle in lists.teleports_started:
             self._teleport(time, vehicle)
         for vehicle in lists.teleports_ended:
             self._place(time, EventKind.TELEPORT_END, vehicle, fronts[vehicle])
         self._stops(time, lists.emergency_stops, fronts)
         self._collisions(time, lists.collisions)
+        self._arrivals_of(time, lists)
+
+    def _departures_of(self, time: float, lists: StepLists) -> None:
+        fronts = lists.fronts
+        for name in (*lists.departed, *lists.departed_persons):
+            if not self._parks.still_parked(name):
+                self._depart(time, name, fronts[name])
+        for name in lists.unparked:
+            if self._parks.leaves(name):
+                self._depart(time, name, fronts[name])
+
+    def _arrivals_of(self, time: float, lists: StepLists) -> None:
+        for name in lists.parked:
+            if name in self._departures and self._parks.ends(name):
+                self._arrive(time, name)
         for name in (*lists.arrived, *lists.arrived_persons):
-            self._arrive(time, name)
+            if not self._parks.has_ended(name):
+                self._arrive(time, name)
 
     def _depart(self, time: float, name: str, front: Front | None) -> None:
         if name in self._departures:  # back on the road after a teleport is no second departure
@@ -183,7 +244,8 @@ class Recorder:
         x, y = body_centre(
             front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
         )
-        error = math.hypot(x - planned.x, y - planned.y) if planned else None
+        placed = planned is not None and planned.begins_in is None
+        error = math.hypot(x - planned.x, y - planned.y) if planned and placed else None
         self._events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
 
     def _arrive(self, time: float, name: str) -> None:

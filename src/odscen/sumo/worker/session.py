@@ -14,12 +14,13 @@ import sys
 from collections import Counter, defaultdict
 from contextlib import contextmanager, suppress
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.detours import LaneLink
+from odscen.sumo.worker.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
 from odscen.sumo.worker.moved_actors import MovedActors
 from odscen.sumo.worker.observed import (
     Ahead,
@@ -33,6 +34,7 @@ from odscen.sumo.worker.observed import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
     from pathlib import Path
+    from types import ModuleType
 
     from odscen.sumo.worker.protocol import EgoPose
 
@@ -47,6 +49,8 @@ _EDGES_AHEAD = 3
 
 _CLASSES = ("passenger", "delivery", "truck", "bus", "motorcycle", "bicycle")
 """SUMO's classes of our categories of vehicles."""
+_NEAR_LANE = 10.0
+"""Metres around a place in which SUMO looks for its lane; its own 100 m cost thrice as much."""
 _CLOSE = 5.0
 """Metres that a stopped vehicle ahead may be away and be the reason for stopping."""
 _BLOCKING = 10.0
@@ -66,6 +70,8 @@ _HAPPENINGS = (
     ("getEndingTeleportNumber", "getEndingTeleportIDList"),
     ("getEmergencyStoppingVehiclesNumber", "getEmergencyStoppingVehiclesIDList"),
     ("getCollisions", "getCollisions"),
+    ("getParkingStartingVehiclesNumber", "getParkingStartingVehiclesIDList"),
+    ("getParkingEndingVehiclesNumber", "getParkingEndingVehiclesIDList"),
 )
 """Getters of numbers and lists, as in :class:`StepLists`."""
 
@@ -84,6 +90,7 @@ class Session:
             (_native(sumo, domain, "getPosition3D"), _native(sumo, domain, "getAngle"))
             for domain in ("vehicle", "person")
         )
+        self._foreign: ForeignTraffic | None = None
         self._happenings = tuple(
             (_native(sumo, "simulation", count), _native(sumo, "simulation", ids))
             for count, ids in _HAPPENINGS
@@ -110,23 +117,45 @@ class Session:
             raise SimulationError(msg) from error
 
     def expected(self) -> int:
-        """How many vehicles and persons are on the road or still to come; 0 only when none is."""
-        return int(self._expected())
+        """How many vehicles and persons are on the road or still to come; 0 only when none is.
+
+        Those that other programs drive do not count.
+        """
+        return int(self._expected()) - self._strangers()
 
     def running(self) -> int:
-        """How many vehicles and persons are on the road now."""
-        return int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
+        """How many vehicles and persons of the run are on the road now."""
+        on_road = int(self._sumo.vehicle.getIDCount() + self._sumo.person.getIDCount())
+        return on_road - self._strangers()
+
+    def foreign_traffic(self) -> ForeignTraffic:
+        """Road users that other programs drive."""
+        if self._foreign is None:
+            self._foreign = ForeignTraffic(self._sumo, self._errors, self.place)
+        return self._foreign
+
+    @cached_property
+    def foreign_lights(self) -> ForeignLights:
+        """Traffic lights that other programs switch."""
+        return ForeignLights(self._sumo)
+
+    def _strangers(self) -> int:
+        return 0 if self._foreign is None else len(self._foreign)
 
     def happened(self) -> StepLists | None:
         """What happened in the last step; ``None`` if nothing did, as in most."""
         # A list costs far more than its length, and most are empty.
         lists: list[Any] = [ids() if count() else () for count, ids in self._happenings]
+        if self._foreign is not None:
+            lists = [_of_the_run(ids) for ids in lists]
         if not any(lists):
             return None
         fronts: dict[str, Front | None] = {}
         lists.append(fronts)
         step = StepLists(*lists)
-        for name in (*step.departed, *step.teleports_ended, *step.emergency_stops):
+        for name in (
+            *step.departed, *step.teleports_ended, *step.emergency_stops, *step.unparked
+        ):  # fmt: skip
             fronts[name] = self._front(self._vehicle, name)
         for name in step.departed_persons:
             fronts[name] = self._front(self._person, name)
@@ -223,20 +252,22 @@ class Session:
         native = partial(_native, self._sumo)
         return MovedActors(self._sumo, self._errors, self._lanes_of_edge, self._admits, native)
 
-    def place(self, vehicle: str, at: EgoPose) -> bool:
+    def place(self, vehicle: str, at: EgoPose, *, again: bool = False) -> bool:
         """Put a vehicle where another program has driven it; false if SUMO cannot.
 
         The place is taken exactly, on or off the road, and so is the speed, whatever limits,
         lights and right of way say: nothing of SUMO's drives it. ``keepRoute=2`` lets the vehicle
         leave its route; its new one would end with the edge that it is on, so it is led on a
-        little: others must know where it may be going.
+        little: others must know where it may be going. ``again`` says that it was put somewhere
+        before: how it obeys need not be said twice.
         """
         vehicles = self._sumo.vehicle
         try:
-            vehicles.setSpeedMode(vehicle, _UNCHECKED)
-            vehicles.setMaxSpeed(vehicle, _FAST)
+            if not again:
+                vehicles.setSpeedMode(vehicle, _UNCHECKED)
+                vehicles.setMaxSpeed(vehicle, _FAST)
             vehicles.setSpeed(vehicle, at.speed)
-            vehicles.moveToXY(vehicle, "", -1, at.x, at.y, at.angle_deg, 2)
+            vehicles.moveToXY(vehicle, "", -1, at.x, at.y, at.angle_deg, 2, _NEAR_LANE)
             route, index = vehicles.getRoute(vehicle), vehicles.getRouteIndex(vehicle)
             if index >= 0 and len(route) - index < _EDGES_AHEAD:
                 self._lead_on(vehicle, route[index:])
@@ -364,7 +395,7 @@ class Session:
         vehicle = self._sumo.vehicle
         found = []
         for name in vehicle.getIDList():
-            waited = vehicle.getWaitingTime(name)
+            waited = 0.0 if is_foreign(name) else vehicle.getWaitingTime(name)
             if waited >= seconds and (lane := vehicle.getLaneID(name)):
                 found.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
         return found
@@ -530,6 +561,11 @@ def _native(sumo: Any, domain: str, name: str) -> Any:
     return getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
 
 
+def _of_the_run(happened: Sequence[Any]) -> list[Any]:
+    """Leave out what happened to road users that other programs drive, but collisions."""
+    return [one for one in happened if not (isinstance(one, str) and is_foreign(one))]
+
+
 def import_libsumo() -> Any:
     """Import libsumo with stdout kept clean.
 
@@ -538,6 +574,10 @@ def import_libsumo() -> Any:
     """
     sys.stdout.flush()
     kept = os.dup(1)
+    # It imports sumolib, for a few names, and that pyproj, which takes longer than a short run.
+    unused = "pyproj" not in sys.modules and "sumolib" not in sys.modules
+    if unused:
+        sys.modules["pyproj"] = cast("ModuleType", None)  # how Python itself says: not there
     try:
         os.dup2(2, 1)
         import libsumo
@@ -546,4 +586,6 @@ def import_libsumo() -> Any:
     finally:
         os.dup2(kept, 1)
         os.close(kept)
+        if unused:
+            del sys.modules["pyproj"]
     return libsumo

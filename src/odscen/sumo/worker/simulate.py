@@ -1,7 +1,8 @@
 """One simulation in a process: ``python -m odscen.sumo.worker.simulate RUN/plan.json [PACE]``.
 
 libsumo holds one simulation per process, and a crash of SUMO takes its process with it; so every
-run has a process of its own, and only the runner starts it. It reads the plan and the SUMO files
+run has a process of its own, and only the runner starts it, or has it forked by
+:mod:`odscen.sumo.worker.fork_server`. It reads the plan and the SUMO files
 beside it, steps until no road user is left or the end is reached, writes ``events.json`` and
 ``actors.json``, and sends :mod:`odscen.sumo.worker.protocol` messages to its stdout. Whatever SUMO
 says goes to ``sumo.log``. With a :class:`~odscen.sumo.worker.protocol.Pace` as second argument the
@@ -62,12 +63,16 @@ from odscen.sumo.worker.watch import Watch
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.sumo.worker.story_run import StoryRun
+    from odscen.sumo.worker.story.story_run import StoryRun
 
 
 def main() -> int:
     """Run the plan named on the command line; 0 when the simulation ended by itself."""
-    plan_file = Path(sys.argv[1])
+    return run_plan(Path(sys.argv[1]), sys.argv[2:])
+
+
+def run_plan(plan_file: Path, how: Sequence[str] = ()) -> int:
+    """Run a plan, with the pace and the commands of ``how``; the exit code of the process."""
     folder = plan_file.parent
     with in_use(folder), captured_output(folder / LOG_FILE) as stdout:
 
@@ -80,7 +85,7 @@ def main() -> int:
             plan = Plan.from_json(plan_file.read_text(encoding="utf-8"))
             gc.freeze()  # the plan stays, and need not be gone through again and again
             gc.enable()
-            watch = _watch(plan, folder, sys.argv[2:], send) if len(sys.argv) > 2 else None
+            watch = _watch(plan, folder, how, send) if how else None
             done = simulate(plan, folder, send, watch)
             if done is not None:
                 send(done)
@@ -130,7 +135,7 @@ def _story(plan: Plan, folder: Path) -> StoryRun | None:
     """Rules of the run; without any, nothing of theirs is imported."""
     if not (folder / SUMO_FOLDER / STORY_FILE).is_file():
         return None
-    from odscen.sumo.worker.story_run import StoryRun
+    from odscen.sumo.worker.story.story_run import StoryRun
 
     return StoryRun.in_folder(folder, plan)
 
@@ -151,7 +156,7 @@ def _in_one_piece(plan: Plan, folder: Path, stepper: Stepper) -> Done:
         now = stepper.run(session, plan.until)
         lengths = session.lane_lengths()
     tidy_part(folder / TRAJECTORIES_FILE)
-    tidy_outputs(folder, lengths, present={}, last=True)
+    tidy_outputs(folder, lengths, plan, present={}, last=True)
     tidy_conflicts(folder, plan)
     tidy_signals(folder)
     return Done(now, stepper.steps, time.perf_counter() - start, stepper.stopped)

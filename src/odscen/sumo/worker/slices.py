@@ -132,7 +132,8 @@ class _RunningSlice:
             files={},
             story={} if stepper.story is None else stepper.story.state(),
         )
-        return Written(part, checkpoint, events, lengths, before.lanes if before else {})
+        parked = frozenset(before.recorder["parked"]) if before else frozenset()
+        return Written(part, checkpoint, events, lengths, before.lanes if before else {}, parked)
 
     def _arguments(self, part: Path) -> list[str]:
         sumo = self._run / layout.SUMO_FOLDER

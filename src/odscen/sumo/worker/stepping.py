@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import Plan
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.session import Session
-    from odscen.sumo.worker.story_run import StoryRun
+    from odscen.sumo.worker.story.story_run import StoryRun
     from odscen.sumo.worker.watch import Watch
 
 MESSAGE_PAUSE = 0.25
@@ -124,7 +124,7 @@ class Stepper:
         """Let rules act on the last step: at once, or when a program has given others."""
         heard = [] if self._led is None else self._led.heard
         if heard and self.story is None:
-            from odscen.sumo.worker.story_run import StoryRun
+            from odscen.sumo.worker.story.story_run import StoryRun
 
             self.story = StoryRun.without_rules(self._plan)
             self.story.begin(session)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import ScenarioError
-from odscen.base.stored_files import documents, read_document
+from odscen.base.stored_files import stored_document
 from odscen.scenario.document.rules_document import StoryRule, places_of, rule_parts
 from odscen.scenario.placing.region import place_of
 from odscen.scenario.signals.light import find_light
@@ -79,9 +79,7 @@ class StoryPlan:
         InputError
             If it is something else.
         """
-        what = "the rules of a run"
-        data: dict[str, Any] = read_document(text, form=FORMAT, version=VERSION, what=what)
-        with documents(what):
+        with stored_document(text, form=FORMAT, version=VERSION, what="the rules of a run") as data:
             return cls(
                 tuple(StoryRule.model_validate_json(json.dumps(rule)) for rule in data["rules"]),
                 {name: StoryPlace(*place) for name, place in data["places"].items()},

@@ -26,7 +26,7 @@ from tests.sumo.story_case import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-STEPS = (0.05, 0.1, 0.5)
+STEPS = (pytest.param(0.05, marks=pytest.mark.slow), 0.1, pytest.param(0.5, marks=pytest.mark.slow))
 MOTORWAY, TOWN = "motorway_weave", "town_5x5"
 
 
@@ -67,6 +67,7 @@ def test_braking_at_6_from_20_stops_after_33_m_whatever_the_vehicle_type_allows(
     assert van.x[-1] > stood + 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize(
     ("change", "seconds", "metres"),
@@ -155,6 +156,17 @@ def test_a_gap_is_reached_and_kept(tmp_path: Path, gap: dict[str, float], step: 
     between = (np.interp(16.0, ego.time, ego.x) - ego.length) - np.interp(16.0, van.time, van.x)
     assert between == pytest.approx(15.0, abs=0.1)
     assert found.instant("r", "ended") == pytest.approx(17.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("gap", [{"metres": 15.0}, {"seconds": 1.0}])
+def test_a_gap_is_kept_ahead(tmp_path: Path, gap: dict[str, float], step: float) -> None:
+    actors = [fast("ego", 370.0, MIDDLE, 15.0, ego=True), fast("van", 410.0, RIGHT, 15.0)]
+    rules = [after(1.0, {"keep_gap": {"to": "ego", "ahead": True, "lasting": 11.0, **gap}})]
+    found = run(document(MOTORWAY, actors, rules, step=step), tmp_path / "run")
+    ego, van = found.tracks["ego"], found.tracks["van"]
+    between = (np.interp(12.0, van.time, van.x) - van.length) - np.interp(12.0, ego.time, ego.x)
+    assert between == pytest.approx(15.0, abs=0.1)
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -282,6 +294,7 @@ def crossing_child(**then: Any) -> tuple[list[dict[str, Any]], list[dict[str, An
     return [ego, child], rules, far
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_walker_crosses_mid_block_and_the_ego_brakes(tmp_path: Path, step: float) -> None:
     actors, rules, far = crossing_child()

@@ -13,11 +13,11 @@ from odscen.scenario.story.channels import Pose, WantedMove
 from odscen.scenario.story.story_engine import StoryEngine
 from odscen.sumo.folder.layout import STORY_FILE, SUMO_FOLDER
 from odscen.sumo.realize.rules.story_files import StoryPlan
-from odscen.sumo.worker.body_contacts import BodyContacts
 from odscen.sumo.worker.moved_actors import SavedWalk
-from odscen.sumo.worker.saved_walks import mend_walks
-from odscen.sumo.worker.story_hands import StoryHands
-from odscen.sumo.worker.story_view import StoryView
+from odscen.sumo.worker.story.body_contacts import BodyContacts
+from odscen.sumo.worker.story.saved_walks import mend_walks
+from odscen.sumo.worker.story.story_hands import StoryHands
+from odscen.sumo.worker.story.story_view import StoryView
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -32,6 +32,10 @@ if TYPE_CHECKING:
 _FREE = WantedMove()
 _ANY_SPEED = 200.0
 """m/s."""
+_MORE = frozenset({"acceleration", "travelled", "off_road", "arrive", "own"})
+"""Conditions and actions that ask more of actors than where they are and how fast."""
+_LASTING = frozenset({"stopped", "own"})
+"""Those that ask how long actors have been standing."""
 
 
 class StoryRun:
@@ -49,6 +53,7 @@ class StoryRun:
             net_offset=plan.net_offset,
             rule_changes=self._engine.rule_changes,
         )
+        self._read(story)
         self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
         self._rules = story.rules
         self._contacts = BodyContacts(self._planned, plan.net_offset)
@@ -82,9 +87,15 @@ class StoryRun:
         self._rules = (*self._rules, *more.rules)
         self._plan.places.update(more.places)
         self._plan.signals.update(more.signals)
+        self._read(more)
         for name in _names(more):
             if name in self._planned:
                 self._actors[name] = self._planned[name]
+
+    def _read(self, story: StoryPlan) -> None:
+        """Let the view read what rules ask of actors."""
+        self._view.whole |= _asked_by(story, _MORE)
+        self._view.always |= _asked_by(story, _LASTING)
 
     def begin(self, session: Session) -> None:
         """Begin with a simulation; after a saved state, do again what the state does not hold."""
@@ -292,6 +303,17 @@ def _names(story: StoryPlan) -> Iterator[str]:
         for _, _, part in rule_parts(rule, ""):
             for _, name in actors_of(part):
                 yield name
+
+
+def _asked_by(story: StoryPlan, kinds: frozenset[str]) -> set[str]:
+    """Actors of whom conditions and actions of some kinds ask."""
+    return {
+        name
+        for rule in story.rules
+        for _, kind, part in rule_parts(rule, "")
+        if kind in kinds
+        for name in (rule.actor, *(name for _, name in actors_of(part)))
+    }
 
 
 def _numbers(pose: Any) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from odscen.results.records.run_records import PlannedActor
     from odscen.scenario.story.road_view import Point
     from odscen.sumo.realize.rules.story_files import StoryPlan
-    from odscen.sumo.worker.moved_actors import MovedActors, SeenPerson, SeenVehicle
+    from odscen.sumo.worker.moved_actors import MovedActors
 
 _STANDING = 0.1
 """m/s below which a road user stands."""
@@ -34,6 +34,14 @@ class StoryView:
     ----------
     rule_changes
         Of the engine.
+
+    Attributes
+    ----------
+    whole
+        Vehicles of which acceleration, metres travelled and lane are read, too.
+    always
+        Vehicles that are read in each step, as it is remembered how long they stand; others are
+        read when they are asked for. Persons always are.
     """
 
     def __init__(
@@ -48,9 +56,12 @@ class StoryView:
         self._actors = actors
         self._offset = net_offset
         self.rule_changes = rule_changes
-        self._now = 0.0
+        self.whole: set[str] = set()
+        self.always: set[str] = set()
+        self._now, self._step = 0.0, 0.0
+        self._driven: Mapping[str, float] = {}
         self._road: MovedActors
-        self._views: dict[str, ActorView] = {}
+        self._views: dict[str, ActorView | None] = {}
         self._nearest: dict[Point, tuple[str, float, int]] = {}
         self._half_widths: dict[str, float] = {}
         self._travelled: dict[str, float] = {}
@@ -65,22 +76,33 @@ class StoryView:
     def look(
         self, road: MovedActors, time: float, step: float, driven: Mapping[str, float]
     ) -> None:
-        """Read all actors; ``driven`` are speeds of persons that were moved, m/s."""
-        self._road, self._now = road, time
-        views = {}
+        """Begin to read a step; ``driven`` are speeds of persons that were moved, m/s."""
+        self._road, self._now, self._step, self._driven = road, time, step, driven
+        self._views = {}
         for name, actor in self._actors.items():
-            one = self._person(actor, step, driven) if actor.person else self._vehicle(actor)
-            if one is not None:
-                views[name] = one
-        self._views = views
+            if actor.person or name in self.always:
+                self.actor(name)
 
     def actor(self, name: str) -> ActorView | None:
         """Return an actor, ``None`` if it is not on the road."""
-        return self._views.get(name)
+        if name in self._views:
+            return self._views[name]
+        planned = self._actors.get(name)
+        found = None
+        if planned is not None:
+            found = self._person(planned) if planned.person else self._vehicle(planned)
+        self._views[name] = found
+        return found
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""
-        return tuple(self._views.values())
+        return tuple(one for one in map(self.actor, self._actors) if one is not None)
+
+    def _there(self, name: str) -> ActorView:
+        one = self.actor(name)
+        if one is None:
+            raise KeyError(name)
+        return one
 
     def place(self, place: str | Point) -> Point:
         """X and y of a place."""
@@ -91,11 +113,11 @@ class StoryView:
 
     def lane_distance(self, actor: str, to: str | Point) -> float | None:
         """Metres along the lanes from the centre of an actor to another's, or to a place."""
-        own = self._views[actor]
+        own = self._there(actor)
         if own.person:
             return None
         ahead = own.length / 2.0
-        other = self._views.get(to) if isinstance(to, str) else None
+        other = self.actor(to) if isinstance(to, str) else None
         if other is not None:
             if other.person:
                 where = self._near((other.x, other.y))
@@ -110,7 +132,7 @@ class StoryView:
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
         """Centre line of the lane ``by`` lanes to the left of an actor's."""
-        own = self._views[actor]
+        own = self._there(actor)
         for shape in self._road.side_lines(actor, by):
             line = tuple((x - self._offset[0], y - self._offset[1]) for x, y in shape)
             left = -beside(line, (own.x, own.y)).left
@@ -168,76 +190,61 @@ class StoryView:
         return self._nearest[place]
 
     def _vehicle(self, planned: PlannedActor) -> ActorView | None:
+        if planned.id not in self.whole:
+            moves = self._road.motion(planned.id)
+            return None if moves is None else self._view(planned, *moves)
         seen = self._road.vehicle(planned.id)
         if seen is None:
             return None
-        half = 0.0
-        if seen.lane:
-            known = self._half_widths.get(seen.lane)
-            if known is None:
-                known = self._half_widths[seen.lane] = self._road.lane_width(seen.lane) / 2.0
-            half = known
-        return self._view(
-            planned,
-            seen,
-            speed=seen.speed,
-            acceleration=seen.acceleration,
-            travelled=seen.travelled,
-            off_road=not seen.lane or abs(seen.left) > half,
-        )
+        x, y, angle, speed, faster, travelled, lane, left = seen
+        off_road = not lane or abs(left) > self._half_width(lane)
+        return self._view(planned, x, y, angle, speed, faster, travelled, off_road=off_road)
 
-    def _person(
-        self, planned: PlannedActor, step: float, driven: Mapping[str, float]
-    ) -> ActorView | None:
+    def _half_width(self, lane: str) -> float:
+        known = self._half_widths.get(lane)
+        if known is None:
+            known = self._half_widths[lane] = self._road.lane_width(lane) / 2.0
+        return known
+
+    def _person(self, planned: PlannedActor) -> ActorView | None:
         seen = self._road.person(planned.id)
         if seen is None:
             return None
         x, y, before = self._last.get(planned.id, (seen.x, seen.y, seen.speed))
         moved = math.hypot(seen.x - x, seen.y - y)
         # SUMO says 0 of persons that are moved.
-        speed = driven.get(planned.id, seen.speed)
+        speed = self._driven.get(planned.id, seen.speed)
         self._travelled[planned.id] = self._travelled.get(planned.id, 0.0) + moved
         self._last[planned.id] = seen.x, seen.y, speed
+        travelled, faster = self._travelled[planned.id], (speed - before) / self._step
         return self._view(
-            planned,
-            seen,
-            speed=speed,
-            acceleration=(speed - before) / step,
-            travelled=self._travelled[planned.id],
+            planned, seen.x, seen.y, seen.angle_deg, speed, faster, travelled,
             off_road=not seen.lane,
-        )
+        )  # fmt: skip
 
     def _view(
         self,
         planned: PlannedActor,
-        seen: SeenVehicle | SeenPerson,
-        *,
+        front_x: float,
+        front_y: float,
+        angle: float,
         speed: float,
-        acceleration: float,
-        travelled: float,
-        off_road: bool,
+        acceleration: float = 0.0,
+        travelled: float = 0.0,
+        *,
+        off_road: bool = False,
     ) -> ActorView:
-        if speed >= _STANDING:
-            self._standing.pop(planned.id, None)
-        else:
-            self._standing.setdefault(planned.id, self._now)
-        x, y = body_centre(
-            seen.x, seen.y, seen.angle_deg, length=planned.length, net_offset=self._offset
-        )
-        return ActorView(
-            id=planned.id,
-            x=x,
-            y=y,
-            hdg=math.remainder(math.radians(90.0 - seen.angle_deg), math.tau),
-            speed=speed,
-            acceleration=acceleration,
-            length=planned.length,
-            width=planned.width,
-            travelled=travelled,
-            person=planned.person,
-            standing=self._standing.get(planned.id),
-            off_road=off_road,
-        )
+        name, length, standing = planned.id, planned.length, None
+        if speed < _STANDING:
+            standing = self._standing.setdefault(name, self._now)
+        elif name in self._standing:
+            del self._standing[name]
+        x, y = body_centre(front_x, front_y, angle, length=length, net_offset=self._offset)
+        hdg = math.remainder(math.radians(90.0 - angle), math.tau)
+        return ActorView(  # by place: by name it takes twice as long
+            name, x, y, hdg, speed, acceleration, length, planned.width, travelled,
+            planned.person, standing, off_road,
+        )  # fmt: skip
 
 
 def _under(one: ActorView, place: Point) -> float | None:
@@ -256,13 +263,16 @@ def stranger(
     road: MovedActors, planned: PlannedActor, net_offset: tuple[float, float]
 ) -> ActorView | None:
     """Body of a road user that no rule names."""
-    seen = road.person(planned.id) if planned.person else road.vehicle(planned.id)
-    if seen is None:
+    if planned.person:
+        seen = road.person(planned.id)
+        moves = None if seen is None else seen[:4]
+    else:
+        moves = road.motion(planned.id)
+    if moves is None:
         return None
-    pose = sumo_to_xodr(
-        SumoPose(seen.x, seen.y, 0.0, seen.angle_deg), length=planned.length, net_offset=net_offset
-    )
+    x, y, angle, speed = moves
+    pose = sumo_to_xodr(SumoPose(x, y, 0.0, angle), length=planned.length, net_offset=net_offset)
     return ActorView(
-        planned.id, float(pose.x), float(pose.y), float(pose.hdg), seen.speed, 0.0,
+        planned.id, float(pose.x), float(pose.y), float(pose.hdg), speed, 0.0,
         planned.length, planned.width, 0.0, planned.person,
     )  # fmt: skip

@@ -110,6 +110,12 @@ class StoryHands:
             half = self._actors[one.actor].length / 2.0
             x += half * math.cos(hdg) + self._offset[0]
             y += half * math.sin(hdg) + self._offset[1]
+            if not held.person and road.off_lanes(x, y, width=self._actors[one.actor].width):
+                why = (
+                    f"it appears where it is placed, as {one.at[0]:g}, {one.at[1]:g} is on no lane"
+                )
+                self._lose(one.actor, time, why)
+                return
             put = road.put_person if held.person else road.put_vehicle
             put(one.actor, x, y, float(angle_deg_from_hdg(hdg)))
 

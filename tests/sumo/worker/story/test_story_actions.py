@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from odscen.lanegraph.query import node_id, node_index, walk_node_index
+from odscen.results.measures.latent_delay import due, latent_delay
+from odscen.results.measures.summary import actors_from_json
 from tests.sumo.story_case import (
     LEFT,
     MIDDLE,
@@ -19,7 +21,7 @@ from tests.sumo.story_case import (
     run,
     walk_node_at,
 )
-from tests.sumo.worker.test_story_run import MOTORWAY, STEPS, TOWN, after, fast
+from tests.sumo.worker.story.test_story_run import MOTORWAY, STEPS, TOWN, after, fast
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -212,6 +214,24 @@ def test_a_run_waits_for_whom_a_rule_lets_appear(tmp_path: Path) -> None:
     assert [one.actor for one in found.events if one.kind == "arrived"] == ["van", "child"]
 
 
+@pytest.mark.parametrize(("when", "appears"), [(9.0, True), (90.0, False)])
+def test_whoever_appears_by_a_rule_waits_for_no_room_before(
+    tmp_path: Path, when: float, appears: bool
+) -> None:
+    actors = [
+        fast("van", 370.0, MIDDLE),
+        {"id": "late", "category": "car", "spawn": node_at(MOTORWAY, 800.0, RIGHT),
+         "goal": node_at(MOTORWAY, 900.0, RIGHT)},
+    ]  # fmt: skip
+    rules = [after(when, {"appear": {}}, actor="late")]
+    run(document(MOTORWAY, actors, rules, until=40.0), tmp_path / "run")
+    rows = actors_from_json((tmp_path / "run" / "actors.json").read_text())
+    late = next(one for one in rows if one.id == "late")
+    assert (late.depart, late.depart_delay) == ((9.1, 0.0) if appears else (40.0, None))
+    assert {one.id for one in due(rows, 40.0)} == ({"van", "late"} if appears else {"van"})
+    assert latent_delay(late, 40.0) == 0.0
+
+
 def test_a_child_appears_on_its_sidewalk_and_walks(tmp_path: Path) -> None:
     spawn = walk_node_at(TOWN, 270.0, 100.5)
     child = {
@@ -311,3 +331,22 @@ def test_lights_and_horn_are_reported(tmp_path: Path) -> None:
         (3.0, "lights: the driver's"),
     ]
     assert math.isfinite(said[0][0])
+
+
+def test_what_is_to_appear_beside_all_lanes_appears_where_it_is_placed_with_a_word(
+    tmp_path: Path,
+) -> None:
+    place = [500.0, MIDDLE - 12.0, 0.0]
+    rows = [[0.0, *place], [1.0, *place]]
+    then = [{"appear": {"at": place}}, {"replay": {"rows": rows}}]
+    rule = {"id": "r", "actor": "van", "when": {"time": {"after": 1.0}}, "then": then}
+    van = {
+        "id": "van", "category": "car", "spawn": node_at(MOTORWAY, 370.0, MIDDLE),
+        "goal": node_at(MOTORWAY, 900.0, MIDDLE),
+    }  # fmt: skip
+    found = run(document(MOTORWAY, [van], [rule], until=4.0), tmp_path / "run")
+    [said] = [one for one in found.events if one.kind == "rule_failed"]
+    assert said.detail is not None
+    assert said.detail.startswith("it appears where it is placed, as 500, ")
+    first = found.tracks["van"]
+    assert first.centre(float(first.time[0]))[0] == pytest.approx(370.0, abs=3.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.results.records.run_records import Event, EventKind
 from odscen.scenario.story.body_distance import overlap
-from odscen.sumo.worker.story_view import stranger
+from odscen.sumo.worker.story.story_view import stranger
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from odscen.scenario.story.channels import WantedMove
     from odscen.scenario.story.road_view import ActorView
     from odscen.sumo.worker.moved_actors import MovedActors
-    from odscen.sumo.worker.story_view import StoryView
+    from odscen.sumo.worker.story.story_view import StoryView
 
 BODIES = "bodies"
 """Kind of collision, where odscen has found it."""
@@ -54,11 +54,12 @@ class BodyContacts:
         moved = [name for name, move in moves.items() if move.exact or move.pose is not None]
         touching: set[tuple[str, str]] = set()
         events: list[Event] = []
+        named = {one.id: one for one in view.named()} if moved else {}
         for name in sorted(moved):
-            one = view.actor(name)
+            one = named.get(name)
             if one is None:
                 continue
-            for other in self._others(one, road, view):
+            for other in self._others(one, road, named):
                 pair = min(one.id, other.id), max(one.id, other.id)
                 if pair in touching or not _near(one, other):
                     continue
@@ -72,13 +73,14 @@ class BodyContacts:
             return [one for one in events if frozenset((one.actor, one.partner or "")) not in known]
         return []
 
-    def _others(self, one: ActorView, road: MovedActors, view: StoryView) -> Iterator[ActorView]:
-        named = {other.id: other for other in view.named()}
+    def _others(
+        self, one: ActorView, road: MovedActors, named: Mapping[str, ActorView]
+    ) -> Iterator[ActorView]:
         yield from (other for name, other in named.items() if name != one.id)
-        seen = road.person(one.id) if one.person else road.vehicle(one.id)
-        if seen is None or not seen.lane:
+        lane = road.lane_of(one.id, person=one.person)
+        if not lane:
             return
-        for name, _ in road.bodies_near(seen.lane):
+        for name, _ in road.bodies_near(lane):
             planned = self._planned.get(name)
             if name not in named and planned is not None:
                 other = stranger(road, planned, self._offset)

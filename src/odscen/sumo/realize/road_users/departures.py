@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Flow, Scenario
     from odscen.scenario.placing.region import Region
     from odscen.scenario.placing.usable_nodes import Usable
+    from odscen.sumo.realize.transit.parking_trips import ParkingOfTrips
 
 
 def road_users(
@@ -54,8 +55,10 @@ def road_users(
             category=actor.category,
             spawn=_node(graph, actor.spawn),
             goal=goals[actor.id],
+            via=tuple(_node(graph, name) for name in actor.via),
             depart=actor.depart,
             speed=actor.speed,
+            initial_speed=actor.initial_speed,
             design=actor,
         )
         for actor in scenario.actors
@@ -106,6 +109,7 @@ def flow_users(
                 goal=goal,
                 depart=round(depart, 2),
                 speed=flow.speed,
+                initial_speed=flow.initial_speed,
                 flow=flow.id,
             )
         )
@@ -118,11 +122,12 @@ def demand_users(
     placed: Sequence[RoadUser],
     *,
     until: float,
+    parking: ParkingOfTrips | None = None,
 ) -> tuple[list[RoadUser], list[str]]:
     """Members of the scenario's demand who depart before ``until``, and what of it is not met.
 
     Counts come last: they are made up for what all others, ``placed`` and the rest of the
-    demand, leaves of them.
+    demand, leaves of them. ``parking`` lets trips before them park.
     """
     taken = [place for actor in scenario.actors if (place := region.place(actor.spawn))]
     ground = TripEnds(region, usable, taken=taken)
@@ -141,6 +146,9 @@ def demand_users(
         add(matrix_trips(scenario, ground, matrix))
     for background in scenario.demand.background:
         add(background_trips(scenario, ground, background, usable))
+    if parking is not None:
+        users, said = parking.applied(users)
+        unmet += said
     generated = [one for one in scenario.demand.counts if one.use == "generate"]
     if generated:
         others = [*placed, *users]

@@ -1,0 +1,121 @@
+"""Many short runs by odscen, two at a time, against a bare pool of libsumo that writes the same.
+
+Aim: at most 1.5 times the CPU of the pool, and one run alone at most 0.6 s. The pool has two
+processes that keep libsumo loaded and go through the same SUMO files, with the same outputs and
+the same allocator; it checks nothing and makes no figures. odscen's side has everything, from the
+start of ``odscen run``; once with reports, and once without. Its modules are compiled, as those of
+an installed package are, whatever ``PYTHONDONTWRITEBYTECODE`` says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from odscen.app.scenarios import GenerationSettings, generate
+from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.sumo.folder import layout
+from odscen.sumo.runner.forked_worker import worker_environment
+from odscen.workspace.store import Workspace
+
+ACTORS = 20
+SECONDS = 60.0
+JOBS = 2
+MAP = Path(__file__).parents[1] / "maps" / "signal_crossing.xodr"
+_POOL = """
+import sys
+from multiprocessing import get_context
+
+
+def run(config):
+    import libsumo
+
+    libsumo.start(["sumo", "-c", config, "--output-prefix", "bare_"])
+    while libsumo.simulation.getMinExpectedNumber() and libsumo.simulation.getTime() < %s:
+        libsumo.simulationStep()
+    libsumo.close()
+
+
+if __name__ == "__main__":
+    with get_context("spawn").Pool(%d) as pool:
+        pool.map(run, sys.stdin.read().split(), chunksize=1)
+"""
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(prog="bench short_runs")
+    options.add_argument("--runs", type=int, default=20, help="scenarios")
+    options.add_argument("--repeats", type=int, default=3, help="rounds; medians are shown")
+    asked = options.parse_args()
+    with tempfile.TemporaryDirectory(prefix="odscen-bench-") as name:
+        compare(Path(name), runs=asked.runs, repeats=asked.repeats)
+
+
+def compare(folder: Path, *, runs: int, repeats: int) -> None:
+    scenarios = _scenarios(folder, runs)
+    script = folder / "pool.py"
+    script.write_text(_POOL % (SECONDS, JOBS), encoding="utf-8")
+    out = folder / "runs"
+    batch = _command(folder, out, scenarios)
+    _cpu(batch)
+    configs = sorted(out.glob(f"*/{layout.SUMO_FOLDER}/{layout.CONFIG_FILE}"))
+    bare = folder / "bare"
+    for config in configs:
+        shutil.copytree(config.parent, bare / config.parent.parent.name)
+    given = "\n".join(str(bare / one.parent.parent.name / one.name) for one in configs)
+    rounds = [
+        (
+            _cpu([sys.executable, str(script)], given=given),
+            _cpu(batch),
+            _cpu([*batch, "--no-report"]),
+            _cpu(_command(folder, folder / "alone", scenarios[:1])),
+            _cpu([*_command(folder, folder / "alone", scenarios[:1]), "--no-report"]),
+        )
+        for _ in range(repeats)
+    ]
+    for row, words in ((1, "with reports"), (2, "without reports")):
+        each = statistics.median(one[row][0] for one in rounds) / runs
+        peer = statistics.median(one[0][0] for one in rounds) / runs
+        ratio = statistics.median(one[row][0] / one[0][0] for one in rounds)
+        print(
+            f"{runs} runs of {ACTORS} actors, {SECONDS:g} s, {JOBS} at a time, {words}: "
+            f"odscen {each:.3f} CPU s each, bare pool {peer:.3f}, ratio {ratio:.2f} (aim 1.5)"
+        )
+        cpu, wall = (statistics.median(one[row + 2][part] for one in rounds) for part in (0, 1))
+        print(f"one alone, {words}: {wall:.2f} s, {cpu:.2f} CPU s (aim 0.6 s)")
+
+
+def _scenarios(folder: Path, number: int) -> list[Path]:
+    workspace = Workspace.open(folder / "workspace")
+    workspace.add_map(MAP)
+    config = SamplingConfig(actors_max=ACTORS, duration=SECONDS)
+    settings = GenerationSettings(map_name=MAP.stem, count=number, fill=1.0, config=config)
+    return list(generate(workspace, settings=settings))
+
+
+def _command(folder: Path, out: Path, scenarios: list[Path]) -> list[str]:
+    command = [sys.executable, "-m", "odscen", "run", *map(str, scenarios)]
+    command += ["--workspace", str(folder / "workspace"), "--out", str(out)]
+    return [*command, "--jobs", str(JOBS)]
+
+
+def _cpu(command: list[str], *, given: str = "") -> tuple[float, float]:
+    """CPU seconds of a command with all that it starts, and wall seconds."""
+    # What a forked process takes is its server's, which the command waits for.
+    environment = worker_environment() if given else dict(os.environ)
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    environment["PYTHONPYCACHEPREFIX"] = str(Path(tempfile.gettempdir()) / "odscen-bench-compiled")
+    before, start = os.times(), time.perf_counter()
+    subprocess.run(
+        command, check=True, capture_output=True, text=True, input=given, env=environment
+    )
+    after, wall = os.times(), time.perf_counter() - start
+    spent = after.children_user + after.children_system
+    return spent - before.children_user - before.children_system, wall

@@ -1,0 +1,1 @@
+"""Who is on the road, when and where, and how each of them goes."""
